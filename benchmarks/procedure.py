@@ -27,7 +27,7 @@ def measure(config: Path, time_scale: float, out: Path) -> tuple[float, float]:
     began_s = time.perf_counter()
     subprocess.run([*command, "--set", f"world.time_scale={time_scale}"], check=True, capture_output=True)
     wall_s = time.perf_counter() - began_s
-    arm = read_run(out / "run.h5").arm
+    arm = read_run(out / "run.h5").states
     moving = np.flatnonzero(np.abs(arm["qd_rad_s"]).max(axis=1) > 0)
     return wall_s, float(arm["time_s"][moving[-1]] - arm["time_s"][moving[0]])
 

@@ -76,7 +76,7 @@ def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
     """The arm states of a recording, and how many are missing between its first and last; none without a recording."""
     if not recording.exists():
         return 0, 0
-    time_s = read_run(recording).arm["time_s"]
+    time_s = read_run(recording).states["time_s"]
     missed = np.round(np.diff(time_s) * state_rate_hz).astype(int) - 1
     return len(time_s), int(missed.clip(min=0).sum())
 

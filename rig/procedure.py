@@ -9,7 +9,7 @@ from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
 from rig.analysis.outcome import Outcome, calibrated, drifted, verified, verified_alone
-from rig.config.models import ArmSection, ProcedureSection, RigConfig
+from rig.config.models import ArmSection, ProcedureSection, RigConfig, TurnerSection
 from rig.config.procedure_sections import (
     AttitudesSection,
     BiasDriftSection,
@@ -32,7 +32,7 @@ from rig.plans.verbs import Verbs
 __all__ = [
     "ArmSection", "AttitudesSection", "BiasDriftSection", "Dwell", "ImuSection", "Joints", "Outcome", "Plan",
     "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData", "SixObservationSection",
-    "SixSweepsSection", "StaticAttitudesSection", "Step", "Sweep", "Transfer", "Verbs", "VerifySection",
-    "calibrated", "drifted", "plan_imu", "plan_six_observation", "plan_static_attitudes", "run_script",
+    "SixSweepsSection", "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection", "Verbs",
+    "VerifySection", "calibrated", "drifted", "plan_imu", "plan_six_observation", "plan_static_attitudes", "run_script",
     "trapezoid_duration", "travel", "verified", "verified_alone",
 ]  # fmt: skip

@@ -22,6 +22,7 @@ from rig.estimation.earth_rate import EarthRate
 from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.own_errors import KnownSensor, own_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
+from rig.observation.arm_motion import ArmMotion
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
@@ -165,7 +166,7 @@ def _of_angles(pieces: Pieces, known: Allowed) -> Array:
 def _visits(pieces: Pieces) -> list[list[int]]:
     """Sweeps that follow each other, of one joint, beside which the others stood where they were."""
     found: list[list[int]] = []
-    stood = np.full(6, np.nan)
+    stood: Array = np.array(np.nan)
     for sweep in np.unique(pieces.sweep[pieces.sweep > REST]).tolist():
         stretch = pieces.stretches[int(np.argmax(pieces.sweep == sweep))]
         q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
@@ -185,7 +186,7 @@ def turned_by(stretch: Stretch, steps: int) -> Array:
     middle, moved = (q_rad[1:] + q_rad[:-1]) / 2, np.diff(q_rad, axis=0)
     axes = flange_axes(middle, motion.kinematics)
     off = np.zeros((len(ANGLES), 3))
-    for joint, first in WAVES_OF.items():
+    for joint, first in _waves_of(motion).items():
         if np.ptp(q_rad[:, joint]) < STANDS_RAD:
             continue
         for here, by in zip(middle, moved[:, joint], strict=True):
@@ -195,11 +196,18 @@ def turned_by(stretch: Stretch, steps: int) -> Array:
     return off / (stretch.end_s - stretch.start_s)
 
 
+def _waves_of(motion: ArmMotion) -> dict[int, int]:
+    """Where in `ANGLES` the waves of a joint begin, by its place: of an arm its wrists, of any chain its last three."""
+    beyond = motion.kinematics.joints - 1 - WRIST_3
+    return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
+
+
 def _ends(stretch: Stretch) -> list[Array]:
     """(3,) rad/s for a radian by which one joint that moved was elsewhere before a way, or after it; for each."""
     q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
     axes = flange_axes(q_rad, stretch.motion.kinematics) / (stretch.end_s - stretch.start_s)
-    return [end[:, joint] for joint in WAVES_OF if np.ptp(q_rad[:, joint]) >= STANDS_RAD for end in axes]
+    moved = [joint for joint in _waves_of(stretch.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
+    return [end[:, joint] for joint in moved for end in axes]
 
 
 def _of_times(pieces: Pieces, jitter_s: float) -> Array:

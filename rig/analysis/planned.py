@@ -14,7 +14,7 @@ from rig.analysis.planned_reference import planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference
 from rig.analysis.vector_inputs import known_sensor
-from rig.config.models import RigConfig
+from rig.config.models import ArmSection, RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION
@@ -32,14 +32,14 @@ class Told:
 
 
 def planned_told_from(config: RigConfig, plan: Plan) -> Told:
-    """What the plan will tell of all that is to be calibrated but magnetometers.
+    """What the plan of an arm will tell of all that is to be calibrated but magnetometers; of other turners nothing.
 
     For the nominal arm, and for a sensor as its data sheet has it, which nothing but its noise and its flicker makes
     wander.
     """
     settings = settings_of(config, plan)
     site, known = settings.site, settings.uncertainty
-    if site is None or known is None:  # as in settings of before
+    if site is None or known is None or not isinstance(config.turner, ArmSection):  # None in settings of before
         return Told({}, {})
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)

@@ -5,7 +5,6 @@ import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from contextlib import ExitStack
-from math import degrees
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
@@ -39,7 +38,7 @@ def run(options: Namespace) -> int:
         found = stack.enter_context(configured_here(options.config, options.overrides, options.script))
         if found.loaded.simulated:
             stack.enter_context(simulated_laboratory(found.loaded.text))
-        looks = [_look_at_board, _look_at_instruments, _look_at_arm]
+        looks = [_look_at_board, _look_at_instruments, _look_at_turner]
         missing = [problem for look_at in looks for problem in _named(look_at, found, tell)]
     if options.json:
         problems = [problem._asdict() for problem in missing]
@@ -112,28 +111,27 @@ def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
     return missing
 
 
-def _look_at_arm(configured: "Configured", tell: Tell) -> list[Problem]:
+def _look_at_turner(configured: "Configured", tell: Tell) -> list[Problem]:
     from rig.motion.doubts import doubts
-    from rig.turners.ur.driver import look
-    from rig.turners.ur.identity import arm_words
-    from rig.turners.ur.preflight import preflight_problems
+    from rig.turners.registry import kind_of
 
-    section = configured.loaded.config.arm
-    report = look(section.host)
-    state = report.state
-    angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
-    tell(f"arm at {report.host}: {arm_words(report)}")
-    tell(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
-    plan = configured.phase.plan(state.q_rad)
+    section = configured.loaded.config.turner
+    kind = kind_of(section)
+    report = kind.look(section)
+    tell(f"arm at {report.host}: {report.words}")
+    tell(kind.stance(report))
+    plan = configured.phase.plan(report.state.q_rad)
     for doubt in doubts(plan):
         tell(f"note: {doubt}")
-    return [*_claims_of_others(section.host), *preflight_problems([plan], section, report)]
+    return [*_claims_of_others(section.address), *kind.problems([plan], section, report)]
 
 
 def _claims_of_others(host: str) -> list[Problem]:
     """A problem if another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
     from rig.commands.claims import claimed_arm
 
+    if not host:
+        return []
     try:
         with claimed_arm(host):
             return []

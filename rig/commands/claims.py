@@ -29,7 +29,8 @@ CREDENTIALS = struct.Struct("3i")  # of the far end: process, user, group (unix(
 def claimed(config: RigConfig) -> Iterator[None]:
     """All that a run works with. Raises Refused `arm_claimed`, `board_claimed`, `sensor_claimed`."""
     with ExitStack() as stack:
-        stack.enter_context(claimed_arm(config.arm.host))
+        if config.turner.address:
+            stack.enter_context(claimed_arm(config.turner.address))
         if config.board is not None:
             stack.enter_context(claimed_board(config.board.port))
         for name, section in config.sensors.items():

@@ -11,6 +11,7 @@ from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections
 from rig.plans.script_errors import script_errors
 from rig.plans.script_file import ScriptFile, installed_script, load_script
+from rig.turners import registry as turners
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
         overrides = [*overrides, f"procedure.name={script.procedure.name}"]
     # The section of a script is its own code as well.
     with script_errors(f"the section of {script.name} fails") if script is not None else nullcontext():
-        loaded = load(config_path, overrides, sections(procedures))
+        loaded = load(config_path, overrides, sections(procedures), turners.sections())
     if script is None:
         script = installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))
@@ -47,5 +48,5 @@ def configured_here(
 ) -> Iterator[Configured]:
     """What `configured` has, its simulated laboratory at an address of its own for the length of the `with` block."""
     found = configured(config_path, overrides, script)
-    with own_address(found.loaded.config, simulated=found.loaded.simulated) as moved:
+    with own_address(found.loaded.config, found.loaded.laboratory) as moved:
         yield configured(config_path, [*overrides, *moved], script and found.script) if moved else found

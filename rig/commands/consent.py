@@ -50,7 +50,8 @@ def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
     if loaded.flash_file is not None:
         yield "the file of a simulated board's flash", str(loaded.flash_file)
     if not loaded.simulated:
-        yield "the arm", config.arm.host
+        if config.turner.address:
+            yield "the arm", config.turner.address
         if config.board is not None:
             yield "the board", config.board.port
         for name, section in config.sensors.items():

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from rig.commands.claims import claimed_arm, claimed_laboratory
 from rig.config.load import Loaded, load
-from rig.config.models import SensorsConfig
+from rig.config.models import RigConfig, SensorsConfig
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -19,27 +19,28 @@ CANDIDATES = 250
 
 
 @contextmanager
-def own_address(config: SensorsConfig, *, simulated: bool) -> Iterator[list[str]]:
+def own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
     """What to override of a configuration so that its laboratory is nobody else's, for the length of the `with` block.
 
-    Nothing where its address is free, or it is real. Nor where none of many is: whoever needs it then says so.
+    `laboratory` is the file as used where it has a simulated one, else None. Nothing where its address is free, or it
+    is real. Nor where none of many is: whoever needs it then says so.
     """
-    if not simulated or config.arm is None:
+    if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    host = config.arm.host
+    host = config.turner.address
     with ExitStack() as held:
         own = next((each for each in (host, *_others()) if _take(each, held)), host)
         if own != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
-        yield [] if own == host else list(_moved(config, own))
+        yield [] if own == host else [f"{_turner_key(laboratory)}.host={own}", *_moved(config, own)]
 
 
 @contextmanager
 def loaded_here(path: Path, overrides: Sequence[str]) -> Iterator[Loaded]:
     """A configuration, its laboratory at an address of its own, without its procedure. Raises Refused as `load`."""
     loaded = load(path, overrides, sections=None)
-    with own_address(loaded.config, simulated=loaded.simulated) as moved:
+    with own_address(loaded.config, loaded.laboratory) as moved:
         yield load(path, [*overrides, *moved], sections=None) if moved else loaded
 
 
@@ -65,10 +66,16 @@ def _take(host: str, held: ExitStack) -> bool:
     return True
 
 
+def _turner_key(text: str) -> str:
+    """Under which key a file says what turns."""
+    import yaml
+
+    return "turner" if "turner" in yaml.safe_load(text) else "arm"
+
+
 def _moved(config: SensorsConfig, host: str) -> Iterator[str]:
-    """Every address of the configuration, at another host."""
+    """The ports of the configuration, at another host."""
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.serial.port": each.serial.port for name, each in config.sensors.items() if each.serial}
-    yield f"arm.host={host}"
     for key, port in ports.items():
         yield f"{key}=socket://{host}:{urlsplit(port).port}"

@@ -31,12 +31,11 @@ def planned(options: Namespace) -> "Planned":
     """
     from rig.commands.configured import configured
     from rig.errors import refuse
-    from rig.motion.carried import carried_by
-    from rig.motion.preflight import plan_problems
     from rig.report.plan_table import Planned
+    from rig.turners.registry import kind_of
 
     found = configured(options.config, options.overrides, options.script)
     steps = found.phase.plan()
     config = found.loaded.config
-    refuse(plan_problems(steps, carried_by(config.arm)))
+    refuse(kind_of(config.turner).problems([steps], config.turner, None))
     return Planned(steps, config, repeated=found.phase.follows is not None)

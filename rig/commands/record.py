@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
     config, simulated = load_sensors(options.config, options.overrides)
     with ExitStack() as stack:
         if simulated is not None:
-            if moved := stack.enter_context(own_address(config, simulated=True)):
+            if moved := stack.enter_context(own_address(config, simulated)):
                 config, simulated = load_sensors(options.config, [*options.overrides, *moved])
             assert simulated is not None
             stack.enter_context(simulated_laboratory(simulated))

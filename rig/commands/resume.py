@@ -38,6 +38,7 @@ def run(options: Namespace) -> int:
     from rig.data.result_file import read_result
     from rig.data.run_folder import CONFIG, RESULT, SCRIPT, refuse_links, script_identity
     from rig.plans.script_file import kept_script, load_script
+    from rig.turners.registry import sections
 
     folder: Path = options.run_folder
     if not (folder / CONFIG).exists():
@@ -51,7 +52,7 @@ def run(options: Namespace) -> int:
             "Start a new run with `rig run`",
         )
     refuse_links(*folder.iterdir())
-    refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), options.connect)
+    refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None, turners=sections()), options.connect)
     named = None if options.script is None else load_script(options.script)
     script, moved = kept_script(folder, script_identity(folder), named), frozenset(options.other_board)
     with configured_here(folder / CONFIG, script=script) as found:

@@ -63,7 +63,7 @@ def run(options: Namespace) -> int:
     with raised_as(Refused):  # nothing runs here
         for run in runs:
             refuse_elsewhere(run)
-            check_arms_times(run.arm)
+            check_arms_times(run.states)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
     feed = Feed(Shown(_about(folder, runs)))
     with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
@@ -83,13 +83,17 @@ def run(options: Namespace) -> int:
 def _about(folder: Path, runs: "list[RunData]") -> "About":
     from rig.data.provenance import calls_itself_simulated
     from rig.page.about import About
+    from rig.page.arm import geometry
 
     parts: dict[str, str] = {}
     for run in runs:
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
     made_with = runs[0].provenance
     simulated = calls_itself_simulated(made_with.arm_software)
-    arm = {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
+    turner = runs[0].turner
+    assert turner is not None, "of what was not recorded elsewhere"
+    arm = geometry(turner.geometry, turner.joints)
+    arm |= {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
     return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)
 
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from rig.config.as_written import take_text_as_written
 from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
-from rig.config.models import ProcedureSection, RigConfig, SensorsConfig, StatementConfig
+from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
@@ -24,6 +24,9 @@ from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
+Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for an arm
+ARM = "ur"  # the kind of turner that `arm` is the section of
+TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
 
 
@@ -43,6 +46,11 @@ class Loaded:
     text: str
     rig_text: str
 
+    @property
+    def laboratory(self) -> str | None:
+        """The file as used, where it has a `world:` section."""
+        return self.text if self.simulated else None
+
 
 class ConfigurationRefused(Refused):
     """The configuration is not valid; `problems` has one line for each error found."""
@@ -60,14 +68,16 @@ class ConfigurationRefused(Refused):
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in shown)])
 
 
-def load(path: str | Path, overrides: Sequence[str] = (), sections: Sections = STOCK_SECTIONS) -> Loaded:
+def load(
+    path: str | Path, overrides: Sequence[str] = (), sections: Sections = STOCK_SECTIONS, turners: Turners = None
+) -> Loaded:
     """Read, override and validate a configuration file.
 
     `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures the file may name, each
-    with what its `procedure:` section holds. Raises `ConfigurationRefused` listing every error with its path, line,
-    value, what is allowed and, for a misspelling, the nearest valid spelling.
+    with what its `procedure:` section holds, `turners` the same of the kinds of turners. Raises `ConfigurationRefused`
+    listing every error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
-    return _validated(_layered(path, overrides), str(path), sections)
+    return _validated(_layered(path, overrides), str(path), sections, turners)
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
@@ -77,11 +87,14 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
     """
     layered = _layered(path, overrides)
     if "world" in layered.document:
-        loaded = _validated(layered, str(path), None)
+        loaded = _validated(layered, str(path), None, None)
         return loaded.config, loaded.text
-    config, problems = _validate(SensorsConfig, layered.document, (), layered)
-    if layered.problems or config is None:
-        raise ConfigurationRefused(str(path), [*layered.problems, *problems])
+    rest = {key: value for key, value in layered.document.items() if key not in TURNS}
+    said = TURNS & layered.document.keys()
+    _, turner_problems = _validate_turner(layered.document, None, layered) if said else (None, [])
+    config, problems = _validate(SensorsConfig, rest, (), layered)
+    if layered.problems or turner_problems or config is None:
+        raise ConfigurationRefused(str(path), [*layered.problems, *turner_problems, *problems])
     return config, None
 
 
@@ -109,19 +122,20 @@ def parse(
     source: str = "configuration",
     overrides: Sequence[str] = (),
     sections: Sections = STOCK_SECTIONS,
+    turners: Turners = None,
 ) -> Loaded:
     """The configuration in a text, as `load` has it; it cannot build on a file."""
     try:
         layered = put_together(text, None, overrides)
     except Unreadable as error:
         raise ConfigurationRefused(source, [str(error)]) from None
-    return _validated(layered, source, sections)
+    return _validated(layered, source, sections, turners)
 
 
-def _validated(layered: Layered, source: str, sections: Sections) -> Loaded:
+def _validated(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
     document = layered.document
     rig_part = {key: value for key, value in document.items() if key != "world"}
-    config, rig_problems = _validate_rig(rig_part, sections, layered)
+    config, rig_problems = _validate_rig(rig_part, sections, turners, layered)
     world: WorldSection | None = None
     world_problems: list[str] = []
     if "world" in document:
@@ -145,14 +159,16 @@ def _dump(document: Mapping[str, Any]) -> str:
 
 
 def _validate_rig(
-    document: Mapping[str, Any], sections: Sections, layered: Layered
+    document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """The rig's part: the procedure by the section its name chooses, and the rest."""
+    """The rig's part: the procedure and the turner by the sections that name and kind choose, and the rest."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
-    rest = {**document, "procedure": procedure or ProcedureSection(name="")}
+    turner, turner_problems = _validate_turner(document, turners, layered)
+    rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
+    rest.pop("arm", None)
     config, rest_problems = _validate(RigConfig, rest, (), layered)
-    if procedure is None or config is None:
-        return None, rest_problems + problems
+    if procedure is None or turner is None or config is None:
+        return None, turner_problems + rest_problems + problems
     problems = [f"(file): {problem}" for problem in procedure.problems(config)]
     return (None if problems else config), problems
 
@@ -170,6 +186,31 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
     if nearest:
         problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), layered)[1]
     return None, problems
+
+
+def _validate_turner(
+    document: Mapping[str, Any], turners: Turners, layered: Layered
+) -> tuple[TurnerSection | None, list[str]]:
+    """The section that says what turns: `arm` or, with its kind, `turner`. Of a wrong kind one problem."""
+    if "turner" not in document:
+        if "arm" not in document:
+            return None, ["arm: missing"]
+        return _validate(ArmSection, document["arm"], ("arm",), layered)
+    known = {ARM: ArmSection, **(turners or {})}
+    data = document["turner"]
+    kind = data.get("kind") if isinstance(data, dict) else None
+    if "arm" in document:
+        problem = _where(("turner",), layered.places) + ": what turns is said twice; say either arm or turner"
+    elif not isinstance(data, dict):
+        problem = _where(("turner",), layered.places) + f": {quote(data)}: must be a section, with the key kind"
+    elif isinstance(kind, str) and kind in known:
+        said = {key: value for key, value in data.items() if key != "kind"}
+        return _validate(known[kind], said, ("turner",), layered)
+    elif turners is None and kind is not None:
+        return TurnerSection(), []
+    else:
+        problem = _where(("turner", "kind"), layered.places) + _not_allowed(kind, list(known))
+    return None, [problem]
 
 
 def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered) -> tuple[Model | None, list[str]]:
@@ -194,7 +235,9 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
     where = _where((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]
     if kind == "extra_forbidden":
-        allowed = [*_keys_at(model, location[:-1]), *(["world", BASE] if not prefix and len(location) == 1 else [])]
+        whole = not prefix and len(location) == 1
+        arm = ["arm"] if whole and issubclass(model, SensorsConfig) else []
+        allowed = [*arm, *_keys_at(model, location[:-1]), *(["world", BASE] if whole else [])]
         return f"{where}: unknown key{_nearest(str(location[-1]), allowed)}; allowed: {', '.join(allowed)}"
     if kind == "missing":
         return f"{where}: missing{_made_by_override((*prefix, *location[:-1]), layered)}"
@@ -252,7 +295,10 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
-    host = config.arm.host
+    if not isinstance(config.turner, ArmSection):
+        yield "world: simulates an arm, and turner says another kind"
+        return
+    host = config.turner.host
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
     if not _is_loopback(host):

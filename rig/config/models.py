@@ -24,6 +24,7 @@ from rig.config.section import (
     Offset,
     Section,
     SensorName,
+    Vector3,
     checked_host,
     checked_port,
 )
@@ -32,7 +33,21 @@ from rig.config.sensor_sections import MagnetometerSection, SensorSection, field
 from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG, SPEED_LIMIT_DEG_S
 
 
-class ArmSection(Section):
+class TurnerSection(Section):
+    """What every turner's section has: nothing in common but this. A kind of turner adds its own keys."""
+
+    @property
+    def address(self) -> str:
+        """Where it answers, a host or a port; empty where nothing is connected to."""
+        return ""
+
+    @property
+    def extension_m(self) -> Vector3:
+        """Where the extension ends on which the sensors sit, x y z in the frame of what it turns, m."""
+        return (0.0, 0.0, 0.0)
+
+
+class ArmSection(TurnerSection):
     """The robot arm and what it carries."""
 
     host: str = Field(min_length=1, max_length=253, description="name or address of the arm's controller")
@@ -67,6 +82,17 @@ class ArmSection(Section):
     def can_be_looked_up(cls, value: str) -> str:
         """What no name server could be asked for."""
         return checked_host(value)
+
+    @property
+    def address(self) -> str:
+        """The controller's name or address."""
+        return self.host
+
+    @property
+    def extension_m(self) -> Vector3:
+        """Where the extension ends, x y z in the flange's frame, m."""
+        x, y, z = (each / 1000 for each in self.extension_mm)
+        return x, y, z
 
 
 class BoardSection(Section):
@@ -136,7 +162,7 @@ class StatementConfig(Section):
 class SensorsConfig(Section):
     """What who only reads sensors needs of a configuration: how they are turned and judged may be left out."""
 
-    arm: ArmSection | None = None
+    turner: Any = None
     board: BoardSection | None = None
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, MagnetometerSection] = Field(default={}, max_length=len(MAGNETOMETERS))
@@ -227,11 +253,21 @@ class SensorsConfig(Section):
 
 
 class RigConfig(SensorsConfig):
-    """Everything the rig reads. It has no knowledge of whether the far end is simulated."""
+    """Everything the rig reads. It has no knowledge of whether the far end is simulated.
 
-    arm: ArmSection
+    `turner` is what turns the sensors; a file says it under `turner` with its kind, or an arm under `arm`.
+    """
+
+    turner: TurnerSection
     procedure: ProcedureSection
     limits: LimitsSection
+
+    @property
+    def arm(self) -> ArmSection:
+        """The robot arm that turns the sensors. Raises TypeError where something else does."""
+        if not isinstance(self.turner, ArmSection):
+            raise TypeError(f"no arm turns the sensors: the configuration has a {type(self.turner).__name__}")
+        return self.turner
 
 
 def _fields_of_kvhs(sensors: Mapping[str, SensorSection]) -> set[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from rig.config import layers, yaml_text
-from rig.config.models import RigConfig
+from rig.config.models import ArmSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.sensor_catalogue import PARTS
 from rig.config.world_models import WorldSection
@@ -98,9 +98,24 @@ def _keys() -> Iterator[str]:
     for name in schema["properties"]:
         if name == "procedure":
             yield from _procedures()
+        elif name == "turner":
+            yield from _turners()
         else:
             section = schema["properties"][name]
             yield from _section(name, _section_of(section) or section, schema["$defs"])
+
+
+def _turners() -> Iterator[str]:
+    schema = ArmSection.model_json_schema()
+    yield from _section("arm", schema, schema.get("$defs", {}))
+    yield from (
+        "### `turner`",
+        "",
+        "What turns the sensors, said by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
+        "`arm`; a file has one of the two. A package may bring another kind, which brings its own keys",
+        "([another turner](how-to/other-hardware.md)).",
+        "",
+    )
 
 
 def _procedures() -> Iterator[str]:

@@ -12,7 +12,6 @@ from typing import Any
 from firmware_host.answers import BoardObservation, BoardSolution
 from rig.data.checked import Finite, checked
 from rig.errors.quoting import quote
-from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Dwell, Sweep
 
 LARGEST_INTEGER = 2**63 - 1
@@ -175,13 +174,14 @@ def _check_sweep(sweep: Sweep) -> None:
     """A sweep that could be planned: what reads it relies on its numbers."""
     low, high = sweep.revolution_rad
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, sweep.speed_rad_s, sweep.duration_s)
-    if not (0 <= sweep.joint < len(JOINT_NAMES) and low < high and all(map(math.isfinite, numbers))):
+    joints = len(sweep.start_q_rad)
+    if not (0 <= sweep.joint < joints == len(sweep.end_q_rad) and low < high and all(map(math.isfinite, numbers))):
         raise ValueError(f"there is no such sweep as {quote(sweep)}")
 
 
 def _check_dwell(dwell: Dwell) -> None:
     """Raises ValueError for a dwell that cannot be."""
-    if len(dwell.q_rad) != len(JOINT_NAMES) or not all(map(math.isfinite, (*dwell.q_rad, dwell.duration_s))):
+    if not all(map(math.isfinite, (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 

@@ -2,8 +2,8 @@
 
 The HDF5 library does not come back from some damaged files, and nothing in a process can end it then, no signal
 either. So a file is read where it can be ended from outside, and only what proved whole reaches the rig: a line of JSON
-(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, arm, events, and
-the tables of readings from elsewhere.
+(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, the turner's
+states, events, and the tables of readings from elsewhere.
 What is of another shape ends in one line on stderr and exit status 1, an output that takes no more in NO_ROOM.
 """
 
@@ -19,8 +19,17 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, recorded_sensor, table_dtype
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.data.layout import (
+    EVENTS_DTYPE,
+    SCHEMA,
+    SCHEMA_ELSEWHERE,
+    TABLES,
+    TEXTS,
+    recorded_sensor,
+    states_dtype,
+    states_name,
+    table_dtype,
+)
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
@@ -43,6 +52,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         schema = _text(file, "schema")
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
+        texts = {name: _text(file, name) for name in TEXTS[schema]}
         elsewhere = schema == SCHEMA_ELSEWHERE
         group = {} if elsewhere else _member(file, "samples", h5py.Group)
         if len(group) > MAX_SENSORS:
@@ -50,9 +60,10 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
         described = {name: _attributes(dataset) for name, dataset in samples.items()}
         sensors = {name: recorded_sensor(schema, name, attributes) for name, attributes in described.items()}
+        states = states_name(schema)
         rows = {
             **{f"samples/{name}": (each, sensors[name].sample_dtype) for name, each in samples.items()},
-            "arm": (_member(file, "arm", h5py.Dataset), ARM_STATE_DTYPE),
+            states: (_member(file, states, h5py.Dataset), states_dtype(schema, texts)),
             "events": (_member(file, "events", h5py.Dataset), EVENTS_DTYPE),
         }
         for name in TABLES if elsewhere else ():
@@ -63,7 +74,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         _refuse_endless(path, sum(int(dataset.nbytes) for dataset, _ in rows.values()))
         yield {
             "schema": schema,
-            "texts": {name: _text(file, name) for name in TEXTS[schema]},
+            "texts": texts,
             "described": described,
         }
         for dataset, _ in rows.values():

@@ -1,12 +1,15 @@
-"""How a run lies in HDF5 (schema "rig.run/3").
+"""How a run lies in HDF5 (schema "rig.run/4").
 
 `/samples/<sensor>` (its stamps and a column for each of its channels; the sensor's description as attributes, with the
-`channels` in JSON), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of variable length, so an event is a
-line of JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the file. Schema
-"rig.run/2" has attributes of fixed names in place of `channels`, and "rig.run/1" lacks `settings` as well.
+`channels` in JSON), `/states` (of the turner, of the type that `turner` describes: `rig.data.recorded_turner`),
+`/events` (bytes: SWMR forbids data of variable length, so an event is a line of JSON); `schema`, `config` (YAML),
+`settings`, `provenance` and `turner` (JSON) as attributes of the file. Schema "rig.run/3" has no `turner`, and `/arm`
+(ARM_STATE_DTYPE) in place of `/states`; "rig.run/2" has attributes of fixed names in place of `channels`, and
+"rig.run/1" lacks `settings` as well.
 
-Readings from elsewhere (schema "rig.files/1") have no `/samples`, but the tables `/readings` and `/motion` (a float
-column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose readings, and what the motion tells).
+Readings from elsewhere (schema "rig.files/1") have no `/samples` and an empty `/arm`, but the tables `/readings` and
+`/motion` (a float column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose readings, and what the
+motion tells).
 """
 
 import json
@@ -20,18 +23,21 @@ from numpy.typing import NDArray
 
 from rig.config.written_file import PART
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
+from rig.data.recorded_turner import turner_of
 from rig.data.sensor_of_run_2 import described_in_channels
 from rig.motion.state import ARM_STATE_DTYPE
 
-SCHEMA = "rig.run/3"
+SCHEMA = "rig.run/4"
 SCHEMA_ELSEWHERE = "rig.files/1"
 TABLES = ("readings", "motion")
 TEXTS = {
-    SCHEMA: ("config", "settings", "provenance"),
+    SCHEMA: ("config", "settings", "provenance", "turner"),
     SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
+    "rig.run/3": ("config", "settings", "provenance"),
     "rig.run/2": ("config", "settings", "provenance"),
     "rig.run/1": ("config", "provenance"),
 }
+IN_CHANNELS = (SCHEMA, "rig.run/3")
 EVENTS_DTYPE = np.dtype("u1")
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
@@ -42,29 +48,40 @@ class Contents:
     """What a run file holds, as it stands there: nothing of it is judged yet.
 
     `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
-    its type, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of readings from
-    elsewhere alone.
+    its type, `states` (n,) of the turner, of theirs, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of
+    readings from elsewhere alone.
     """
 
     schema: str
     texts: Mapping[str, str]
     described: Mapping[str, Mapping[str, Any]]
     samples: Mapping[str, NDArray[Any]]
-    arm: NDArray[Any]
+    states: NDArray[Any]
     events: NDArray[Any]
     tables: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
-def empty(texts: Mapping[str, str], sensors: Mapping[str, RecordedSensor]) -> Contents:
-    """The contents of a run of these sensors that begins."""
+def empty(schema: str, texts: Mapping[str, str], sensors: Mapping[str, RecordedSensor]) -> Contents:
+    """The contents of a recording of these sensors that begins. Raises ValueError for a turner that cannot be."""
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
     samples = {name: np.empty(0, sensor.sample_dtype) for name, sensor in sensors.items()}
-    return Contents(SCHEMA, texts, described, samples, np.empty(0, ARM_STATE_DTYPE), np.empty(0, EVENTS_DTYPE))
+    states = np.empty(0, states_dtype(schema, texts))
+    return Contents(schema, texts, described, samples, states, np.empty(0, EVENTS_DTYPE))
+
+
+def states_name(schema: str) -> str:
+    """The name of the dataset of states in a file of that schema."""
+    return "states" if schema == SCHEMA else "arm"
+
+
+def states_dtype(schema: str, texts: Mapping[str, str]) -> np.dtype[Any]:
+    """The type of the rows of states in a file of that schema with these texts. Raises ValueError."""
+    return turner_of(texts["turner"]).dtype if schema == SCHEMA else ARM_STATE_DTYPE
 
 
 def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
     """The sensor that the attributes of its samples describe in a file of that schema. Raises ValueError."""
-    if schema != SCHEMA:
+    if schema not in IN_CHANNELS:
         return sensor_of(described_in_channels(name, attributes))
     channels = attributes.get("channels")
     if not isinstance(channels, str):
@@ -96,7 +113,7 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
     whole.unlink(missing_ok=True)
     with h5py.File(whole, "x", libver="latest" if swmr else None) as file:  # not through a link that came to lie there
         file.attrs.update(schema=contents.schema, **contents.texts)
-        _dataset(file, "arm", contents.arm, CHUNK_ROWS)
+        _dataset(file, states_name(contents.schema), contents.states, CHUNK_ROWS)
         _dataset(file, "events", contents.events, CHUNK_BYTES)
         for name, rows in contents.tables.items():
             _dataset(file, name, rows, CHUNK_ROWS)

@@ -16,8 +16,8 @@ from rig.data.checked import checked
 from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, Pose
-from rig.motion.state import ArmReport, Made
+from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.state import Made, Report
 
 OF_FILES = ("readings_file", "motion_file")
 SIMULATED = "(simulated)"  # so ends the version of a controller that is none
@@ -28,13 +28,15 @@ PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 class Provenance:
     """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
 
-    `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. `arm_kinematics` is
-    the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one.
-    `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is reckoned
-    with; None where it was not told. `arm_maker` and `arm_model` are those of the arm that was found; older recordings
-    do not say (None): any arm was taken for a UR10e. `board_follows_crystal` is the board's own word on its clock, None
-    where there is no board and in older recordings. Files of schema "rig.run/1" do not name the script; that was an
-    installed one. `readings_file` and `motion_file` are those of readings recorded elsewhere, with no arm and no board.
+    What turned the sensors is called the arm, whatever it is. `stored_calibrations` are those by which the board
+    corrected what it streamed, by sensor name. `arm_kinematics` is the geometry that was reckoned with; older
+    recordings do not say (None): that was the nominal arm's. `tcp_offset` is where the controller's tool centre point
+    stood in the flange's frame, which nothing is reckoned with; None where it was not told. `arm_maker` and `arm_model`
+    are those of what was found; older recordings do not say (None): any arm was taken for a UR10e. `turner_kind` is the
+    kind it is registered as, None in recordings of before there were several: an arm of Universal Robots.
+    `board_follows_crystal` is the board's own word on its clock, None where there is no board and in older recordings.
+    Files of schema "rig.run/1" do not name the script; that was an installed one. `readings_file` and `motion_file` are
+    those of readings recorded elsewhere, with no arm and no board.
     """
 
     started_utc: str
@@ -55,14 +57,10 @@ class Provenance:
     tcp_offset: Pose | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
+    turner_kind: str | None = None
     board_follows_crystal: bool | None = None
     readings_file: FileEntry | None = None
     motion_file: FileEntry | None = None
-
-    @property
-    def kinematics(self) -> DenavitHartenberg:
-        """The arm's geometry its angles are to be read with."""
-        return self.arm_kinematics or NOMINAL
 
     @property
     def script_identity(self) -> ScriptIdentity:
@@ -75,7 +73,8 @@ class Provenance:
         files = {name: each.model_dump() for name in OF_FILES if (each := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "board_follows_crystal", *OF_FILES)
+        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model")
+        optional += ("turner_kind", "board_follows_crystal", *OF_FILES)
         unknown |= {name for name in optional if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
 
@@ -113,21 +112,22 @@ def _program() -> dict[str, Any]:
 def provenance_of(
     loaded: Loaded,
     board: BoardIdentity | None,
-    arm: ArmReport,
+    turner: Report,
     made: Made,
     *,
     stored: Mapping[str, StoredCalibration],
     script: ScriptIdentity,
     script_installed: bool,
     follows_crystal: bool | None,
+    kind: str,
 ) -> Provenance:
-    """Provenance of a recording that begins now with an arm `made` so; `stored` as in `Provenance`."""
+    """Provenance of a recording that begins now with a turner of that `kind`, `made` so; `stored` as above."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         **_program(),
         configuration_sha256=hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
-        arm_serial_number=arm.serial_number,
-        arm_software=arm.polyscope,
+        arm_serial_number=turner.serial_number,
+        arm_software=turner.software,
         board_unique_id=NO_BOARD if board is None else board.unique_id,
         firmware_version=NO_BOARD if board is None else board.firmware,
         sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.all_sensors.items()},
@@ -138,8 +138,9 @@ def provenance_of(
         script_sha256=script.sha256,
         script_installed=script_installed,
         arm_kinematics=made.kinematics,
-        tcp_offset=arm.tcp_offset,
+        tcp_offset=made.tcp_offset,
         arm_maker=made.maker,
         arm_model=made.model,
+        turner_kind=kind,
         board_follows_crystal=follows_crystal,
     )

@@ -37,6 +37,7 @@ from rig.data.result_types import (
 )
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
+from rig.motion.geometry import OfJoints
 
 SCHEMA: Final = "rig.result/1"
 SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,000
@@ -94,12 +95,12 @@ class StoredCalibrationEntry(Entry):
 
 
 class KinematicsEntry(Entry):
-    """The arm's Denavit–Hartenberg parameters that were reckoned with, base to wrist 3."""
+    """The Denavit–Hartenberg parameters of what turned that were reckoned with, from the ground on; of an arm six."""
 
-    theta_rad: Vector6
-    a_m: Vector6
-    d_m: Vector6
-    alpha_rad: Vector6
+    theta_rad: OfJoints
+    a_m: OfJoints
+    d_m: OfJoints
+    alpha_rad: OfJoints
 
 
 class FileEntry(Entry):
@@ -136,6 +137,7 @@ class ProvenanceEntry(Entry):
     tcp_offset: Vector6 | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
+    turner_kind: str | None = None
     board_follows_crystal: bool | None = None
     readings_file: FileEntry | None = None
     motion_file: FileEntry | None = None

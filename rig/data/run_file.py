@@ -27,6 +27,7 @@ from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
 from rig.data.layout import (
     EVENTS_DTYPE,
+    SCHEMA,
     SCHEMA_ELSEWHERE,
     TABLES,
     Contents,
@@ -34,17 +35,20 @@ from rig.data.layout import (
     empty,
     lay_out,
     recorded_sensor,
+    states_name,
     table_of,
 )
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
 from rig.data.quantity import RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recorded_turner import RecordedTurner, check_joints, turner_of
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.data.silence import Silence
+from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.errors import Fault, Refused
-from rig.motion.state import ARM_STATE_DTYPE, ArmState
+from rig.motion.state import State
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
@@ -54,18 +58,19 @@ READ_SPARED = 6  # … and at most so many times that, when the reading process 
 
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """A run file in memory: `samples` (n,) by name of a sensor, `arm` (n,) ARM_STATE_DTYPE, events in order.
+    """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
 
     `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
-    have no arm; their samples are those of a sensor on a clock of its own.
+    have no turner (None); their samples are those of a sensor on a clock of its own.
     """
 
     config: str
     settings: RunSettings
     provenance: Provenance
+    turner: RecordedTurner | None
     sensors: dict[str, RecordedSensor]
     samples: dict[str, NDArray[Any]]
-    arm: NDArray[Any]
+    states: NDArray[Any]
     events: tuple[Recorded, ...]
     elsewhere: ReadElsewhere | None = None
 
@@ -84,7 +89,7 @@ class RunRecorder:
     `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
     not. Raises Fault `recording_failed` from the constructor, `check` and `close`.
     The adding calls never wait for the disk and do not report its failures, so that a full disk stalls neither the
-    board's link nor the arm's: watch `check`.
+    board's link nor the turner's: watch `check`.
     """
 
     def __init__(
@@ -94,6 +99,7 @@ class RunRecorder:
         config: str,
         settings: RunSettings,
         provenance: Provenance,
+        turner: RecordedTurner,
         sensors: Mapping[str, RecordedSensor],
     ) -> None:
         import h5py
@@ -104,12 +110,14 @@ class RunRecorder:
         self._controller_time_s: float | None = None
         self._lock = threading.Lock()
         self._pending = _Pending({name: [] for name in sensors}, [], [])
+        self._states_dtype = turner.dtype
         self._closing = threading.Event()
         try:
             if path.exists():
                 raise FileExistsError(f"{path.name} is there already")
             texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
-            lay_out(path, empty(texts, sensors), swmr=True)
+            texts["turner"] = turner.to_json()
+            lay_out(path, empty(SCHEMA, texts, sensors), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
@@ -131,14 +139,14 @@ class RunRecorder:
         with self._lock:
             self._pending.samples[sensor].append(samples)
 
-    def add_arm_state(self, state: ArmState) -> None:
-        """Append one arm state."""
+    def add_state(self, state: State) -> None:
+        """Append one state of the turner."""
         with self._lock:
             self._controller_time_s = state.time_s
-            self._pending.arm.append(state)
+            self._pending.states.append(state)
 
     def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
-        """Append an event, now; its controller time is the newest arm state's unless given."""
+        """Append an event, now; its controller time is the newest state's unless given."""
         with self._lock:
             known = self._controller_time_s if controller_time_s is None else controller_time_s
             self._pending.events.append(to_line(Recorded(event, time.monotonic(), known)))
@@ -184,9 +192,9 @@ class RunRecorder:
         for name, batches in pending.samples.items():
             if batches:
                 append(self._file["samples"][name], np.concatenate(batches))
-        if pending.arm:
-            records = [state.to_record() for state in pending.arm]
-            append(self._file["arm"], np.array(records, ARM_STATE_DTYPE))
+        if pending.states:
+            records = [state.to_record() for state in pending.states]
+            append(self._file[states_name(SCHEMA)], np.array(records, self._states_dtype))
         if pending.events:
             append(self._file["events"], np.frombuffer(b"".join(pending.events), EVENTS_DTYPE))
 
@@ -213,14 +221,22 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
         if elsewhere is not None:
             sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
+        settings = _settings(contents, sensors)
+        provenance = checked(Provenance, json.loads(contents.texts["provenance"]), "provenance")
+        events = tuple(from_lines(contents.events.tobytes()))
+        turner = None
+        if elsewhere is None:
+            turner = _turner(contents, provenance)
+            check_joints(turner, settings, events)
         return RunData(
             config=contents.texts["config"],
-            settings=_settings(contents, sensors),
-            provenance=checked(Provenance, json.loads(contents.texts["provenance"]), "provenance"),
+            settings=settings,
+            provenance=provenance,
+            turner=turner,
             sensors=sensors,
             samples=samples,
-            arm=_whole_rows(contents.arm),
-            events=tuple(from_lines(contents.events.tobytes())),
+            states=_whole_rows(contents.states),
+            events=events,
             elsewhere=elsewhere,
         )
     except (ValueError, RecursionError) as error:
@@ -235,7 +251,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
     texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells)))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
-    lay_out(path, replace(empty(texts, {}), schema=SCHEMA_ELSEWHERE, tables=tables), swmr=False)
+    lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
 
 
 def make_plain(path: Path) -> None:
@@ -245,7 +261,7 @@ def make_plain(path: Path) -> None:
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
-    lay_out(path, replace(contents, samples=samples, arm=_whole_rows(contents.arm)), swmr=False)
+    lay_out(path, replace(contents, samples=samples, states=_whole_rows(contents.states)), swmr=False)
 
 
 def _contents(path: Path, timeout_s: float | None) -> Contents:
@@ -275,9 +291,9 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         out.seek(0)
         header = json.loads(out.readline())
         samples = {name: np.load(out) for name in header["described"]}
-        arm, events = np.load(out), np.load(out)
+        states, events = np.load(out), np.load(out)
         tables = {name: np.load(out) for name in (TABLES if header["schema"] == SCHEMA_ELSEWHERE else ())}
-        return Contents(**header, samples=samples, arm=arm, events=events, tables=tables)
+        return Contents(**header, samples=samples, states=states, events=events, tables=tables)
 
 
 def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:
@@ -326,6 +342,15 @@ def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunS
     return settings
 
 
+def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
+    if contents.schema != SCHEMA:
+        return turner_of_provenance(provenance)
+    turner = turner_of(contents.texts["turner"])
+    if provenance.arm_kinematics not in (None, turner.geometry):
+        raise ValueError("its provenance has another geometry than its turner")
+    return turner
+
+
 def _elsewhere(contents: Contents) -> ReadElsewhere:
     tables = [contents.tables[each] for each in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
@@ -354,5 +379,5 @@ class _Pending:
     """What waits for the writer thread."""
 
     samples: dict[str, list[NDArray[Any]]]
-    arm: list[ArmState]
+    states: list[State]
     events: list[bytes]

@@ -20,6 +20,7 @@ from rig.data.checked import Finite, Positive, checked
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
+from rig.motion.geometry import OfJoints
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import SiteSection
@@ -167,7 +168,7 @@ class PlannedDwell:
     through, from 0."""
 
     index: int
-    q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+    q_rad: OfJoints
     repeat: Annotated[int, Field(ge=0)]
 
 
@@ -183,7 +184,8 @@ class RunSettings:
     that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
     the extension ends on which the sensors sit, in the flange's frame. `reckoning` numbers the way of solving and
     checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, what
-    docs/uncertainty.md says of today. Readings from `elsewhere` have no arm, so no home, and no limits.
+    docs/uncertainty.md says of today. `home_q_rad` are the angles of the turner's joints, of which there may be none.
+    Readings from `elsewhere` have no home and no limits.
     """
 
     procedure: str
@@ -192,7 +194,7 @@ class RunSettings:
     limits: Limits | None
     to_calibrate: Annotated[tuple[str, ...], Field(min_length=1)]
     reference: KnownReference | None
-    home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)] | tuple[()]
+    home_q_rad: OfJoints
     planned_sweeps: tuple[PlannedSweep, ...]
     matrix_corrected: tuple[str, ...] = ()
     site: Site | None = None
@@ -288,15 +290,13 @@ def settings_from_json(text: str) -> RunSettings:
     if schema not in SCHEMAS:
         raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
     settings = checked(RunSettings, document, "settings")
-    if settings.elsewhere is None and (settings.limits is None or not settings.home_q_rad):
-        raise ValueError("its settings have no limits or no home_q_rad, which those of a run have")
+    if settings.elsewhere is None and settings.limits is None:
+        raise ValueError("its settings have no limits, which those of a run have")
     return settings
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     """The settings of a new run; `plan` is that of the whole procedure."""
-    from rig.motion.carried import carried_by
-
     reference = None
     if config.reference is not None:
         name, section = config.reference
@@ -318,7 +318,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
-        extension_m=carried_by(config.arm).extension_m,
+        extension_m=config.turner.extension_m,
         reckoning=RECKONING,
     )
 

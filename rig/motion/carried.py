@@ -19,7 +19,7 @@ class Carried:
 
 def carried_by(arm: ArmSection) -> Carried:
     """What an arm carries by its configuration."""
-    return Carried(arm.payload_kg, _metres(arm.payload_centre_mm), _metres(arm.extension_mm))
+    return Carried(arm.payload_kg, _metres(arm.payload_centre_mm), arm.extension_m)
 
 
 def _metres(millimetres: Place) -> Place:

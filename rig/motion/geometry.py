@@ -1,6 +1,7 @@
-"""Kinematics of an arm like the UR10e: where the flange is and how it turns, from joint angles and speeds.
+"""Kinematics of a chain of joints: where the flange, its end, is and how it turns, from joint angles and speeds.
 
-Every function takes arrays whose last axis holds the six joints, base to wrist 3, and broadcasts over the others.
+Every function takes arrays whose last axis holds the n joints, the one on the ground first, and broadcasts over the
+others. What speaks of shoulder, elbow, forearm is of an arm like the UR10e, of six joints, base to wrist 3.
 """
 
 from dataclasses import dataclass
@@ -32,18 +33,31 @@ LENGTHS = (
 )
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-OfJoints = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+MAX_JOINTS = 8
+OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]
 Pose = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]  # a controller's: m, rotation vector in rad
 
 
 @dataclass(frozen=True, slots=True)
 class DenavitHartenberg:
-    """An arm's geometry: of each joint, base to wrist 3, its zero θ, the length a, the offset d and the twist α."""
+    """A chain's geometry: of each of n joints, from the ground on, its zero θ, the length a, the offset d, the twist α.
+
+    Raises ValueError unless there are as many of each.
+    """
 
     theta_rad: OfJoints
     a_m: OfJoints
     d_m: OfJoints
     alpha_rad: OfJoints
+
+    def __post_init__(self) -> None:
+        if len({len(each) for each in (self.theta_rad, self.a_m, self.d_m, self.alpha_rad)}) > 1:
+            raise ValueError("a geometry has as many θ as a, d and α")
+
+    @property
+    def joints(self) -> int:
+        """How many joints it has."""
+        return len(self.theta_rad)
 
 
 NOMINAL = DenavitHartenberg(  # the maker's article 45257
@@ -57,36 +71,47 @@ NOMINAL = DenavitHartenberg(  # the maker's article 45257
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(13, 3) change of the direction of a wrist's axis in the flange's frame, by radian of each of `AXIS_ERRORS`.
 
-    At joint angles `q_rad` (6,). What turns the whole flange is seen by a sensor as its mounting.
+    At joint angles `q_rad` (n,). What turns the whole flange is seen by a sensor as its mounting. The wrists of another
+    chain are its last three joints; what it has not is never wrong.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
     to_flange = frames[-1].T
     axis = to_flange @ frames[joint, :, 2]
+    wrists = _last_three(arm)
 
     def turned(about: Array, link: int) -> Array:
         """How the joint's axis turns with all that lies beyond the joint `link`, the flange among it."""
         return np.cross(axis, to_flange @ about) if joint <= link else np.zeros(3)
 
-    changes = [turned(frames[link + 1][:, 0], link) for link in (WRIST_1, WRIST_2, WRIST_3)]
-    for link in (WRIST_2, WRIST_3):
-        by_zero = turned(frames[link][:, 2], link)
-        changes += [by_zero, *(wave * by_zero for wave in angle_waves(q[link]))]
+    changes = [turned(frames[link + 1][:, 0], link) if link >= 0 else np.zeros(3) for link in wrists]
+    for link in wrists[1:]:
+        by_zero = turned(frames[link][:, 2], link) if link >= 0 else np.zeros(3)
+        changes += [by_zero, *(wave * by_zero for wave in angle_waves(q[link] if link >= 0 else 0.0))]
     return np.array(changes)
 
 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(3, 6, 3) small turns of the flange, by radian of what is wrong with each wrist, in the base's frame.
 
-    At joint angles `q_rad` (6,): of its twist, its zero, and the waves of its angle as `WAVES` has them.
+    At joint angles `q_rad` (n,): of its twist, its zero, and the waves of its angle as `WAVES` has them. The wrists of
+    another chain are its last three joints; what it has not is never wrong.
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = np.array(_frames(q, arm))[:, :3, :3]
     found = []
-    for link in (WRIST_1, WRIST_2, WRIST_3):
+    for link in _last_three(arm):
+        if link < 0:
+            found.append([np.zeros(3)] * (2 + len(WAVES)))
+            continue
         by_zero = frames[link][:, 2]
         found.append([frames[link + 1][:, 0], by_zero, *(wave * by_zero for wave in angle_waves(q[link]))])
     return np.array(found)
+
+
+def _last_three(arm: DenavitHartenberg) -> tuple[int, int, int]:
+    """The last three joints of a chain, by their places; those it has not have places below 0."""
+    return arm.joints - 3, arm.joints - 2, arm.joints - 1
 
 
 def angle_waves(angle_rad: float) -> Array:
@@ -122,7 +147,7 @@ def _clean(value: float) -> float:
 
 
 def _frames(q_rad: ArrayLike, arm: DenavitHartenberg) -> list[Array]:
-    """Seven (…, 4, 4) transforms in the base frame: the base itself, then the frame after each joint."""
+    """The n + 1 transforms (…, 4, 4) in the base frame: the base itself, then the frame after each joint."""
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))]
     for joint, (theta, *link) in enumerate(zip(arm.theta_rad, arm.a_m, arm.d_m, arm.alpha_rad, strict=True)):
@@ -131,12 +156,12 @@ def _frames(q_rad: ArrayLike, arm: DenavitHartenberg) -> list[Array]:
 
 
 def flange_pose(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(…, 4, 4) pose of the flange in the base frame (metres) from joint angles `q_rad` (…, 6)."""
+    """(…, 4, 4) pose of the flange in the base frame (metres) from joint angles `q_rad` (…, n)."""
     return _frames(q_rad, arm)[-1]
 
 
 def flange_attitude(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(…, 3, 3) rotations taking a vector of the base frame into the flange's, for joint angles `q_rad` (…, 6)."""
+    """(…, 3, 3) rotations taking a vector of the base frame into the flange's, for joint angles `q_rad` (…, n)."""
     rotations: Array = np.swapaxes(flange_pose(q_rad, arm)[..., :3, :3], -1, -2)
     return rotations
 
@@ -208,7 +233,7 @@ def _distance(point: Array, start: Array, end: Array) -> Array:
 
 
 def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(…, 3, 6) unit axes of the six joints (columns) in the flange frame, for joint angles `q_rad` (…, 6).
+    """(…, 3, n) unit axes of the n joints (columns) in the flange frame, for joint angles `q_rad` (…, n).
 
     A joint's own angle does not move its column, so a sweep of one wrist keeps its axis.
     """
@@ -220,7 +245,7 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 3) metres from the axis of a joint to the flange's origin, in the flange's frame: what it swings on.
 
-    From the joint's own origin, at joint angles `q_rad` (…, 6); along the axis it means nothing.
+    From the joint's own origin, at joint angles `q_rad` (…, n); along the axis it means nothing.
     """
     frames = _frames(q_rad, arm)
     to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)
@@ -229,6 +254,6 @@ def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -
 
 
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, 6)."""
+    """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, n)."""
     rate: Array = np.einsum("...ij,...j->...i", flange_axes(q_rad, arm), np.asarray(qd_rad_s, dtype=np.float64))
     return rate

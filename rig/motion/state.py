@@ -1,37 +1,106 @@
-"""What the arm says about itself: one state per controller packet, and the report a look at the arm gives."""
+"""What a turner says about itself: its states, of any number of joints, and the report a look at it gives.
 
-from collections.abc import Callable
+A robot arm's states say more than joints: those of Universal Robots stand here too.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from operator import attrgetter
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from rig.motion.geometry import DenavitHartenberg, Pose
 
-JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
+JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")  # of an arm of Universal Robots
+MAKER = "Universal Robots"
 
-Joints = tuple[float, ...]  # six values, base to wrist 3
+Joints = tuple[float, ...]  # a value for each joint, the one that stands on the ground first
 Row = tuple[float | int | Joints, ...]
+Scalar = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # NumPy's names of types
 
-ARM_STATE_DTYPE = np.dtype(
-    [
-        ("time_s", "f8"),
-        ("host_time_s", "f8"),
-        ("q_rad", "f8", (6,)),
-        ("qd_rad_s", "f8", (6,)),
-        ("target_speed_fraction", "f8"),
-        ("speed_scaling", "f8"),
-        ("robot_mode", "i4"),
-        ("safety_mode", "i4"),
-        ("runtime_state", "i4"),
-        ("robot_status_bits", "u4"),
-        ("safety_status_bits", "u4"),
-    ]
+
+@dataclass(frozen=True, slots=True)
+class StateField:
+    """What the states of a turner tell beyond times and joints: a number's name, which carries the unit, its type."""
+
+    name: str
+    type: Scalar
+
+
+def state_dtype(joints: int, more: Sequence[StateField] = ()) -> np.dtype[Any]:
+    """The type of the rows in which states of so many joints are recorded, with what more they tell.
+
+    Without joints there are no columns of them: HDF5 has no arrays of no length.
+    """
+    angles = [(name, "<f8", (joints,)) for name in ("q_rad", "qd_rad_s")] if joints else []
+    beside = [(each.name, f"<{each.type}" if each.type[1] != "1" else each.type) for each in more]
+    return np.dtype([("time_s", "<f8"), ("host_time_s", "<f8"), *angles, *beside])
+
+
+ARM_FIELDS = (
+    StateField("target_speed_fraction", "f8"),
+    StateField("speed_scaling", "f8"),
+    StateField("robot_mode", "i4"),
+    StateField("safety_mode", "i4"),
+    StateField("runtime_state", "i4"),
+    StateField("robot_status_bits", "u4"),
+    StateField("safety_status_bits", "u4"),
 )
+ARM_STATE_DTYPE = state_dtype(len(JOINT_NAMES), ARM_FIELDS)
 
 # A joint slower than this stands still: above the noise of the velocity signal, 0.3° a second.
 REST_SPEED_RAD_S = 5e-3
+
+
+class State(Protocol):
+    """How a turner stood at one moment.
+
+    `time_s` is its own time (the reference clock of a recording), `host_time_s` `time.monotonic()` when that was read;
+    `q_rad` (n,) and `qd_rad_s` (n,) are the measured angles (rad) and speeds (rad/s) of its joints.
+    """
+
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def host_time_s(self) -> float: ...
+    @property
+    def q_rad(self) -> Joints: ...
+    @property
+    def qd_rad_s(self) -> Joints: ...
+    @property
+    def at_rest(self) -> bool:
+        """Whether no joint moves."""
+        ...
+
+    def to_record(self) -> Row:
+        """The values in the order of `state_dtype`: called for every state, hundreds of times a second."""
+        ...
+
+
+def stand_still(qd_rad_s: Joints) -> bool:
+    """Whether joints of these speeds stand still."""
+    return max(map(abs, qd_rad_s), default=0.0) < REST_SPEED_RAD_S
+
+
+@dataclass(frozen=True, slots=True)
+class JointState:
+    """A `State` that tells nothing beyond times and joints."""
+
+    time_s: float
+    host_time_s: float
+    q_rad: Joints
+    qd_rad_s: Joints
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no joint moves."""
+        return stand_still(self.qd_rad_s)
+
+    def to_record(self) -> Row:
+        """The values in the order of `state_dtype`, of at least one joint."""
+        return self.time_s, self.host_time_s, self.q_rad, self.qd_rad_s
 
 
 class RobotMode(IntEnum):
@@ -76,7 +145,7 @@ class RuntimeState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """One packet of the controller.
+    """One packet of the controller: a `State`.
 
     `time_s` is the controller's time stamp (the reference clock), `host_time_s` is `time.monotonic()` when the
     packet was read. `q_rad` and `qd_rad_s` are the six measured joint angles (rad) and speeds (rad/s), base to
@@ -104,7 +173,7 @@ class ArmState:
     @property
     def at_rest(self) -> bool:
         """Whether no joint moves."""
-        return max(map(abs, self.qd_rad_s)) < REST_SPEED_RAD_S
+        return stand_still(self.qd_rad_s)
 
 
 _IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(each.name for each in fields(ArmState)))
@@ -134,11 +203,41 @@ class ArmSetup:
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """Who made what turns, which model it is (None where it does not tell), and the geometry reckoned with."""
+    """Who made what turns, which model it is (None where it does not tell), and the geometry reckoned with.
+
+    `tcp_offset` is where an arm's tool centre point stands in the flange's frame, which nothing is reckoned with.
+    """
 
     maker: str
     model: str | None
     kinematics: DenavitHartenberg
+    tcp_offset: Pose | None = None
+
+
+class Report(Protocol):
+    """What a look at a turner shows.
+
+    `host` says where it answers, by an address or a port; `software` is the version of what drives it there, `model`
+    None where it does not tell, `kinematics` its geometry where it tells that itself, `joints` the names of its joints,
+    the one on the ground first; `words` name it in a line of text.
+    """
+
+    @property
+    def host(self) -> str: ...
+    @property
+    def serial_number(self) -> str: ...
+    @property
+    def software(self) -> str: ...
+    @property
+    def model(self) -> str | None: ...
+    @property
+    def state(self) -> State: ...
+    @property
+    def kinematics(self) -> DenavitHartenberg | None: ...
+    @property
+    def joints(self) -> tuple[str, ...]: ...
+    @property
+    def words(self) -> str: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +247,8 @@ class ArmReport:
     `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `payload_kg` and
     `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's geometry as the
     factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame, `setup` the arm it
-    is set up for, `called` that arm's name as the dashboard has it.
+    is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all of that means, in the
+    maker's names. It is a `Report`.
     """
 
     host: str
@@ -164,3 +264,20 @@ class ArmReport:
     tcp_offset: Pose | None = None
     setup: ArmSetup | None = None
     called: str | None = None
+    model: str | None = None
+
+    @property
+    def software(self) -> str:
+        """The controller's software in its own words."""
+        return self.polyscope
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of its joints."""
+        return JOINT_NAMES
+
+    @property
+    def words(self) -> str:
+        """The arm as a line of text names it: model, serial number, software."""
+        named = "model not told" if self.model is None else f"{MAKER} {self.model}"
+        return f"{named}, serial number {self.serial_number}, PolyScope {self.polyscope}"

@@ -98,7 +98,7 @@ class Dwell:
 
     @property
     def name(self) -> str:
-        angles = (round(math.degrees(angle), 1) + 0.0 for angle in self.q_rad[3:])  # no -0
+        angles = (round(math.degrees(angle), 1) + 0.0 for angle in self.q_rad[-3:])  # no -0
         return f"dwell at {' '.join(f'{angle:g}' for angle in angles)}"
 
 

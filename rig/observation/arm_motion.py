@@ -1,4 +1,4 @@
-"""The recorded arm as a function of time: all that is read of its states is read here."""
+"""What turned, a chain of joints, as a function of time: all that is read of its states is read here."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,23 +23,25 @@ ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicul
 
 
 class ArmMotion:
-    """A `Motion` of an arm: `angles(t)` (n, 6) rad of its joints, `rate(t)` (n, 3) rad/s of its flange.
+    """A `Motion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
-    counts is when the joint was where. `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
+    counts is when the joint was where. `states` (m,) are rows as `state_dtype` has them, of joints of that `kinematics`
+    and of those `names`.
     Raises Fault `no_motion`, `not_finite`, `impossible_times`.
     """
 
-    def __init__(self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL) -> None:
+    def __init__(
+        self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL, names: Sequence[str] = JOINT_NAMES
+    ) -> None:
         from scipy.interpolate import CubicSpline
 
-        self.kinematics = kinematics
+        self.kinematics, self._names = kinematics, names
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
-        if len(self.time_s) < 4:
-            raise Fault(
-                "no_motion", f"the recording holds {len(self.time_s)} arm states", "Record a run with the arm on"
-            )
+        if len(self.time_s) < 4 or not names:
+            what = f"the recording holds {len(self.time_s)} arm states" if names else "what turned has no joints"
+            raise Fault("no_motion", what, "Record a run with the arm on")
         if not (np.isfinite(self.time_s).all() and np.isfinite(self._states["q_rad"]).all()):
             raise not_finite("an arm state")
         check_span(self.time_s, "the arm's states")
@@ -75,7 +77,7 @@ class ArmMotion:
         return float(np.ptp(q_rad, axis=0).max()) if len(q_rad) > 1 else None
 
     def away_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
-        """How far any joint ever was from the pose `q_rad` (6,) in a window; None where no state tells."""
+        """How far any joint ever was from the pose `q_rad` (k,) in a window; None where no state tells."""
         seen_rad = self._q_rad(window)
         return float(np.abs(seen_rad - np.array(q_rad)).max()) if len(seen_rad) else None
 
@@ -108,8 +110,8 @@ class ArmMotion:
 
     def table(self) -> dict[str, Array]:
         """The states as columns (m,) by name: times, and the joints' angles and rates as the controller tells them."""
-        angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(JOINT_NAMES)}
-        rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(JOINT_NAMES)}
+        angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(self._names)}
+        rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(self._names)}
         return {"time_s": self.time_s, **angles, **rates}
 
     def _q_rad(self, window: Window) -> Array:
@@ -118,9 +120,11 @@ class ArmMotion:
 
 
 def motion_of(run: RunData) -> ArmMotion:
-    """The arm of a recording. Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`."""
+    """What turned in a recording. Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`."""
     refuse_elsewhere(run)
-    return ArmMotion(run.arm, run.provenance.kinematics)
+    turner = run.turner
+    assert turner is not None, "of what was not recorded elsewhere"
+    return ArmMotion(run.states, turner.geometry, turner.joints)
 
 
 def refuse_elsewhere(run: RunData) -> None:

@@ -63,7 +63,8 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         provenance=provenance_of_files(_named(files.readings), _named(files.motion), files.item, began),
         sensors={files.item.name: read_elsewhere.sensor},
         samples={files.item.name: read_elsewhere.samples},
-        arm=np.empty(0, ARM_STATE_DTYPE),
+        turner=None,
+        states=np.empty(0, ARM_STATE_DTYPE),
         events=(),
         elsewhere=read_elsewhere,
     )

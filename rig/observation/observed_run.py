@@ -78,7 +78,7 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], beside: st
     base = next((each for each in known if each in bases and one_clock(run, sensor, each)), None)
     if base is not None:
         return bases[base].controller_time_s(stamps_s)
-    came_s = np.interp(samples["host_time_s"], run.arm["host_time_s"], run.arm["time_s"])
+    came_s = np.interp(samples["host_time_s"], run.states["host_time_s"], run.states["time_s"])
     return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
 
 

@@ -19,7 +19,7 @@ from rig.observation.windows import Window, finished_sweeps
 def revolution_on_the_board(
     samples: NDArray[Any],
     sensor: RecordedSensor,
-    arm: NDArray[Any],
+    states: NDArray[Any],
     sweep: Sweep,
     *,
     first: int,
@@ -28,13 +28,13 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    `samples` (n,) SAMPLE_DTYPE and `arm` (m,) ARM_STATE_DTYPE may reach further back than the sweep, which began after
+    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) may reach further back than the sweep, which began after
     the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
     a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
-    motion = ArmMotion(arm, kinematics)
+    motion = ArmMotion(states, kinematics)
     clock = on_the_arms_clock(samples, sensor, motion).clock
-    window = Window(float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
+    window = Window(float(states["time_s"][min(first, len(states) - 1)]), float(states["time_s"][-1]))
     revolution = motion.turn(sweep, window, settings)
     start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
     return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s

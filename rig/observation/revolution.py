@@ -65,7 +65,7 @@ class Ends:
 
 
 def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
-    """The revolution of one sweep, of which `states` (n,) ARM_STATE_DTYPE tell, in the order of their times.
+    """The revolution of one sweep, of which `states` (n,) of the turner tell, in the order of their times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
     `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`, `other_joint_moved`.
@@ -137,6 +137,9 @@ def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: floa
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
+    """An arm tells of its speed slider; other turners have none."""
+    if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
+        return
     slowest = float(min(turning["target_speed_fraction"].min(), turning["speed_scaling"].min()))
     if slowest < MIN_SPEED_FRACTION:
         raise Fault(
@@ -164,7 +167,7 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
 
 def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:
     others = np.delete(np.ptp(turning["q_rad"], axis=0), joint)
-    if others.max() > MAX_OTHER_TRAVEL_RAD:
+    if others.max(initial=0.0) > MAX_OTHER_TRAVEL_RAD:
         raise Fault(
             "other_joint_moved",
             f"in {where} another joint moved by {np.degrees(others.max()):.1f}°",

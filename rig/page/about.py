@@ -1,6 +1,7 @@
 """What the page is told of a run before anything has happened."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,4 +18,4 @@ class About:
     parts: dict[str, str] = field(default_factory=dict)
     simulated: bool = False
     storing: str | None = None
-    arm: dict[str, str | None] = field(default_factory=dict)
+    arm: dict[str, Any] = field(default_factory=dict)

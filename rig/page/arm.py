@@ -1,35 +1,37 @@
 """What the page shows of the arm: its geometry, its name, how it stands."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from rig.motion.geometry import NOMINAL, DenavitHartenberg
-from rig.motion.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
+from rig.motion.state import JOINT_NAMES, ArmState, Report, RobotMode, RuntimeState, SafetyMode, State
 from rig.page.history import rounded
-from rig.turners.ur.identity import model_found
 
 
-def geometry(arm: DenavitHartenberg) -> dict[str, Any]:
-    """An arm of which nothing is known but how it is built."""
-    return {"geometry": asdict(arm), "joints": list(JOINT_NAMES), "q_rad": None, "missed": 0}
+def geometry(arm: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> dict[str, Any]:
+    """A turner of which nothing is known but how it is built."""
+    return {"geometry": asdict(arm), "joints": list(joints), "q_rad": None, "missed": 0}
 
 
-def connected(report: ArmReport) -> dict[str, Any]:
-    """An arm that has answered."""
+def connected(report: Report) -> dict[str, Any]:
+    """A turner that has answered."""
     known = {
-        "model": model_found(report),
+        "model": report.model,
         "serial_number": report.serial_number,
         "host": report.host,
-        "polyscope": report.polyscope,
+        "polyscope": report.software,
     }
-    return {**geometry(report.kinematics or NOMINAL), **known, **stance(report.state)}
+    return {**geometry(report.kinematics or NOMINAL, report.joints), **known, **stance(report.state)}
 
 
-def stance(state: ArmState) -> dict[str, Any]:
-    """How an arm stood when it was seen; `let_go` where it stays so, for it stood and no program ran."""
+def stance(state: State) -> dict[str, Any]:
+    """How a turner stood when it was seen; `let_go` where it stays so, for it stood and no program ran."""
+    seen = {"q_rad": rounded(state.q_rad), "qd_rad_s": rounded(state.qd_rad_s)}
+    if not isinstance(state, ArmState):
+        return {**seen, "let_go": False}
     return {
-        "q_rad": rounded(state.q_rad),
-        "qd_rad_s": rounded(state.qd_rad_s),
+        **seen,
         "slider": round(state.target_speed_fraction, 3),
         "scaling": round(state.speed_scaling, 3),
         "mode": _named(RobotMode, state.robot_mode),

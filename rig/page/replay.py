@@ -11,7 +11,7 @@ from rig.analysis.partial_results import so_far
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.result_file import ResultDocument
 from rig.data.run_file import RunData
-from rig.motion.state import ARM_STATE_DTYPE, ArmState
+from rig.motion.state import ARM_STATE_DTYPE, ArmState, JointState, State
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.page.rows import Look, look_of
 from rig.station.events import (
@@ -50,13 +50,13 @@ class _Done:
 
 
 def moments(run: RunData) -> Iterator[Moment]:
-    """All of one recording in its order; nothing of one in which no state of the arm is."""
-    if len(run.arm) == 0:
+    """All of one recording in its order; nothing of one in which no state of the turner is."""
+    if len(run.states) == 0:
         return
-    times_s = run.arm["time_s"]
+    times_s = run.states["time_s"]
     began_s, ended_s = float(times_s[0]), float(times_s[-1])
     steps = _steps(run, ended_s)
-    plan = Plan(tuple(each.step for each in steps), tuple(run.arm["q_rad"][0].tolist()), run.settings.home_q_rad)
+    plan = Plan(tuple(each.step for each in steps), _state(run.states[0]).q_rad, run.settings.home_q_rad)
     modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
     raw = "calibrated" not in modes.values()
     yield Moment(0.0, PhaseStarted(run.settings.procedure, plan, modes))
@@ -72,8 +72,8 @@ def moments(run: RunData) -> Iterator[Moment]:
             yield Moment(time_s - began_s, event)
             if raw and isinstance(event, StepFinished) and isinstance(event.step, Sweep | Dwell):
                 yield Moment(time_s - began_s, look_of(so_far([_until(run, time_s)])))
-        place = min(int(np.searchsorted(times_s, time_s)), len(run.arm) - 1)
-        state = _state(run.arm[place])
+        place = min(int(np.searchsorted(times_s, time_s)), len(run.states) - 1)
+        state = _state(run.states[place])
         yield Moment(time_s - began_s, SamplesTaken(seen(state.host_time_s)))
         yield Moment(time_s - began_s, ArmSeen(state, None))
         if under_way := [each for each in steps if each.start_s <= time_s]:
@@ -135,7 +135,7 @@ def _until(run: RunData, time_s: float) -> RunData:
     return replace(run, events=tuple(e for e in run.events if (e.controller_time_s or 0.0) <= time_s))
 
 
-def _progress(done: _Done, count: int, state: ArmState, *, time_s: float, began_s: float, ended_s: float) -> Progress:
+def _progress(done: _Done, count: int, state: State, *, time_s: float, began_s: float, ended_s: float) -> Progress:
     took_s = done.end_s - done.start_s
     return Progress(
         number=done.number,
@@ -144,13 +144,17 @@ def _progress(done: _Done, count: int, state: ArmState, *, time_s: float, began_
         fraction=min(1.0, (time_s - done.start_s) / took_s) if took_s > 0 else 1.0,
         elapsed_s=time_s - began_s,
         remaining_s=max(0.0, ended_s - time_s),
-        arm_speed_rad_s=max(map(abs, state.qd_rad_s)),
+        arm_speed_rad_s=max(map(abs, state.qd_rad_s), default=0.0),
     )
 
 
-def _state(row: Any) -> ArmState:
-    values: dict[str, Any] = {name: row[name].tolist() for name in ARM_STATE_DTYPE.names or ()}
-    return ArmState(**{**values, "q_rad": tuple(values["q_rad"]), "qd_rad_s": tuple(values["qd_rad_s"])})
+def _state(row: Any) -> State:
+    """A state as it was recorded: an arm's where it tells what such states tell, else what the joints did."""
+    values: dict[str, Any] = {name: row[name].tolist() for name in row.dtype.names}
+    joints = {name: tuple(values.get(name, ())) for name in ("q_rad", "qd_rad_s")}
+    if row.dtype == ARM_STATE_DTYPE:
+        return ArmState(**{**values, **joints})
+    return JointState(values["time_s"], values["host_time_s"], **joints)
 
 
 class _Samples:

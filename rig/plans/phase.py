@@ -4,7 +4,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
-from rig.config.models import RigConfig
+from rig.config.models import RigConfig, TurnerSection
+from rig.errors import Refused
 from rig.motion.state import Joints
 from rig.motion.steps import Plan
 from rig.plans.registry import AnyProcedure, Procedures
@@ -12,7 +13,7 @@ from rig.plans.script_errors import script_errors
 
 
 class PhasePlanner(Protocol):
-    """Makes the plan, as `Planner` does, for the arm and the section of one configuration."""
+    """Makes the plan, as `Planner` does, for the turner and the section of one configuration."""
 
     def __call__(self, start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan: ...
 
@@ -35,12 +36,14 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
     """The phase a run of `procedure` begins with; what follows repeats its movement.
 
     Raises Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, `script_failed`, and
-    `rank_deficient`, `ill_conditioned` where the whole plan's attitudes do not tell what is asked of them.
+    `rank_deficient`, `ill_conditioned` where the whole plan's attitudes do not tell what is asked of them, and
+    `other_turner` where the procedure plans for another kind than is configured.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:
+        turner = _turner_for(procedure, config)
         with script_errors(f"the procedure {procedure.name} cannot be planned"):
-            made = procedure.plan(config.arm, config.procedure, start_q_rad, done)
+            made = procedure.plan(turner, config.procedure, start_q_rad, done)
             if not isinstance(made, Plan):
                 raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
         if not done:
@@ -52,3 +55,15 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
     following = procedure.following(procedures) if config.procedure.then_verify else None
     follows = None if following is None else Phase(following, plan, agreed=True)
     return Phase(procedure, plan, follows=follows)
+
+
+def _turner_for(procedure: AnyProcedure, config: RigConfig) -> TurnerSection:
+    """The turner's section, which the procedure has to know."""
+    if not isinstance(config.turner, procedure.turner):
+        raise Refused(
+            "other_turner",
+            f"the procedure {procedure.name} plans for {procedure.turner.__name__}, the configuration says "
+            f"{type(config.turner).__name__}",
+            "Name a procedure for what turns the sensors, or the turner that the procedure is for",
+        )
+    return config.turner

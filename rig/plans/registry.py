@@ -11,7 +11,7 @@ from importlib.metadata import entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from rig.analysis.outcome import Outcome, calibrated
-from rig.config.models import ArmSection, ProcedureSection
+from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.data.run_file import RunData
 from rig.errors import Refused
 from rig.motion.state import Joints
@@ -25,7 +25,7 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 
 
 class Planner(Protocol[SectionT_contra]):
-    """Makes the steps; pure. `start_q_rad` is where the arm stands (at home when None), `done` what to leave out.
+    """Makes the steps; pure. `start_q_rad` is where the turner stands (at home when None), `done` what to leave out.
 
     The `index` of sweeps and dwells, by which `done` names them, is their place in the whole procedure. Raises
     `Refused` by name when there is no such movement.
@@ -33,7 +33,7 @@ class Planner(Protocol[SectionT_contra]):
 
     def __call__(
         self,
-        arm: ArmSection,
+        turner: Any,  # of the section that `Procedure.turner` names
         procedure: SectionT_contra,
         start_q_rad: Joints | None = None,
         done: Collection[int] = (),
@@ -56,7 +56,8 @@ class Procedure(Generic[SectionT]):
     """A procedure: its name and section in the configuration, how it plans, what it does, how it is judged.
 
     `readings` is what the sensors to calibrate stream: raw counts, which the board averages as well, or what the board
-    has corrected by the calibration it has stored. `then` names the procedure that follows with the same movement when
+    has corrected by the calibration it has stored. `turner` is the section of the kind of turner that it plans for.
+    `then` names the procedure that follows with the same movement when
     the section says `then_verify`.
     """
 
@@ -67,6 +68,7 @@ class Procedure(Generic[SectionT]):
     analyse: Analysis = calibration
     readings: Readings = "raw"
     then: str | None = None
+    turner: type[TurnerSection] = ArmSection
 
     @property
     def reads_corrected(self) -> bool:

@@ -100,6 +100,8 @@ def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
             blocks.setdefault(f"{item.kind}, scale factor", []).append((item.label, item.shown.scale))
         heading = f"{item.kind}, {_heading(item)}" if scaled else _heading(item)
         blocks.setdefault(heading, []).append((item.label, item.shown.numbers))
+    if not blocks:
+        return
     table: list[tuple[str, Sequence[str]]] = []
     for heading, rows in blocks.items():
         table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))

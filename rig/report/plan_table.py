@@ -13,7 +13,7 @@ from rich.table import Table
 
 from rig.config.models import RigConfig
 from rig.motion.doubts import doubts
-from rig.motion.state import JOINT_NAMES
+from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.station.plain_text import LONG_S, duration_words, plain
 
@@ -161,7 +161,12 @@ def _motion(step: Step) -> tuple[str, str, str]:
         return "", "", ""
     turns = [
         f"{name} {math.degrees(start):+.1f} → {math.degrees(target):+.1f}"
-        for name, start, target in zip(JOINT_NAMES, step.start_q_rad, step.target_q_rad, strict=True)
+        for name, start, target in zip(_names(step.start_q_rad), step.start_q_rad, step.target_q_rad, strict=True)
         if abs(target - start) > SAME_PLACE_RAD
     ]
     return "\n".join(turns), f"{math.degrees(step.speed_rad_s):g}", f"{math.degrees(step.acceleration_rad_s2):g}"
+
+
+def _names(q_rad: Joints) -> Sequence[str]:
+    """The names of joints as far as a plan tells them: an arm's, of others their numbers."""
+    return JOINT_NAMES if len(q_rad) == len(JOINT_NAMES) else [f"joint {i + 1}" for i in range(len(q_rad))]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
-from rig.motion.state import ArmState
+from rig.motion.state import State
 from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 
@@ -57,7 +57,7 @@ class _Part:
     """What came between two calls of `keep`."""
 
     batches: defaultdict[str, list[np.ndarray]]
-    states: list[ArmState]
+    states: list[State]
 
 
 @dataclass(slots=True)
@@ -108,14 +108,14 @@ class Acquisition:
         if self.recorder is not None:
             self.recorder.add_samples(sensor, samples)
 
-    def on_state(self, state: ArmState) -> None:
-        """Take a state of the arm."""
+    def on_state(self, state: State) -> None:
+        """Take a state of the turner."""
         with self._lock:
             if self._kept:
                 self._kept[-1].states.append(state)
         thinning = self._thinning
         if self.recorder is not None and (thinning is None or thinning.keeps(state.time_s)):
-            self.recorder.add_arm_state(state)
+            self.recorder.add_state(state)
 
     @contextmanager
     def standing(self) -> Iterator[None]:
@@ -134,7 +134,7 @@ class Acquisition:
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 
-    def kept(self, sensor: str) -> tuple[np.ndarray, list[ArmState], int]:
+    def kept(self, sensor: str) -> tuple[np.ndarray, list[State], int]:
         """Samples (n,) of one sensor and arm states that are held, and how many of these are new.
 
         New are those since the latest `keep`; what is older reaches back `REACHES_BACK_S` from there, however long

@@ -5,21 +5,21 @@ from math import degrees
 
 from rig.motion.doubts import doubts
 from rig.motion.preflight import way_to_home
-from rig.motion.state import JOINT_NAMES, ArmReport
+from rig.motion.state import Report
 from rig.motion.steps import Plan
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 
 
-def announcement(plan: Plan, report: ArmReport, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
-    """The question before the first motion, which depends on where the arm stands.
+def announcement(plan: Plan, report: Report, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
+    """The question before the first motion, which depends on where the turner stands.
 
     `repeated` is the movement that follows without another question if the calibration passes; `mounted` says, in
     lines, which sensors are turned.
     """
     way = way_to_home(plan, report.state.q_rad)
     turns = ", ".join(
-        f"{name} {degrees(angle):+.0f}°" for name, angle in zip(JOINT_NAMES, way, strict=True) if abs(angle) > 0.01
+        f"{name} {degrees(angle):+.0f}°" for name, angle in zip(report.joints, way, strict=True) if abs(angle) > 0.01
     )
     lines = [
         *mounted,

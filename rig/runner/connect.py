@@ -1,4 +1,4 @@
-"""Connects the sources of samples and the arm, starts the recording, and hands all of it to a script as one `Rig`."""
+"""Connects the sources of samples and the turner, starts the recording, hands all of it to a script as one `Rig`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -10,13 +10,14 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
-from rig.data.provenance import calls_itself_simulated, provenance_of
+from rig.data.provenance import Provenance, calls_itself_simulated, provenance_of
 from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunRecorder
 from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.data.settings import RunSettings
-from rig.errors import Refused, refuse
-from rig.motion.state import ArmReport
+from rig.errors import Refused
+from rig.motion.state import Made, Report
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
@@ -30,9 +31,9 @@ from rig.sensors.registry import OWN_PORT
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
-from rig.turners.ur.driver import Arm
-from rig.turners.ur.identity import identity_problems
-from rig.turners.ur.preflight import made
+from rig.turners.kind import AnyTurner
+from rig.turners.registry import kind_of
+from rig.turners.turner import Turner
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +55,9 @@ class Connector:
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
-        """Everything connected and recording, nothing moved yet; on the way out the arm stops and the file is closed.
+        """Everything connected and recording, nothing moved yet; on the way out the turner stops, the file is closed.
 
-        Raises `Refused` by name when the arm, the board or a sensor is not what the configuration says, or not what
+        Raises `Refused` by name when the turner, the board or a sensor is not what the configuration says, or not what
         was recorded earlier, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
@@ -72,18 +73,20 @@ class Connector:
             described = {name: sensor for source in sources for name, sensor in source.sensors.items()}
             for name, sensor in described.items():
                 acquisition.expect(name, sensor)
-            arm, report = self._connect_arm(stack, acquisition)
-            recording = self._record(stack, board, described, report)
+            kind = kind_of(self.loaded.config.turner)
+            turner, report, made = self._connect_turner(kind, stack, acquisition)
+            recorded = RecordedTurner.of(kind.name, made, report.joints, kind.fields)
+            recording = self._record(stack, self._provenance(kind, board, report, made), recorded, described)
             acquisition.recorder = recording.recorder
-            simulated = self.loaded.simulated or calls_itself_simulated(report.polyscope)
+            simulated = self.loaded.simulated or calls_itself_simulated(report.software)
             on_board = None if board is None else board.board.identity.unique_id
             carried = mounted(described, on_board, self.memory, simulated=simulated)
             yield Rig(
-                devices=Devices(arm, report, self.loaded.config.arm, sources, acquisition, carried),
+                devices=Devices(turner, report, kind, self.loaded.config.turner, sources, acquisition, carried),
                 plan=self.phase.plan(report.state.q_rad, self.resumed.done),
                 whole_plan=whole_plan,
                 recording=recording,
-                along=None if board is None else self._calibrating_along(board, acquisition, recording),
+                along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
                 phase=self.phase,
             )
 
@@ -122,41 +125,45 @@ class Connector:
             )
         return calibration_of(self.found[name])
 
-    def _connect_arm(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Arm, ArmReport]:
-        section = self.loaded.config.arm
+    def _connect_turner(
+        self, kind: AnyTurner, stack: ExitStack, acquisition: Acquisition
+    ) -> tuple[Turner, Report, Made]:
+        section = self.loaded.config.turner
         log = self.path.with_name(ARM_LOG)
         refuse_links(log)
-        let_go = stack.enter_context(ExitStack())  # closed after the arm
-        arm = stack.enter_context(Arm(section.host, acquisition.on_state, section.state_rate_hz, log))
-        let_go.callback(self._last_seen, arm)
-        report = arm.report()
+        let_go = stack.enter_context(ExitStack())  # closed after the turner
+        turner = stack.enter_context(kind.connect(section, acquisition.on_state, log))
+        let_go.callback(self._last_seen, turner)
+        report = turner.report()
         self.station.event(ArmConnected(report))
-        refuse(identity_problems(section, report))
-        return arm, report
+        return turner, report, kind.made(section, report)
 
-    def _last_seen(self, arm: Arm) -> None:
-        """Tell how the arm was left: whoever looks on has last seen it move."""
-        self.station.event(ArmSeen(arm.latest, arm.missed_states))
+    def _last_seen(self, turner: Turner) -> None:
+        """Tell how the turner was left: whoever looks on has last seen it move."""
+        self.station.event(ArmSeen(turner.latest, turner.missed_states))
 
-    def _record(
-        self,
-        stack: ExitStack,
-        board: BoardSource | None,
-        described: Mapping[str, RecordedSensor],
-        report: ArmReport,
-    ) -> Recording:
+    def _provenance(self, kind: AnyTurner, board: BoardSource | None, report: Report, made: Made) -> Provenance:
         with refusing():
             crystal = None if board is None else follows_crystal(board.board)
-        made_with = provenance_of(
+        return provenance_of(
             self.loaded,
             None if board is None else board.board.identity,
             report,
-            made(self.loaded.config.arm, report),
+            made,
             stored={} if board is None else board.stored,
             script=self.script.identity,
             script_installed=self.script.is_installed,
             follows_crystal=crystal,
+            kind=kind.name,
         )
+
+    def _record(
+        self,
+        stack: ExitStack,
+        made_with: Provenance,
+        turner: RecordedTurner,
+        described: Mapping[str, RecordedSensor],
+    ) -> Recording:
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(
@@ -164,12 +171,13 @@ class Connector:
                 config=self.loaded.rig_text,
                 settings=self.settings,
                 provenance=made_with,
+                turner=turner,
                 sensors=described,
             )
-        return Recording(stack.enter_context(recorder), described, self.station, made_with.kinematics)
+        return Recording(stack.enter_context(recorder), described, self.station)
 
     def _calibrating_along(
-        self, source: BoardSource, acquisition: Acquisition, recording: Recording
+        self, source: BoardSource, acquisition: Acquisition, recording: Recording, turner: RecordedTurner
     ) -> BoardCalibration | None:
         """The board's own calibration from raw readings; it is given back what it observed before an interruption.
 
@@ -188,7 +196,7 @@ class Connector:
             recording.note,
             self.settings.observation,
             to_calibrate,
-            recording.kinematics,
+            turner,
         )
         with refusing():
             along.recall(self.resumed.earlier, self.resumed.done)

@@ -15,11 +15,10 @@ from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
 from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import ARM_STATE_DTYPE
 from rig.motion.steps import Sweep
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
@@ -40,7 +39,7 @@ class BoardCalibration:
     note: Callable[[Event], None]
     settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
-    kinematics: DenavitHartenberg
+    turner: RecordedTurner
     _observed: dict[str, int] = field(default_factory=dict)
 
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
@@ -83,9 +82,15 @@ class BoardCalibration:
         """The board's observation and the speed it was told, rad/s."""
         index, sensor = self.sensors[name]
         samples, states, new = self.acquisition.kept(name)
-        arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
+        turned = np.array([state.to_record() for state in states], self.turner.dtype)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
-            samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings, kinematics=self.kinematics
+            samples,
+            sensor,
+            turned,
+            sweep,
+            first=len(turned) - new,
+            settings=self.settings,
+            kinematics=self.turner.geometry,
         )
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
-from rig.config.models import ArmSection
+from rig.config.models import TurnerSection
 from rig.data.events import (
     DwellFinished,
     DwellStarted,
@@ -23,10 +23,8 @@ from rig.data.events import (
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.errors import Fault, Refused, refuse
-from rig.motion.carried import carried_by
-from rig.motion.geometry import DenavitHartenberg
 from rig.motion.preflight import way_to_home
-from rig.motion.state import ArmReport
+from rig.motion.state import Report
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
@@ -46,8 +44,8 @@ from rig.station.events import (
     StepStarted,
 )
 from rig.station.station import Station
+from rig.turners.kind import AnyTurner
 from rig.turners.turner import Turner
-from rig.turners.ur.preflight import preflight_problems
 
 FIRST_SAMPLE_TIMEOUT_S = 2.0
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
@@ -59,13 +57,14 @@ SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 class Devices:
     """What is connected.
 
-    `turner` turns the sensors; `report` is how it stood, `arm` how it is configured; `sources` are where samples come
-    from, those of the sensors that are `mounted`.
+    `turner` turns the sensors; `report` is how it stood, `kind` what it is, `section` how it is configured; `sources`
+    are where samples come from, those of the sensors that are `mounted`.
     """
 
     turner: Turner
-    report: ArmReport
-    arm: ArmSection
+    report: Report
+    kind: AnyTurner
+    section: TurnerSection
     sources: tuple[SampleSource, ...]
     acquisition: Acquisition
     mounted: Mounted
@@ -73,14 +72,11 @@ class Devices:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where everything goes, and what of (`sensors` by name, an arm of known `kinematics`); what happens is told at the
-    `station` as well.
-    """
+    """Where everything goes, and what of (`sensors` by name); what happens is told at the `station` as well."""
 
     recorder: RunRecorder
     sensors: Mapping[str, RecordedSensor]
     station: Station
-    kinematics: DenavitHartenberg
 
     def note(self, event: Event) -> None:
         """Record what happens, and tell it."""
@@ -123,14 +119,14 @@ class Rig:
         A movement that was agreed to before begins without asking, unless the arm no longer stands where it was left.
         Raises `Refused` naming every problem found; nothing has moved then.
         """
-        report, arm = self.devices.report, self.devices.arm
-        refuse(preflight_problems([self.whole_plan, self.plan], arm, report))
+        report, kind, section = self.devices.report, self.devices.kind, self.devices.section
+        refuse(kind.problems([self.whole_plan, self.plan], section, report))
         self.recording.station.event(PreflightPassed(self.plan, report))
-        away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
+        away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()
         self._refuse_moved()
-        self.devices.turner.take_control(carried_by(arm))
+        self.devices.turner.take_control(kind.carried(section))
         self._motions = iter(self.plan.motions)
 
     def _agree(self) -> None:
@@ -146,7 +142,7 @@ class Rig:
 
     def _refuse_moved(self) -> None:
         """Refuse an arm that somebody moved while the operator thought: it would take another way than announced."""
-        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)))
+        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
                 "arm_moved",
@@ -292,7 +288,7 @@ class Rig:
                 fraction=fraction,
                 elapsed_s=self._done_s + within_s,
                 remaining_s=self.plan.duration_s - self._done_s - within_s,
-                arm_speed_rad_s=max(map(abs, state.qd_rad_s)),
+                arm_speed_rad_s=max(map(abs, state.qd_rad_s), default=0.0),
             )
         )
 

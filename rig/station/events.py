@@ -11,7 +11,7 @@ from firmware_host.client import BoardIdentity
 from rig.analysis.check import Check
 from rig.data.events import Event
 from rig.errors import RigError
-from rig.motion.state import ArmReport, ArmState
+from rig.motion.state import Report, State
 from rig.motion.steps import Plan, Step
 from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation
@@ -43,7 +43,7 @@ class SensorConnected:
 class ArmConnected:
     """The arm answered and said how it stands; nothing has moved."""
 
-    report: ArmReport
+    report: Report
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class PreflightPassed:
     """All that can be known beforehand is right with the plan and the arm."""
 
     plan: Plan
-    report: ArmReport
+    report: Report
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class ArmSeen:
     Comes with every `Progress`, and once more when the arm was let go.
     """
 
-    state: ArmState
+    state: State
     missed_states: int | None
 
 

@@ -30,7 +30,6 @@ from rig.station.events import (
     SensorConnected,
     StepFinished,
 )
-from rig.turners.ur.identity import arm_words
 
 
 def line(event: RunEvent) -> str | None:
@@ -46,7 +45,7 @@ def line(event: RunEvent) -> str | None:
                 f"; {name} was {before}, corrected" for name, before in corrected.items()
             )
         case ArmConnected(report):
-            text = f"arm: {arm_words(report)} at {report.host}"
+            text = f"arm: {report.words} at {report.host}"
         case PreflightPassed(plan, report):
             text = (
                 f"pre-flight: arm {report.serial_number} at {report.host} is ready; "

@@ -1,10 +1,10 @@
-"""What turns the sensors, as far as a run needs it: the arm of `rig.turners.ur.driver`, or another in its own room."""
+"""What turns the sensors, as far as a run needs it; each kind (`rig.turners.kind`) has a driver in its own room."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 from rig.motion.carried import Carried
-from rig.motion.state import ArmReport, ArmState
+from rig.motion.state import Report, State
 from rig.motion.steps import Motion
 
 
@@ -18,7 +18,7 @@ class Turner(Protocol):
     """
 
     @property
-    def latest(self) -> ArmState:
+    def latest(self) -> State:
         """The newest state."""
         ...
 
@@ -27,7 +27,7 @@ class Turner(Protocol):
         """Gaps in its states, counted in states."""
         ...
 
-    def report(self) -> ArmReport:
+    def report(self) -> Report:
         """What it says about itself, for pre-flight; nothing moves."""
         ...
 

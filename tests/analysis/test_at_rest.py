@@ -48,6 +48,6 @@ def test_a_missing_reading_parts_a_rest_in_two(run: RunData) -> None:
 
 
 def test_a_rest_in_which_the_arm_moved_is_left_out(run: RunData) -> None:
-    arm = run.arm.copy()
-    arm["q_rad"][(arm["time_s"] > run.arm["time_s"][-1] - 15.0), 5] += 0.01
-    assert rates(replace(run, arm=arm)).stretches == 5
+    arm = run.states.copy()
+    arm["q_rad"][(arm["time_s"] > run.states["time_s"][-1] - 15.0), 5] += 0.01
+    assert rates(replace(run, states=arm)).stretches == 5

@@ -26,10 +26,10 @@ FAST = Setup(speed_deg_s=120, noise_rad_s=0.002)
 def recorded(setup: Setup, host_slope: float, software: str = SIMULATED) -> RunData:
     """A recording whose states came at a computer that counts `host_slope` seconds for one of the controller's."""
     run = synthetic_run(setup)
-    arm = run.arm.copy()
+    arm = run.states.copy()
     late = np.random.default_rng(5).exponential(5e-4, len(arm))
     arm["host_time_s"] = 1000.0 + host_slope * (arm["time_s"] - arm["time_s"][0]) + late
-    return replace(run, arm=arm, provenance=replace(run.provenance, arm_software=software))
+    return replace(run, states=arm, provenance=replace(run.provenance, arm_software=software))
 
 
 def observed(setup: Setup, host_slope: float, software: str = SIMULATED) -> ObservedRun:
@@ -53,12 +53,12 @@ def of_clocks(setup: Setup, host_slope: float = 0.2, software: str = SIMULATED) 
 
 def in_two(whole: RunData) -> tuple[RunData, RunData]:
     """The recordings of a run that was resumed, an hour later and with a computer that is 200 ppm slow by then."""
-    arm, half = whole.arm.copy(), len(whole.events) // 2
+    arm, half = whole.states.copy(), len(whole.events) // 2
     arm["host_time_s"] = 5000.0 + (1 - 200 * PPM) * (arm["host_time_s"] - arm["host_time_s"][0])
     later = replace(whole.provenance, started_utc="2026-11-21T01:00:00+00:00")
     return (
         replace(whole, events=whole.events[:half]),
-        replace(whole, arm=arm, provenance=later, events=whole.events[half:]),
+        replace(whole, states=arm, provenance=later, events=whole.events[half:]),
     )
 
 
@@ -91,11 +91,11 @@ def test_without_another_clock_nothing_is_corrected() -> None:
 
 def test_the_jitter_of_the_states_is_measured() -> None:
     run = synthetic_run(Setup(speed_deg_s=120))
-    arm = run.arm.copy()
+    arm = run.states.copy()
     motion = observe_runs([run])[0].motion
     jitter = np.random.default_rng(6).normal(0, 1e-4, len(arm))
     arm["q_rad"] = motion.angles(arm["time_s"] + jitter)
-    (seen,) = observe_runs([replace(run, arm=arm)])
+    (seen,) = observe_runs([replace(run, states=arm)])
     exact = observe_runs([run])
     assert state_jitter([seen]).std_s == pytest.approx(1e-4, rel=0.1)
     assert state_jitter(exact).std_s < 1e-5

@@ -45,7 +45,7 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
     third = list(swept(run))[2].window
-    times_s = on_the_arms_clock(samples, run.sensors["gyro"], ArmMotion(run.arm, run.provenance.kinematics)).time_s
+    times_s = on_the_arms_clock(samples, run.sensors["gyro"], ArmMotion(run.states, run.provenance.kinematics)).time_s
     samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
     found = so_far([replace(run, samples={"gyro": samples})])["gyro"]
     refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]
@@ -54,5 +54,5 @@ def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
 
 
 def test_nothing_is_told_of_a_recording_that_has_only_begun(run: RunData) -> None:
-    assert so_far([replace(run, arm=run.arm[:2], events=())]) == {}
+    assert so_far([replace(run, states=run.states[:2], events=())]) == {}
     assert so_far([replace(run, events=())])["gyro"].sweeps == {}

@@ -28,11 +28,11 @@ def unseen(run: RunData) -> RunData:
 
 def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
     """Of each sweep, between so many seconds after it began."""
-    kept = np.ones(len(run.arm), dtype=np.bool_)
+    kept = np.ones(len(run.states), dtype=np.bool_)
     for each in swept(run):
-        since_s = run.arm["time_s"] - each.window.start_s
+        since_s = run.states["time_s"] - each.window.start_s
         kept &= (since_s < from_s) | (since_s > to_s)
-    return replace(run, arm=run.arm[kept])
+    return replace(run, states=run.states[kept])
 
 
 def pieces_of(run: RunData) -> Pieces:

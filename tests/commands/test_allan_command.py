@@ -33,7 +33,7 @@ def write(run: RunData, path: Path) -> None:
     }
     events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
     described = {name: sensor.attributes() for name, sensor in run.sensors.items()}
-    lay_out(path, Contents(SCHEMA, texts, described, run.samples, run.arm, events), swmr=False)
+    lay_out(path, Contents(SCHEMA, texts, described, run.samples, run.states, events), swmr=False)
 
 
 def test_people_see_random_walk_and_why_there_is_no_bias_instability(

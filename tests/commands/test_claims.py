@@ -72,22 +72,22 @@ def test_an_arm_and_a_port_are_known_by_every_name_they_have(tmp_path: Path) -> 
 
 def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
     host = fresh_host()
-    here = load(DEMO, [f"arm.host={host}", f"board.port=socket://{host}:7321"]).config
-    with own_address(here, simulated=True) as first, own_address(here, simulated=True) as second:
+    here, text = load(DEMO, [f"arm.host={host}", f"board.port=socket://{host}:7321"]).config, DEMO.read_text("utf-8")
+    with own_address(here, text) as first, own_address(here, text) as second:
         assert first == [] and len(second) == 2
         moved = load(DEMO, second).config
         assert moved.board is not None and moved.board.port == f"socket://{moved.arm.host}:7321"
         assert moved.arm.host not in (host, load(DEMO).config.arm.host)
-    with arm_held_elsewhere(host), own_address(here, simulated=True) as moved_away:
+    with arm_held_elsewhere(host), own_address(here, text) as moved_away:
         assert moved_away != []
-    with own_address(here, simulated=True) as again:
+    with own_address(here, text) as again:
         assert again == [], "what has ended takes no address"
 
 
 def test_hardware_is_where_its_configuration_says() -> None:
     host = fresh_host()
     config = load(DEMO, [f"arm.host={host}"]).config
-    with arm_held_elsewhere(host), own_address(config, simulated=False) as moved:
+    with arm_held_elsewhere(host), own_address(config, None) as moved:
         assert moved == []
 
 

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from rig.config.models import RigConfig
+from rig.config.models import ArmSection, RigConfig
 from rig.config.procedure_sections import STOCK_SECTIONS
 from rig.config.reference_page import REPEAT, reference, unit_of
 from rig.config.world_models import WorldSection
 from support.paths import CONFIGS, DOCS
 
-MODELS: tuple[type[BaseModel], ...] = (RigConfig, WorldSection, *STOCK_SECTIONS.values())
+MODELS: tuple[type[BaseModel], ...] = (RigConfig, ArmSection, WorldSection, *STOCK_SECTIONS.values())
 
 
 def keys() -> Iterator[tuple[str, str, Mapping[str, Any]]]:

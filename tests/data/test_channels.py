@@ -24,7 +24,7 @@ from rig.report.exports.formats import writer_of_readings
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken
 from rig.station.view import LiveView
-from support.synthetic_run import Setup, synthetic_run
+from support.synthetic_run import UR, Setup, synthetic_run
 
 PRESSURE_PA = 96_480.0
 BAROMETER = RecordedSensor(
@@ -36,9 +36,9 @@ IN_COUNTS = replace(BAROMETER, channels=(Channel(PRESSURE.name, "pressure_counts
 def beside_a_gyroscope(barometer: RecordedSensor) -> RunData:
     """A recording with a barometer that has a clock of its own, whose samples came when the arm's states did."""
     run = synthetic_run(Setup())
-    samples = np.zeros(len(run.arm) // 12, barometer.sample_dtype)
+    samples = np.zeros(len(run.states) // 12, barometer.sample_dtype)
     samples["sequence"] = np.arange(len(samples))
-    samples["host_time_s"] = run.arm["host_time_s"][::12][: len(samples)]
+    samples["host_time_s"] = run.states["host_time_s"][::12][: len(samples)]
     samples["board_time_us"] = np.round((samples["host_time_s"] - samples["host_time_s"][0] + 7.0) * 1e6)
     channel = barometer.channel(PRESSURE)
     samples[channel.column] = (PRESSURE_PA - channel.offset) / channel.unit_per_count
@@ -51,7 +51,7 @@ def beside_a_gyroscope(barometer: RecordedSensor) -> RunData:
 
 def recorded(run: RunData, path: Path) -> Path:
     with RunRecorder(
-        path, config=run.config, settings=run.settings, provenance=run.provenance, sensors=run.sensors
+        path, config=run.config, settings=run.settings, provenance=run.provenance, turner=UR, sensors=run.sensors
     ) as recorder:
         for name, samples in run.samples.items():
             recorder.add_samples(name, samples)
@@ -73,7 +73,7 @@ def test_a_scalar_is_exported_in_its_unit_on_the_arms_clock(tmp_path: Path) -> N
     header = (tmp_path / "barometer.csv").read_text(encoding="utf-8").splitlines()[0]
     time_s, pressure_pa = np.loadtxt(tmp_path / "barometer.csv", delimiter=",", skiprows=1).T
     assert header == "time_s,pressure_pa" and pressure_pa == pytest.approx(PRESSURE_PA)
-    assert time_s == pytest.approx(run.arm["time_s"][::12][: len(time_s)], abs=1e-3)
+    assert time_s == pytest.approx(run.states["time_s"][::12][: len(time_s)], abs=1e-3)
     assert not (tmp_path / "barometer_sweeps.csv").exists()
 
 

@@ -40,6 +40,7 @@ from rig.motion.steps import Sweep
 from support.paths import ROOT
 from support.results import VERIFIED
 from support.synthetic_run import PROVENANCE as SYNTHETIC
+from support.synthetic_run import UR
 
 SENSOR = RecordedSensor(
     part="lsm9ds1",
@@ -93,7 +94,7 @@ TICK_S = 0.01
 
 def recorder(path: Path, *sensors: str) -> RunRecorder:
     described = dict.fromkeys(sensors or ("gyro",), SENSOR)
-    return RunRecorder(path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, sensors=described)
+    return RunRecorder(path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, turner=UR, sensors=described)
 
 
 def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
@@ -115,8 +116,9 @@ def test_a_magnetometer_comes_back_beside_the_gyroscopes(tmp_path: Path) -> None
     samples["sequence"] = np.arange(300)
     samples["host_time_s"] = time.monotonic()
     samples["field_counts"] = samples["sequence"][:, None] * [1, -2, 3]
+    sensors = {"gyro": SENSOR, "compass": compass}
     with RunRecorder(
-        path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, sensors={"gyro": SENSOR, "compass": compass}
+        path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, turner=UR, sensors=sensors
     ) as recording:
         recording.add_samples("compass", samples)
         recording.add_samples("gyro", some_samples(0, 10))
@@ -138,7 +140,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
         recording.add_samples("reference", some_samples(7, 5))
         states = [some_state(number) for number in range(1200)]
         for state in states:
-            recording.add_arm_state(state)
+            recording.add_state(state)
         for event in EVENTS:
             recording.add(event)
         recording.add(RestFinished(), controller_time_s=123.5)
@@ -148,14 +150,14 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     assert run.sensors == {"gyro": SENSOR, "reference": SENSOR}
     np.testing.assert_array_equal(run.samples["gyro"]["counts"], some_samples(0, 3000)["counts"])
     assert run.samples["reference"]["board_time_us"][0] == 2**40 + 7 * 4202
-    np.testing.assert_array_equal(run.arm, np.array([state.to_record() for state in states], ARM_STATE_DTYPE))
+    np.testing.assert_array_equal(run.states, np.array([state.to_record() for state in states], ARM_STATE_DTYPE))
     assert [recorded.event for recorded in run.events] == [RestStarted(), *EVENTS, RestFinished()]
     started, *others, finished = run.events
     assert started.controller_time_s is None
     assert {other.controller_time_s for other in others} == {states[-1].time_s}  # the arm's time when it happened
     assert finished.controller_time_s == 123.5
     with h5py.File(path, "r") as file:  # any HDF5 tool opens it
-        assert file.attrs["schema"] == "rig.run/3"
+        assert file.attrs["schema"] == "rig.run/4"
 
 
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:
@@ -201,7 +203,7 @@ def record_until_killed(path: Path, report: Connection) -> None:
     while True:
         recording.add_samples("gyro", some_samples(10 * tick, 10))
         for number in range(5 * tick, 5 * tick + 5):
-            recording.add_arm_state(some_state(number))
+            recording.add_state(some_state(number))
         recording.add(BoardRecalled("gyro", tick))
         tick += 1
         report.send((time.monotonic(), tick))
@@ -252,13 +254,13 @@ def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, th
             pipe.close()
     make_plain(path)
     with h5py.File(path, "r") as file:
-        assert len(file["arm"]) >= 5 * handed_over
+        assert len(file["states"]) >= 5 * handed_over
 
 
 def check_killed(path: Path, ticks: int) -> None:
     """The file opens, begins at the beginning, has no hole, and reaches as far as it must."""
     run = read_run(path)
-    samples, arm = run.samples["gyro"], run.arm
+    samples, arm = run.samples["gyro"], run.states
     assert len(samples) >= 10 * ticks
     assert len(arm) >= 5 * ticks
     assert len(run.events) >= ticks

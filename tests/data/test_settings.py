@@ -54,7 +54,7 @@ def test_a_configuration_of_commit_af3b9f0_reads_as_it_did_then(name: str) -> No
     [
         {"schema": "rig.settings/9"},
         {"limits": None},
-        {"home_q_rad": [0.0] * 5},
+        {"home_q_rad": [0.0] * 9},
         {"planned_sweeps": [{"index": 0}]},
         {"to_calibrate": []},
         {"observation": {"max_lost_fraction": 1.5, "max_speed_deviation": 0.1, "max_axis_deviation_deg": 5}},

@@ -41,7 +41,7 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
     assert rate_rad_s.shape == (len(time_s), 3)
     assert np.all(np.diff(time_s) > 0)
     assert run["gyro"] is run["gyro"]  # its clock is found once
-    arm = run.recorded.movement[0].arm["time_s"]
+    arm = run.recorded.movement[0].states["time_s"]
     assert arm[0] - 1 < time_s[0] < time_s[-1] < arm[-1] + 1
     sweep = next(swept(run.recorded.movement[0])).window
     middle = np.abs(time_s - (sweep.start_s + sweep.end_s) / 2) < 1

@@ -36,7 +36,7 @@ def test_a_magnetometer_is_read_on_the_arms_clock(magnetic: rig.Run) -> None:
     name = next(name for name in magnetic if "field" in magnetic[name].quantities)
     field = magnetic[name].field
     assert 1e-5 < np.median(np.linalg.norm(field.values, axis=1)) < 1e-4
-    arm = magnetic.recorded.movement[0].arm["time_s"]
+    arm = magnetic.recorded.movement[0].states["time_s"]
     assert arm[0] - 1 < field.time_s[0] < field.time_s[-1] < arm[-1] + 1
     assert list(field.to_frame().columns) == ["x_t", "y_t", "z_t"]
 

@@ -114,7 +114,7 @@ def test_a_board_that_was_heard_late_is_not_taken_for_an_earlier_sweep(joint: st
     board_s = samples["board_time_us"] * 1e-6
     heard = np.abs(board_s * (1 + Setup().drift) + Setup().boot_s - begun - 10) < 12.5
     readings_rad_s = samples["counts"][heard] * sensor.channel(RATE).unit_per_count
-    clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(USUAL.arm))
+    clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(USUAL.states))
     assert abs(clock_errors(Setup(), clock)[0]) < 4 * clock.offset_std_s
 
 
@@ -131,7 +131,7 @@ def test_a_single_sweep_tells_the_clock_whatever_the_bias(bias_rad_s: float) -> 
         start_s, end_s = made.window.start_s, made.window.end_s
         begun_s = board_s * (1 + setup.drift) + setup.boot_s - start_s
         heard = (begun_s > -1) & (begun_s < end_s - start_s + 0.1)
-        arm = run.arm[(run.arm["time_s"] > start_s - 1) & (run.arm["time_s"] < end_s + 0.1)]
+        arm = run.states[(run.states["time_s"] > start_s - 1) & (run.states["time_s"] < end_s + 0.1)]
         readings_rad_s = samples["counts"][heard] * sensor.channel(RATE).unit_per_count
         clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(arm))
         assert abs(clock_errors(setup, clock)[0]) < 4 * clock.offset_std_s < 1e-3
@@ -257,7 +257,7 @@ def with_samples(run: RunData, change: Callable[[NDArray[Any]], NDArray[Any]]) -
 
 
 def with_arm(run: RunData, change: Callable[[NDArray[Any]], NDArray[Any]]) -> RunData:
-    return replace(run, arm=change(run.arm.copy()))
+    return replace(run, states=change(run.states.copy()))
 
 
 def lose(run: RunData, where: NDArray[np.intp]) -> RunData:
@@ -434,7 +434,7 @@ def gap_in_states(run: RunData) -> RunData:
         (another_joint, "other_joint_moved"),
         (short, "incomplete_revolution: in sweep 0"),
         (still, "no_motion"),
-        (lambda run: replace(run, arm=np.zeros(0, ARM_STATE_DTYPE)), "no_motion"),
+        (lambda run: replace(run, states=np.zeros(0, ARM_STATE_DTYPE)), "no_motion"),
         (gap_in_states, "arm_states_lost"),
         (lambda run: scaled(run, 180 / np.pi), "wrong_unit: .* 50.1 times"),
         (lambda run: scaled(run, np.nan), "not_finite: a reading"),
@@ -456,8 +456,8 @@ def test_what_does_not_belong_into_a_calibration_is_refused_by_name(
 def thinned(run: RunData, seed: int) -> RunData:
     """What a busy computer leaves of the arm's states: one in fifty is followed by a hole of up to 0.12 s."""
     rng = np.random.default_rng(seed)
-    kept = np.ones(len(run.arm), dtype=np.bool_)
-    for start in np.flatnonzero(rng.random(len(run.arm)) < 0.02):
+    kept = np.ones(len(run.states), dtype=np.bool_)
+    for start in np.flatnonzero(rng.random(len(run.states)) < 0.02):
         kept[start + 1 : start + 1 + rng.integers(1, 15)] = False
     return with_arm(run, lambda arm: arm[kept])
 

@@ -17,7 +17,7 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     sweeps = list(swept(run))
     start_s, end_s = sweeps[sweep].window.start_s, sweeps[sweep].window.end_s
     since_s = sweeps[sweep - 2].window.start_s if sweep >= 2 else 0.0
-    samples, arm = run.samples["gyro"], run.arm
+    samples, arm = run.samples["gyro"], run.states
     at_s = samples["board_time_us"] * 1e-6 * (1 + setup.drift) + setup.boot_s
     held = (at_s > since_s) & (at_s < end_s + 0.05)
     arm = arm[(arm["time_s"] > since_s) & (arm["time_s"] < end_s + 0.05)]

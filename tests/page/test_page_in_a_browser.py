@@ -75,7 +75,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.find_element(By.ID, "halt").click()
     clicked_s = time.monotonic()
     assert process.wait(60) == 130
-    states = read_run(out / "run.h5").arm
+    states = read_run(out / "run.h5").states
     moved = states["time_s"][abs(states["qd_rad_s"]).max(axis=1) > REST_SPEED_RAD_S]
     at_the_click = np.interp(clicked_s, states["host_time_s"], states["time_s"])
     assert len(moved) and moved[-1] - at_the_click < 1.0  # of the controller's time

@@ -21,7 +21,7 @@ from support.synthetic_run import Setup, synthetic_run
 def run() -> RunData:
     """With samples that came while the arm moved."""
     made = synthetic_run(Setup(noise_rad_s=0.005, speed_deg_s=120))
-    samples, arm = made.samples["gyro"].copy(), made.arm
+    samples, arm = made.samples["gyro"].copy(), made.states
     samples["sequence"] = np.arange(len(samples))
     samples["host_time_s"] = np.linspace(arm["host_time_s"][0], arm["host_time_s"][-1], len(samples))
     return replace(made, samples={"gyro": samples})
@@ -48,10 +48,10 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
     seen = [moment for moment in replayed if isinstance(moment.event, ArmSeen)]
     for moment in seen[:: len(seen) // 20]:
         assert isinstance(moment.event, ArmSeen)
-        at_s = moment.event.state.time_s - run.arm["time_s"][0]
+        at_s = moment.event.state.time_s - run.states["time_s"][0]
         assert abs(at_s - moment.at_s) < 0.05
-        place = np.searchsorted(run.arm["time_s"], moment.event.state.time_s)
-        assert moment.event.state.q_rad == tuple(run.arm["q_rad"][place])
+        place = np.searchsorted(run.states["time_s"], moment.event.state.time_s)
+        assert moment.event.state.q_rad == tuple(run.states["q_rad"][place])
     last = [moment.event for moment in replayed if isinstance(moment.event, SamplesTaken)][-1]
     assert last.sensors[0].samples == len(run.samples["gyro"]) and last.sensors[0].lost == 0
 

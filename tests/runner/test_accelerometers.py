@@ -208,10 +208,10 @@ def turned_by(joint: int, angle_deg: float, dwell: int) -> Damage:
             if isinstance(each.event, DwellStarted | DwellFinished) and each.event.dwell.index == dwell
         )
         assert began_s is not None and ended_s is not None
-        arm = run.arm.copy()
+        arm = run.states.copy()
         inside = (arm["time_s"] > began_s - 0.1) & (arm["time_s"] < ended_s + 0.1)
         arm["q_rad"][inside, joint] += np.radians(angle_deg)
-        return replace(run, arm=arm)
+        return replace(run, states=arm)
 
     return damaged
 

@@ -62,7 +62,7 @@ def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     gyro = result["sensors"]["gyro"]
     std = np.sqrt(np.diag(gyro["covariance_combined"]))
     scale_error = np.array(gyro["scale"]) - turntable["gyro"]["scale"]
-    arm_s = read_run(out / "run.h5").arm["time_s"]
+    arm_s = read_run(out / "run.h5").states["time_s"]
     document = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))
     bias_error = np.array(gyro["bias_rad_s"]) - truth(document, "gyro", [(arm_s[0], arm_s[-1])])[3:]
     print(f"scale off by {scale_error}, bias by {bias_error / std[3:]} standard deviations")

@@ -103,7 +103,7 @@ def test_the_field_is_exported_as_it_was_read_on_the_arms_clock(
     run = recorded(finished[0])
     read_t = run.sensors["compass"].channel(FIELD).values(run.samples["compass"])
     np.testing.assert_array_equal(np.column_stack([table[axis] for axis in ("x_t", "y_t", "z_t")]), read_t)
-    arm_s = run.arm["time_s"]
+    arm_s = run.states["time_s"]
     assert arm_s[0] - 1 < table["time_s"][0] and table["time_s"][-1] < arm_s[-1] + 1
     assert "compass.csv: compass, lsm9ds1_magnetometer" in (tmp_path / "README.txt").read_text()
 

@@ -126,7 +126,7 @@ def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal
     assert f"rig resume {rig.out}" in errors
     assert not rig.world.state()["program_running"]
     run = read_run(rig.out / "run.h5")
-    assert len(run.samples["gyro"]) > 0 and len(run.arm) > 0
+    assert len(run.samples["gyro"]) > 0 and len(run.states) > 0
 
 
 def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt_too(start: Start) -> None:
@@ -180,7 +180,7 @@ def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None
     rig.send(signal.SIGINT)
     rig.end()
     run = read_run(rig.out / "run.h5")
-    assert run.arm["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
+    assert run.states["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
 
 
 def test_a_program_held_up_for_a_second_misses_no_state(start: Start) -> None:
@@ -193,7 +193,7 @@ def test_a_program_held_up_for_a_second_misses_no_state(start: Start) -> None:
     rig.send(signal.SIGINT)
     status, errors = rig.end()
     assert status == 130, errors
-    np.testing.assert_allclose(np.diff(read_run(rig.out / "run.h5").arm["time_s"]), 1 / 125, atol=1e-6)
+    np.testing.assert_allclose(np.diff(read_run(rig.out / "run.h5").states["time_s"]), 1 / 125, atol=1e-6)
 
 
 def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
@@ -232,7 +232,7 @@ def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
     assert f"rig: {name}: " in errors, errors
     assert f"rig resume {rig.out}" in errors
     assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
-    assert len(read_run(rig.out / "run.h5").arm) > 0
+    assert len(read_run(rig.out / "run.h5").states) > 0
 
 
 def test_nothing_moves_when_the_board_goes_while_the_sensors_are_first_listened_to(start: Start) -> None:
@@ -243,8 +243,8 @@ def test_nothing_moves_when_the_board_goes_while_the_sensors_are_first_listened_
     status, errors = rig.end()
     assert status == 3 and "rig: board_link_lost: " in errors, errors
     run = read_run(rig.out / "run.h5")
-    assert len(run.arm) > 0 and not run.arm["qd_rad_s"].any()
-    assert run.arm["time_s"][-1] < began_s + 5.0  # not only when the ten seconds for listening are over
+    assert len(run.states) > 0 and not run.states["qd_rad_s"].any()
+    assert run.states["time_s"][-1] < began_s + 5.0  # not only when the ten seconds for listening are over
 
 
 def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Start) -> None:

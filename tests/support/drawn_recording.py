@@ -200,8 +200,8 @@ def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
 
 def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
     """The encoders are not looked at quite when a state says."""
-    arm = run.arm.copy()
+    arm = run.states.copy()
     late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))
     q_rad, _ = motion.joints(arm["time_s"] + late_s)
     arm["q_rad"] = np.round(q_rad / setup.encoder_step_rad) * setup.encoder_step_rad
-    return replace(run, arm=arm)
+    return replace(run, states=arm)

@@ -12,6 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
+from rig.data.layout import states_name
 from rig.data.run_folder import CONFIG, RESULT, recordings
 from support.paths import FIXTURES, ROOT
 
@@ -56,7 +57,7 @@ def _compress(source: Path, target: Path) -> None:
 
     with h5py.File(source) as file, h5py.File(target, "w") as copy:
         copy.attrs.update(file.attrs)
-        for name in ("arm", "events", *(f"samples/{sensor}" for sensor in file["samples"])):
+        for name in (states_name(file.attrs["schema"]), "events", *(f"samples/{sensor}" for sensor in file["samples"])):
             rows = file[name]
             packed = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
             copy.create_dataset(name, data=rows[:], maxshape=(None,), chunks=rows.chunks, **packed)

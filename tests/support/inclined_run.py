@@ -39,9 +39,11 @@ def write(folder: Path) -> None:
     recorded = replace(run, sensors=sensors, samples={**run.samples, "tilt": samples})
     texts = {"config": run.config, "settings": run.settings.to_json()}
     texts["provenance"] = json.dumps(run.provenance.document())
+    assert run.turner is not None
+    texts["turner"] = run.turner.to_json()
     events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
-    lay_out(folder / "run.h5", Contents(SCHEMA, texts, described, recorded.samples, run.arm, events), swmr=False)
+    lay_out(folder / "run.h5", Contents(SCHEMA, texts, described, recorded.samples, run.states, events), swmr=False)
 
 
 if __name__ == "__main__":

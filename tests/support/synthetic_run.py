@@ -19,6 +19,7 @@ from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import settings_of
+from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate
 from rig.motion.state import ARM_STATE_DTYPE
@@ -47,6 +48,7 @@ PROVENANCE = Provenance(
     firmware_version="0.2.0",
     sensor_serial_numbers={"gyro": "LSM9DS1-001"},
 )
+UR = turner_of_provenance(PROVENANCE)
 SCALE = (1.1771, 1.1554, 1.1440)
 BIAS_RAD_S = (0.0077, -0.0100, -0.0051)
 SENSITIVITY = float(np.radians(8.75e-3))
@@ -214,7 +216,14 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
     provenance = replace(PROVENANCE, arm_kinematics=setup.told, board_follows_crystal=setup.follows_crystal)
     return RunData(
-        motion.config, motion.settings, provenance, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
+        motion.config,
+        motion.settings,
+        provenance,
+        turner_of_provenance(provenance),
+        {"gyro": SENSOR},
+        {"gyro": samples},
+        arm,
+        motion.events(),
     )
 
 

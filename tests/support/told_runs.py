@@ -83,6 +83,7 @@ def report(q_rad: Joints) -> ArmReport:
         payload_centre_m=(0.0, 0.0, 0.025),
         state=state(0.0, q_rad, (0.0,) * 6),
         called="UR10",
+        model="UR10e or UR12e",
     )
 
 

@@ -1,16 +1,17 @@
-// The arm from its joints: Denavit–Hartenberg frames seen from a corner of the room, drawn from back to front.
+// What turns the sensors from its joints: Denavit–Hartenberg frames seen from a corner of the room, drawn from back to front.
 
 import { colours, fresh, FONT } from "./drawing.js";
 
 const AZIMUTH = 0.75, ELEVATION = 0.33; // radians, of whoever looks
-const THICK_M = [0.19, 0.17, 0.15, 0.12, 0.115, 0.1]; // of each joint's housing
+const THICK_M = [0.19, 0.17, 0.15, 0.12, 0.115, 0.1]; // of each joint's housing, where there are six
+const USUAL_THICK_M = 0.12;
 const TURNING = 0.02; // rad/s
 
 /** Draw `arm` (as the rig tells it) on a canvas. */
 export function drawArm(canvas, arm) {
   const { pen, width, height } = fresh(canvas);
   const paint = colours();
-  const frames = framesOf(arm.geometry, arm.q_rad ?? [0, 0, 0, 0, 0, 0]);
+  const frames = framesOf(arm.geometry, arm.q_rad ?? arm.geometry.theta_rad.map(() => 0));
   const size = Math.min(width / 2.2, height / 1.6); // pixels a metre
   const see = ([x, y, z]) => {
     const along = x * Math.cos(AZIMUTH) + y * Math.sin(AZIMUTH);
@@ -25,13 +26,15 @@ export function drawArm(canvas, arm) {
   shadow(pen, paint, frames, see, size);
   const fastest = fastestJoint(arm.qd_rad_s);
   const parts = [plinth(paint, see, size)];
-  for (let joint = 0; joint < 6; joint += 1) {
+  const joints = frames.length - 1;
+  const thickOf = (joint) => (joints === THICK_M.length ? THICK_M[Math.min(joint, joints - 1)] : USUAL_THICK_M);
+  for (let joint = 0; joint < joints; joint += 1) {
     const [from, to] = [frames[joint].origin, frames[joint + 1].origin];
-    const thick = size * (THICK_M[joint] + THICK_M[Math.min(joint + 1, 5)]) * 0.42;
+    const thick = size * (thickOf(joint) + thickOf(joint + 1)) * 0.42;
     for (const [start, end] of bent(frames[joint], from, to)) parts.push(limb(paint, see, start, end, thick));
-    parts.push(knuckle(paint, see, from, frames[joint].z, size * THICK_M[joint] * 0.58, joint === fastest));
+    parts.push(knuckle(paint, see, from, frames[joint].z, size * thickOf(joint) * 0.58, joint === fastest));
   }
-  parts.push(...board(paint, see, frames[6], size));
+  parts.push(...board(paint, see, frames[joints], size));
   parts.sort((a, b) => b.deep - a.deep);
   for (const part of parts) part.draw(pen);
   if (fastest !== null) {
@@ -41,11 +44,11 @@ export function drawArm(canvas, arm) {
   }
 }
 
-/** Seven frames, the base's and one after each joint: origin, axes x, y, z in the base's frame. */
+/** Frames, the base's and one after each joint: origin, axes x, y, z in the base's frame. */
 export function framesOf(geometry, q) {
   let frame = { origin: [0, 0, 0], x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
   const frames = [frame];
-  for (let i = 0; i < 6; i += 1) {
+  for (let i = 0; i < q.length; i += 1) {
     const angle = q[i] + geometry.theta_rad[i], twist = geometry.alpha_rad[i];
     const x = sum(scaled(frame.x, Math.cos(angle)), scaled(frame.y, Math.sin(angle)));
     const across = sum(scaled(frame.x, -Math.sin(angle)), scaled(frame.y, Math.cos(angle)));
@@ -69,7 +72,7 @@ function bent(frame, from, to) {
 }
 
 function fastestJoint(speeds) {
-  if (!speeds) return null;
+  if (!speeds?.length) return null;
   const sizes = speeds.map(Math.abs);
   const fastest = sizes.indexOf(Math.max(...sizes));
   return sizes[fastest] > TURNING ? fastest : null;

@@ -51,14 +51,14 @@ const SHOW = {
     $("missed").className = arm.missed ? "odd-number" : "";
     if (!arm.q_rad) return;
     const known = arm.let_go || !past; // of one that moved when it was seen last, nobody knows what it does now
-    const fast = Math.max(...arm.qd_rad_s.map(Math.abs)) * 180 / Math.PI;
+    const fast = Math.max(0, ...arm.qd_rad_s.map(Math.abs)) * 180 / Math.PI;
     const normal = (value, usual) => (known ? [value, value !== usual] : ["–", false]);
     const share = (value) => (known ? [`${Math.round(100 * value)} %`, value < 0.995] : ["–", false]);
-    facts([
-      ["speed", [known ? `${fast.toFixed(1)} °/s` : "–", false]], ["slider", share(arm.slider)],
-      ["scaling", share(arm.scaling)], ["mode", normal(arm.mode, "running")],
+    const ofController = arm.mode === undefined ? [] : [
+      ["slider", share(arm.slider)], ["scaling", share(arm.scaling)], ["mode", normal(arm.mode, "running")],
       ["safety", normal(arm.safety, "normal")], ["program", [known ? arm.program : "–", arm.program === "paused"]],
-    ]);
+    ];
+    facts([["speed", [known ? `${fast.toFixed(1)} °/s` : "–", false]], ...ofController]);
     tables.joints(arm, known);
     drawArm($("arm"), known ? arm : { ...arm, qd_rad_s: arm.q_rad.map(() => 0) });
   },

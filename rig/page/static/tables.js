@@ -41,7 +41,7 @@ export function samples(sensors) {
 
 /** Angles and, where they are `known`, speeds. */
 export function joints(arm, known) {
-  const fastest = Math.max(...arm.qd_rad_s.map(Math.abs));
+  const fastest = Math.max(0, ...arm.qd_rad_s.map(Math.abs));
   fill("joints", arm.joints.map((name, i) => {
     const turning = known && fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
     return row(

@@ -19,6 +19,8 @@ from rig.errors import Refused
 from rig.report.certificate.stated import Stated
 from rig.report.kinds.kind import Found, Without
 from rig.report.kinds.registry import kinds, shown
+from rig.turners.kind import Words
+from rig.turners.registry import words_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +91,16 @@ class Certificate:
         found = self.provenance
         if found.motion_file is not None:
             return f"whatever the file {_named(found.motion_file)} tells the motion of"
-        if found.arm_model is None:
+        if found.arm_model is None and found.turner_kind is None:
             return "robot arm whose model was not recorded; it was taken for a Universal Robots UR10e"
-        return f"robot arm {found.arm_maker} {found.arm_model}"
+        if found.arm_model is None:
+            return f"{self.words.name} whose model was not recorded"
+        return f"{self.words.name} {found.arm_maker} {found.arm_model}"
+
+    @property
+    def words(self) -> Words:
+        """How to speak of what turned the items."""
+        return words_of(self.provenance.turner_kind)
 
     @property
     def procedure(self) -> str:

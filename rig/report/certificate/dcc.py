@@ -221,7 +221,7 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
 def _method(c: Certificate) -> str:
     if c.elsewhere:
         return "readings recorded elsewhere, of a motion that a file tells"
-    return "whole turns and attitudes at rest on a robot arm"
+    return c.words.briefly
 
 
 def _arm(c: Certificate) -> Element:

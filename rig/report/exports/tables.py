@@ -34,7 +34,8 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
     """The tables of each recording: the arm, of each sensor its readings, of each gyroscope its sweeps as well."""
     for number, recording in enumerate(recordings, start=1):
         after = "" if number == 1 else f"-{number}"
-        yield Table(f"arm{after}", recording.motion.table(), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
+        said = f"Joint angles and rates, from the ground on. {CLOCK} {LOST}"
+        yield Table(f"arm{after}", recording.motion.table(), said)
         for name, sensor in recording.run.sensors.items():
             yield from _readings(recording, name, sensor, after)
             if sensor.measures(RATE):

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -15,7 +16,7 @@ from rig.motion.steps import Motion, travel
 from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
 from rig.turners.ur.dashboard import Dashboard
-from rig.turners.ur.identity import series_problem
+from rig.turners.ur.identity import model_found, series_problem
 from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.turners.ur.primary import Account, read_account
 from rig.turners.ur.state_stream import NotSpoken, StateStream
@@ -102,7 +103,7 @@ class Arm:
         try:
             with Dashboard(self._host, ANSWER_S) as dashboard:
                 account = _account(self._host)
-                return ArmReport(
+                report = ArmReport(
                     host=self._host,
                     version=self._connected.version,
                     polyscope=dashboard.polyscope(),
@@ -117,6 +118,7 @@ class Arm:
                     setup=account.setup,
                     called=dashboard.robot_model(),
                 )
+                return replace(report, model=model_found(report))
         except OSError as error:
             raise Refused.of(_silent_dashboard(self._host, error)) from error
 

@@ -12,7 +12,6 @@ from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, NOMINAL, DenavitHartenberg, lengths_m
 from rig.motion.state import ArmReport
 
-MAKER = "Universal Robots"
 E_SERIES, POLYSCOPE_X = 5, 10  # the first major versions of their software; the CB3 series has 3
 UR10 = 2
 E_SERIES_MODELS = {
@@ -49,13 +48,6 @@ def model_found(report: ArmReport) -> str | None:
         return models.get(report.setup.robot_type, f"arm of type {report.setup.robot_type}")
     made_so = report.kinematics is not None and _other_length(report.kinematics) is None
     return models[UR10] if made_so or _called_ur10(report) else None
-
-
-def arm_words(report: ArmReport) -> str:
-    """The arm as a line of text names it: model, serial number, software."""
-    model = model_found(report)
-    named = "model not told" if model is None else f"{MAKER} {model}"
-    return f"{named}, serial number {report.serial_number}, PolyScope {report.polyscope}"
 
 
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:

@@ -10,10 +10,10 @@ from rig.errors import Problem, refuse
 from rig.motion.carried import carried_by
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_axes
 from rig.motion.preflight import plan_problems, way_to_home
-from rig.motion.state import JOINT_NAMES, ArmReport, Made
+from rig.motion.state import JOINT_NAMES, MAKER, ArmReport, Made
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import readiness
-from rig.turners.ur.identity import MAKER, identity_problems, model_found
+from rig.turners.ur.identity import identity_problems, model_found
 
 # How far the first motion may swing the large joints through the room, and the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
@@ -137,7 +137,7 @@ def made(arm: ArmSection, report: ArmReport) -> Made:
     Raises Refused `no_kinematics`, `kinematics_disagree`.
     """
     refuse(kinematics_problems(arm, report))
-    return Made(MAKER, model_found(report), _geometry(arm, report))
+    return Made(MAKER, model_found(report), _geometry(arm, report), report.tcp_offset)
 
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:

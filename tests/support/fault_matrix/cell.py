@@ -213,7 +213,7 @@ def _resume(here: Bench, cell: Cell) -> None:
 def span(setup: str, folder: Path) -> tuple[Cell, float]:
     """A run that nothing disturbs, and how long the arm's part of it takes by the controller's clock."""
     cell = carry_out("none", None, setup, folder, moment=1.0, span_s=0.0, seed=0)
-    arm = read_run(folder / "run" / "run.h5").arm
+    arm = read_run(folder / "run" / "run.h5").states
     moving = np.flatnonzero(np.abs(arm["qd_rad_s"]).max(axis=1) > 0)
     return cell, float(arm["time_s"][moving[-1]] - arm["time_s"][moving[0]])
 

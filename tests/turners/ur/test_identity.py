@@ -14,7 +14,7 @@ from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
 from rig.motion.state import ArmReport
 from rig.turners.ur.driver import look
-from rig.turners.ur.identity import arm_words, identity_problems, model_found
+from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.preflight import preflight_problems
 from support.commands import rig
 from support.told_runs import report
@@ -45,7 +45,7 @@ def untouched(laboratory: WorldHandle) -> bool:
 def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> None:
     assert identity_problems(ARM, seen) == []
     assert seen.version == (5, 14, 0, 0) and seen.called == "UR10"
-    assert arm_words(seen).startswith("Universal Robots UR10e or UR12e, serial number 20265500123, PolyScope ")
+    assert seen.words.startswith("Universal Robots UR10e or UR12e, serial number 20265500123, PolyScope ")
     assert seen.setup is not None
     limits = seen.setup.limits
     np.testing.assert_allclose(np.degrees(limits.speed_rad_s), [120, 120, 180, 180, 180, 180])

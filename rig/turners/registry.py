@@ -1,0 +1,61 @@
+"""The kinds of turners by name. A package adds its own through the entry-point group `rig.turners`.
+
+Nothing in the rig knows a turner except through its `TurnerKind`.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import entry_points
+
+from rig.config.models import TurnerSection
+from rig.errors import Refused
+from rig.turners.kind import AnyTurner, Words
+
+GROUP = "rig.turners"
+
+
+@cache
+def installed() -> Mapping[str, AnyTurner]:
+    """The kinds of turners of the packages installed here. Raises Refused `turner_not_loaded`."""
+    found: dict[str, AnyTurner] = {}
+    for entry in entry_points(group=GROUP):
+        try:
+            kind = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise Refused(
+                "turner_not_loaded",
+                f"the turner {entry.name} is installed but cannot be loaded ({error})",
+                f"Install the package of {entry.value} again, or remove it",
+            ) from error
+        found[kind.name] = kind
+    return found
+
+
+def sections() -> Mapping[str, type[TurnerSection]]:
+    """What the `turner:` section of a configuration may be, by its `kind`."""
+    return {name: kind.section for name, kind in installed().items()}
+
+
+def kind_of(section: TurnerSection) -> AnyTurner:
+    """The kind of turner that is configured so. Raises Refused `turner_not_installed`."""
+    for kind in installed().values():
+        if type(section) is kind.section:
+            return kind
+    raise Refused(
+        "turner_not_installed",
+        f"no turner is installed here that is configured by {type(section).__name__}",
+        "Install the package that brings it; after an update of the rig, install the rig again",
+    )
+
+
+def words_of(name: str | None) -> Words:
+    """How to speak of a kind of turner: in general terms of one that is not installed here. None: an arm, of before."""
+    known = installed().get(name or "ur")
+    if known is not None:
+        return known.words
+    return Words(
+        name=f"turner of the kind {name}",
+        method=f"A turner of the kind {name} turns the items",
+        briefly=f"turns and attitudes at rest on a turner of the kind {name}",
+        directions="the turner's geometry",
+    )

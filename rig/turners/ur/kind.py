@@ -1,0 +1,60 @@
+"""The arms of Universal Robots, as a kind of turner."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from math import degrees
+from pathlib import Path
+
+from rig.config.models import ArmSection
+from rig.errors import Problem, refuse
+from rig.motion.carried import carried_by
+from rig.motion.preflight import plan_problems
+from rig.motion.state import ARM_FIELDS, ArmReport, Made
+from rig.motion.steps import Plan
+from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.turner import Turner
+from rig.turners.ur import driver, preflight
+from rig.turners.ur.identity import identity_problems
+
+
+def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
+    return driver.Arm(section.host, on_state, section.state_rate_hz, log)
+
+
+def _look(section: ArmSection) -> ArmReport:
+    return driver.look(section.host)
+
+
+def _stance(report: ArmReport) -> str:
+    angles = " ".join(f"{degrees(angle):.1f}" for angle in report.state.q_rad)
+    return f"arm joints: {angles} °, speed slider {100 * report.state.target_speed_fraction:.0f} %"
+
+
+def _problems(plans: Sequence[Plan], section: ArmSection, report: ArmReport | None) -> list[Problem]:
+    if report is None:
+        return [problem for plan in plans for problem in plan_problems(plan, carried_by(section))]
+    return preflight.preflight_problems(plans, section, report)
+
+
+def _made(section: ArmSection, report: ArmReport) -> Made:
+    refuse(identity_problems(section, report))
+    return preflight.made(section, report)
+
+
+UR = TurnerKind(
+    name="ur",
+    section=ArmSection,
+    connect=_connect,
+    look=_look,
+    stance=_stance,
+    problems=_problems,
+    made=_made,
+    carried=carried_by,
+    words=Words(
+        name="robot arm",
+        method="A robot arm turns the items through whole turns at constant rate about its wrists' axes, both ways",
+        briefly="whole turns and attitudes at rest on a robot arm",
+        directions="the arm's kinematics",
+    ),
+    fields=ARM_FIELDS,
+)
