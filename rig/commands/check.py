@@ -118,7 +118,7 @@ def _look_at_turner(configured: "Configured", tell: Tell) -> list[Problem]:
     section = configured.loaded.config.turner
     kind = kind_of(section)
     report = kind.look(section)
-    tell(f"arm at {report.host}: {report.words}")
+    tell(f"{kind.words.short} at {report.host}: {report.words}")
     tell(kind.stance(report))
     plan = configured.phase.plan(report.state.q_rad)
     for doubt in doubts(plan):

@@ -196,7 +196,7 @@ def _validate_turner(
         if "arm" not in document:
             return None, ["arm: missing"]
         return _validate(ArmSection, document["arm"], ("arm",), layered)
-    known = {ARM: ArmSection, **(turners or {})}
+    known: dict[str, type[TurnerSection]] = {ARM: ArmSection, **(turners or {})}
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:

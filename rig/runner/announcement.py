@@ -9,10 +9,11 @@ from rig.motion.state import Report
 from rig.motion.steps import Plan
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
+from rig.turners.kind import Words
 
 
-def announcement(plan: Plan, report: Report, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
-    """The question before the first motion, which depends on where the turner stands.
+def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
+    """The question before the first motion, which depends on where the turner stands; `words` speak of it.
 
     `repeated` is the movement that follows without another question if the calibration passes; `mounted` says, in
     lines, which sensors are turned.
@@ -23,11 +24,11 @@ def announcement(plan: Plan, report: Report, repeated: Plan | None, mounted: Ite
     )
     lines = [
         *mounted,
-        f"The arm at {report.host} will move for {duration_words(plan.duration_s)}.",
+        f"The {words.short} at {report.host} will move for {duration_words(plan.duration_s)}.",
         f"First it goes home: {turns or 'it is there already'}.",
     ]
     if plan.sweeps:
-        lines.append(f"Then {len(plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
+        lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than a whole turn each.")
     if plan.dwells:
         lines.append(f"Then it stands still in {len(plan.dwells)} attitudes; settling may add {plan.settling_s:.0f} s.")
     if repeated is not None:

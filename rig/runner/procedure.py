@@ -133,12 +133,9 @@ class Rig:
         devices, station = self.devices, self.recording.station
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
-        if not station.ask(announcement(self.plan, devices.report, repeated, devices.mounted.lines())):
-            raise Refused(
-                "not_confirmed",
-                "nobody agreed to the movement",
-                NOT_AGREED,
-            )
+        told = announcement(self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines())
+        if not station.ask(told):
+            raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
     def _refuse_moved(self) -> None:
         """Refuse an arm that somebody moved while the operator thought: it would take another way than announced."""

@@ -22,11 +22,14 @@ OnState = Callable[[State], None]
 class Words:
     """How documents and messages speak of a turner.
 
-    `name` is a noun without an article ("robot arm"); `method` says in a clause how it turns the items, for the
+    `name` is a noun without an article ("robot arm"), `short` what an operator calls it ("arm"), `turned` what a sweep
+    turns of it ("the wrists"); `method` says in a clause how it turns the items, for the
     certificate; `briefly` the same in a few words, for the digital certificate; `directions` whence its axes are known.
     """
 
     name: str
+    short: str
+    turned: str
     method: str
     briefly: str
     directions: str

@@ -55,6 +55,8 @@ def words_of(name: str | None) -> Words:
         return known.words
     return Words(
         name=f"turner of the kind {name}",
+        short="turner",
+        turned="it",
         method=f"A turner of the kind {name} turns the items",
         briefly=f"turns and attitudes at rest on a turner of the kind {name}",
         directions="the turner's geometry",

@@ -162,7 +162,14 @@ KIND = TurnerKind(
     problems=problems,
     made=lambda section, report: Made("Toys", report.model, GEOMETRY),
     carried=lambda section: Carried(0.0),
-    words=Words("turntable", "A turntable turns the items about its axis", "turns on a turntable", "the table"),
+    words=Words(
+        name="turntable",
+        short="table",
+        turned="it",
+        method="A turntable turns the items about its axis",
+        briefly="turns on a turntable",
+        directions="how the table is made",
+    ),
     fields=(StateField("current_a", "f4"),),
 )
 

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from pathlib import Path
 
 import pytest
 
@@ -77,6 +76,9 @@ def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: d
     assert result["verdict"] == "pass" and [check["name"] for check in result["checks"]] == ["gyro.speed"]
     assert result["provenance"]["turner_kind"] == "turntable" and result["provenance"]["arm_model"] == "T1"
     assert "verdict: PASS" in ran(installed, "-m", "rig", "show", str(recorded))
+    ran(installed, "-m", "rig", "report", str(recorded))
+    page = (recorded / "certificate.html").read_text(encoding="utf-8")
+    assert "Equipment: turntable Toys T1, serial number T-7, software 1.0" in page
     ran(installed, "-m", "rig", "export", str(recorded), "--format", "csv", "--out", str(tmp_path / "csv"))
     header, *rows = (tmp_path / "csv" / "arm.csv").read_text(encoding="utf-8").splitlines()
     assert header == "time_s,table_rad,table_rad_s" and len(rows) > 1000
@@ -92,7 +94,7 @@ def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, instal
     assert "are told" not in plan and "is told" not in plan  # what a plan's checks tell is reckoned for an arm
     assert "joint_speed" in ran(installed, "-m", "rig", "plan", config, "--set", "procedure.speed_deg_s=400", status=2)
     checked = json.loads(ran(installed, "-m", "rig", "check", config, "--json", status=2).partition("\n}")[0] + "}")
-    assert "arm at /dev/ttyUSB7: Toys T1, serial number T-7" in checked["seen"]
+    assert "table at /dev/ttyUSB7: Toys T1, serial number T-7" in checked["seen"]
     assert [problem["name"] for problem in checked["missing"]] == ["no_port"]
     wrong = ran(installed, "-m", "rig", "plan", config, "--set", "turner.kind=turntabel", status=2)
     assert "turner.kind (--set): 'turntabel' is not allowed, did you mean turntable?; allowed: ur, turntable" in wrong
