@@ -20,6 +20,7 @@ from rig.motion.geometry import DenavitHartenberg, Pose
 from rig.motion.state import Made, Report
 
 OF_FILES = ("readings_file", "motion_file")
+OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
 SIMULATED = "(simulated)"  # so ends the version of a controller that is none
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
@@ -73,9 +74,7 @@ class Provenance:
         files = {name: each.model_dump() for name in OF_FILES if (each := getattr(self, name)) is not None}
         document = {**asdict(self), "stored_calibrations": stored, **files}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model")
-        optional += ("turner_kind", "board_follows_crystal", *OF_FILES)
-        unknown |= {name for name in optional if document[name] is None}
+        unknown |= {name for name in (*OPTIONAL, *OF_FILES) if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
 
 

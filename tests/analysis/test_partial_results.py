@@ -10,7 +10,7 @@ from rig.data.events import SweepFinished
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.vector_model import VectorSolution
-from rig.observation.arm_motion import ArmMotion
+from rig.observation.arm_motion import motion_of
 from rig.observation.average import on_the_arms_clock
 from rig.observation.observe import Observation
 from rig.observation.windows import swept
@@ -45,7 +45,7 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
     third = list(swept(run))[2].window
-    times_s = on_the_arms_clock(samples, run.sensors["gyro"], ArmMotion(run.states, run.provenance.kinematics)).time_s
+    times_s = on_the_arms_clock(samples, run.sensors["gyro"], motion_of(run)).time_s
     samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
     found = so_far([replace(run, samples={"gyro": samples})])["gyro"]
     refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]

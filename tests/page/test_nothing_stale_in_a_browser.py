@@ -13,7 +13,7 @@ import pytest
 from selenium.webdriver import Chrome
 
 from rig.errors import Fault
-from rig.motion.state import RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
 from support.browser import kind, legible, needs_browser, picture, severe, text, until
 from support.paths import ROOT
@@ -63,6 +63,7 @@ def contradictions(driver: Chrome) -> list[tuple[str, str]]:
 def let_go(events: list[RunEvent]) -> ArmSeen:
     """The arm where it was seen last, at rest, and its program ended."""
     seen = [event.state for event in events if isinstance(event, ArmSeen)][-1]
+    assert isinstance(seen, ArmState)
     return ArmSeen(replace(seen, qd_rad_s=(0.0,) * 6, runtime_state=RuntimeState.STOPPED), 0)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rig.commands.configured import configured
 from rig.data.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
-from rig.motion.state import RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Sweep
 from rig.runner.phases import Run
 from rig.station.events import (
@@ -144,7 +144,7 @@ def test_the_arm_is_seen_once_more_when_it_was_let_go(events: list[RunEvent]) ->
     ends = [place for place, event in enumerate(events) if isinstance(event, PhaseRecorded)]
     for end in ends:
         seen = events[end + 1]
-        assert isinstance(seen, ArmSeen)
+        assert isinstance(seen, ArmSeen) and isinstance(seen.state, ArmState)
         assert seen.state.at_rest and seen.state.runtime_state == RuntimeState.STOPPED
 
 
@@ -174,7 +174,7 @@ def test_the_hosts_own_observations_come_when_the_calibration_is_judged(events: 
 IMPORTS = """
 import sys
 from pathlib import Path
-from rig.motion.state import RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.commands.configured import configured
 from rig.runner.phases import Run
 from rig.station.events import PhaseRecorded, PreflightPassed

@@ -13,7 +13,7 @@ from typing import Any
 
 from selenium.webdriver import Chrome
 
-from rig.motion.state import RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.page.about import About
 from rig.page.control import Control
 from rig.page.feed import Feed
@@ -44,7 +44,7 @@ class Telling:
         with self._telling:
             for event in events:
                 self._feed.event(event)
-                if isinstance(event, ArmSeen):
+                if isinstance(event, ArmSeen) and isinstance(event.state, ArmState):
                     self._last = event if event.state.runtime_state == RuntimeState.PLAYING else None
                 elif not isinstance(event, GOING_ON):
                     self._last = None

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import pi
+from math import pi, radians
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from pydantic import Field
 
 from rig.analysis.check import Check
 from rig.analysis.outcome import Origin
+from rig.config.section import Direction
 from rig.data.meaning import Meaning
 from rig.errors import Problem
 from rig.motion.carried import Carried
@@ -29,6 +30,7 @@ from rig.procedure import (
     ProcedureSection,
     Rest,
     RunData,
+    Step,
     Sweep,
     Transfer,
     TurnerSection,
@@ -184,16 +186,17 @@ def planned(
     table: TurntableSection, procedure: OneAxisSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
     """A turn either way with a rest before each."""
-    speed, steps, here = np.radians(procedure.speed_deg_s), [], start_q_rad or (0.0,)
-    beside = pi + speed**2 / ACCELERATION_RAD_S2
-    rates = float(speed), ACCELERATION_RAD_S2
-    for index, (way, sign) in enumerate((("ccw", 1), ("cw", -1))):
-        start, end = (float(-sign * beside),), (float(sign * beside),)
+    steps: list[Step] = []
+    here, speed = start_q_rad or (0.0,), radians(procedure.speed_deg_s)
+    beside, rates = pi + speed**2 / ACCELERATION_RAD_S2, (speed, ACCELERATION_RAD_S2)
+    ways: tuple[tuple[Direction, int], ...] = (("ccw", 1), ("cw", -1))
+    for index, (way, sign) in enumerate(ways):
+        start, end = (-sign * beside,), (sign * beside,)
         if here != start:
             takes_s = trapezoid_duration(abs(start[0] - here[0]), *rates)
             steps.append(Transfer("way to the start", here, start, *rates, takes_s))
         steps.append(Rest("rest", 2.0))
-        takes_s, axis = trapezoid_duration(2 * float(beside), *rates), (0.0, 0.0, float(sign))
+        takes_s, axis = trapezoid_duration(2 * beside, *rates), (0.0, 0.0, float(sign))
         steps.append(Sweep(index, 0, "table", way, axis, start, end, *rates, takes_s, (-pi, pi)))
         here = end
     home = Transfer("way home", here, (0.0,), *rates, trapezoid_duration(abs(here[0]), *rates))
