@@ -67,7 +67,7 @@ def _take(host: str, held: ExitStack) -> bool:
 
 
 def _turner_key(text: str) -> str:
-    """Under which key a file says what turns."""
+    """The key under which a file says what turns."""
     import yaml
 
     return "turner" if "turner" in yaml.safe_load(text) else "arm"

@@ -13,7 +13,7 @@ from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
 from rig.data.run_file import RunData
 from support.commands import rig_here
 from support.real import unpacked
-from support.synthetic_run import Setup, synthetic_run
+from support.synthetic_run import UR, Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +30,7 @@ def write(run: RunData, path: Path) -> None:
         "config": run.config,
         "settings": run.settings.to_json(),
         "provenance": json.dumps(run.provenance.document()),
+        "turner": UR.to_json(),
     }
     events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
     described = {name: sensor.attributes() for name, sensor in run.sensors.items()}

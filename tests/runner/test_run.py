@@ -82,7 +82,7 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
     assert ", vector" in whole and "six_observation: k" in whole and "non-orthogonality" in whole
     with h5py.File(out / "run.h5", "r") as file:
         assert "scale: [" not in file.attrs["config"], "the recording must not hold the simulated truth"
-        states = file["arm"]["time_s"]
+        states = file["states"]["time_s"]
         assert np.median(np.diff(states)) <= 1 / 125 + 1e-9
         sequence = file["samples/gyro"]["sequence"]
         assert np.array_equal(sequence, np.arange(len(sequence))), "samples are missing"
