@@ -13,6 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import duration_words, say
 
 if TYPE_CHECKING:
+    from rig.study.catalogue import Entry
     from rig.study.report import Finding
 
 WORTH_TELLING_S = 5.0
@@ -43,7 +44,7 @@ def _listed() -> int:
 
     listed = Table(box=None, show_header=False)
     for name, entry in STUDIES.items():
-        listed.add_row(name, entry.summary, f"about {duration_words(entry.core_s)}")
+        listed.add_row(name, entry.summary, _about(entry))
     console = Console()
     console.print(listed)
     console.print("on one core; --jobs N has N of them work, --runs N takes fewer runs than the paper")
@@ -77,8 +78,8 @@ def _run(options: Namespace) -> int:
         except ImportError as error:
             raise missing_extra(error, "parquet") from error
     refuse_links(*options.out.glob("*"))
-    if options.runs is None and options.dask is None:
-        say(f"study {options.name}: about {duration_words(entry.core_s / (options.jobs or 1))}", file=sys.stderr)
+    if options.runs is None and options.dask is None and (about := _about(entry, options.jobs or 1)):
+        say(f"study {options.name}: {about}", file=sys.stderr)
     with _cluster(options.dask) if options.dask else nullcontext():
         report = entry.run(Settings(options.seed, options.runs, options.jobs, partial(_bar, options.jobs or 1)))
     paths = write(report, options.out, options.name, options.format)
@@ -86,6 +87,12 @@ def _run(options: Namespace) -> int:
     for path in paths:
         say(f"written: {path}", file=sys.stderr)
     return 0
+
+
+def _about(entry: "Entry", jobs: int = 1) -> str:
+    """How long a study takes, in words; nothing where that is not known."""
+    duration_s = entry.duration_s(jobs)
+    return "" if duration_s is None else f"about {duration_words(max(duration_s, 1.0))}"
 
 
 @contextmanager

@@ -133,8 +133,8 @@ class Rig:
         devices, station = self.devices, self.recording.station
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
-        told = announcement(self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines())
-        if not station.ask(told):
+        said = announcement(self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines())
+        if not station.ask(said):
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
     def _refuse_moved(self) -> None:

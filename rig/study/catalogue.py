@@ -12,12 +12,16 @@ from rig.study.report import Report, Settings
 class Entry:
     """A study: what it shows, the function `module:name` that makes it, and the processor time that takes, s.
 
-    That of one core of the machine on which `python benchmarks/studies.py` was run last.
+    That is what `python benchmarks/studies.py` said last, of one core and of one machine; None where nobody has asked.
     """
 
     summary: str
     function: str
-    core_s: float
+    core_s: float | None = None
+
+    def duration_s(self, jobs: int = 1) -> float | None:
+        """About how long it takes with so many processes, s."""
+        return None if self.core_s is None else self.core_s / jobs
 
     def run(self, settings: Settings) -> Report:
         """Compute the study."""
@@ -27,12 +31,14 @@ class Entry:
 
 
 STUDIES = {
-    "normal": Entry("SIX Fig. 2: error bands of Algorithm 1 and Levenberg–Marquardt, usual gyroscopes", "bands:normal"),
-    "extreme": Entry("SIX Fig. 5: the same for poor gyroscopes", "bands:extreme"),
-    "speed": Entry("SIX Fig. 4: mean squared error against the speed of the sweeps", "speed:study"),
-    "convergence": Entry("SIX Table I, and where Algorithm 1 stops converging", "convergence:study"),
-    "sine": Entry("SIX Fig. 3: readings before and after calibration in a swinging movement", "sine:study"),
-    "averaging": Entry("averaging before squaring against squaring before averaging", "averaging:study"),
+    "normal": Entry(
+        "SIX Fig. 2: error bands of Algorithm 1 and Levenberg–Marquardt, usual gyroscopes", "bands:normal", 42
+    ),
+    "extreme": Entry("SIX Fig. 5: the same for poor gyroscopes", "bands:extreme", 52),
+    "speed": Entry("SIX Fig. 4: mean squared error against the speed of the sweeps", "speed:study", 3),
+    "convergence": Entry("SIX Table I, and where Algorithm 1 stops converging", "convergence:study", 1),
+    "sine": Entry("SIX Fig. 3: readings before and after calibration in a swinging movement", "sine:study", 1),
+    "averaging": Entry("averaging before squaring against squaring before averaging", "averaging:study", 1),
     "estimators": Entry("every estimator's mean squared error over its Cramér–Rao bound", "estimators:study"),
     "misalignment": Entry("error against mounting error and non-orthogonality", "misalignment:study"),
     "budget": Entry("whether the stated uncertainty holds where everything may be wrong", "budget:study"),

@@ -20,7 +20,7 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and
     running = world()
     with (
         pytest.raises(Refused, match=f"port_in_use: .*cannot listen on {running.host}:29999"),
-        simulated_laboratory(running.config_path),
+        simulated_laboratory(running.config_path.read_text(encoding="utf-8")),
     ):
         pass
     command = [sys.executable, "-m", "rig", "check", str(running.config_path)]
@@ -38,6 +38,6 @@ def test_a_laboratory_that_breaks_before_it_is_ready_says_how_it_ended(
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
     with (
         pytest.raises(Refused, match=r"world_not_ready: .* ended with status 7"),
-        simulated_laboratory(DEMO),
+        simulated_laboratory(DEMO.read_text(encoding="utf-8")),
     ):
         pass

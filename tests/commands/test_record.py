@@ -55,7 +55,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     config = tmp_path / "config.yaml"
     config.write_text(yaml.safe_dump(document), encoding="utf-8")
     states: list[ArmState] = []
-    with simulated_laboratory(config), Arm(host, states.append) as table:
+    with simulated_laboratory(config.read_text(encoding="utf-8")), Arm(host, states.append) as table:
         out = tmp_path / "recorded"
         command = [sys.executable, "-m", "rig", "record", str(hardware(config, tmp_path)), "--out", str(out)]
         with subprocess.Popen(

@@ -188,7 +188,10 @@ def test_results_do_not_depend_on_a_dask_cluster(tmp_path: Path) -> None:
 def test_the_command_lists_studies_and_refuses_unknown_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["study"]) == 0
     listed = " ".join(capsys.readouterr().out.split())
-    assert all(name in listed for name in STUDIES) and listed.count("about ") >= len(STUDIES)
+    assert (
+        all(name in listed for name in STUDIES)
+        and listed.count("about ") >= sum(each.core_s is not None for each in STUDIES.values()) > 0
+    )
     assert main(["study", "nosuch"]) == 2
     assert "Choose one of normal" in capsys.readouterr().err
 

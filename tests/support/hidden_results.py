@@ -9,9 +9,8 @@ import numpy as np
 import yaml
 
 from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.check import Check
-from rig.analysis.outcome import Outcome
+from rig.analysis.outcome import DEFAULT_ESTIMATOR, Outcome
 from rig.errors import RigError
 from rig.estimation.budget import Budget
 from rig.observation.observed_run import ObservedRun

@@ -2,13 +2,8 @@
 
 from collections.abc import Sequence
 
-from rig.analysis.calibration import (
-    DEFAULT_ESTIMATOR,
-    SensorResult,
-    known_estimator,
-    observe_recordings,
-    solve_observed,
-)
+from rig.analysis.calibration import SensorResult, known_estimator, observe_recordings, solve_observed
+from rig.analysis.outcome import DEFAULT_ESTIMATOR
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
 

@@ -15,7 +15,7 @@ from support.paths import ROOT
 
 NEEDED = [
     "rig.commands.carry_out",
-    "rig.analysis.outcome",
+    "rig.analysis.judging",
     "rig.history.finished",
     "rig.history.series",
     "rig.history.store",
