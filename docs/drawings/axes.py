@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from svg import Drawing, Point
 
-from rig.config.models import ArmSection
 from rig.config.sensor_sections import MountingSection, mounting_matrix
 from rig.motion.geometry import flange_attitude
+from rig.motion.model import turner_model
 
 RED, GREEN, BLUE = "#c62828", "#2e7d32", "#1565c0"  # x, y, z
 NAMES = ("x", "y", "z")
@@ -97,11 +97,11 @@ def mounting() -> Drawing:
 
 def home() -> Drawing:
     """The usual home pose from the side, with the flange's axes: how to find them without a drawing of the flange."""
-    q = np.radians(ArmSection.model_fields["home_deg"].default)
+    q = np.array(turner_model("ur10e").home_rad)
     attitude = flange_attitude(q)  # columns: the flange's axes in the base's frame
     drawing = Drawing(760, 470, "The flange's axes at the usual home pose")
     drawing.words((380, 30), "the usual home pose, from the side", size=18, anchor="middle", bold=True)
-    angles = ", ".join(f"{angle:g}" for angle in ArmSection.model_fields["home_deg"].default)
+    angles = ", ".join(f"{angle:g}" for angle in np.degrees(q).round(9))
     drawing.words((380, 52), f"base, shoulder, elbow, wrists 1, 2, 3: {angles}°", anchor="middle")
     scale, foot = 380.0, (600.0, 420.0)
 

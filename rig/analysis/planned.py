@@ -20,6 +20,7 @@ from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
+from rig.motion.model import model_of
 from rig.motion.steps import Plan
 
 
@@ -34,8 +35,8 @@ class Told:
 def planned_told_from(config: RigConfig, plan: Plan) -> Told:
     """What the plan of an arm will tell of all that is to be calibrated but magnetometers; of other turners nothing.
 
-    For the nominal arm, and for a sensor as its data sheet has it, which nothing but its noise and its flicker makes
-    wander.
+    For an arm as its model is drawn, and for a sensor as its data sheet has it, which nothing but its noise and its
+    flicker makes wander.
     """
     settings = settings_of(config, plan)
     site, known = settings.site, settings.uncertainty
@@ -45,13 +46,16 @@ def planned_told_from(config: RigConfig, plan: Plan) -> Told:
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
     rates: dict[str, tuple[ToldFrom, ...]] = {}
     if plan.sweeps:
-        turned = planned_pieces(plan, site, np.array(settings.extension_m))
+        turned = planned_pieces(plan, site, np.array(settings.extension_m), model_of(config.arm).drawing)
         rates = {
             name: _told_from(name, each, turned, settings, rate, site=site, known=known)
             for name, each in config.to_calibrate.items()
         }
+    arm = model_of(config.arm).drawing
     read = {
-        name: planned_read(name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g)
+        name: planned_read(
+            name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g, arm=arm
+        )
         for name, each in config.to_calibrate.items()
         if plan.dwells and each.acceleration is not None and each.acceleration.range_g is not None
     }

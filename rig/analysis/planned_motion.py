@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import ARM_STATE_DTYPE
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
 from rig.observation.arm_motion import ArmMotion
@@ -41,8 +42,8 @@ def timed(plan: Plan) -> Iterator[Timed[Step]]:
         time_s += step.duration_s
 
 
-def planned_motion(plan: Plan) -> ArmMotion:
-    """The motion of the nominal arm, without vibration. Raises Fault `no_motion` where nothing moves."""
+def planned_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
+    """The motion of an arm made so, without vibration. Raises Fault `no_motion` where nothing moves."""
     time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
     states = np.zeros(len(time_s), ARM_STATE_DTYPE)
     states["time_s"] = time_s
@@ -54,7 +55,7 @@ def planned_motion(plan: Plan) -> ArmMotion:
             start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
             q_rad[since] = start + share * (target - start)
     states["q_rad"] = q_rad
-    return ArmMotion(states)
+    return ArmMotion(states, arm)
 
 
 def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:

@@ -11,6 +11,7 @@ from rig.analysis.planned_motion import measured, planned_motion
 from rig.analysis.ways import SPARSE_S, STEPS, by_the_wrists, moved, pull_m_s2
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan, Sweep
 from rig.observation.arm_motion import ArmMotion
 
@@ -42,9 +43,9 @@ class _Part:
     stretch: Stretch
 
 
-def planned_pieces(plan: Plan, site: Site, extension_m: Array) -> Planned:
-    """A plan's pieces on the nominal arm, sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
-    motion = planned_motion(plan)
+def planned_pieces(plan: Plan, site: Site, extension_m: Array, arm: DenavitHartenberg) -> Planned:
+    """A plan's pieces on an arm made so, sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
+    motion = planned_motion(plan, arm)
     parts = list(_parts(plan, motion))
     ways = [_Part(REST - 1 - place, 0.0, way) for place, way in enumerate(_ways(plan, motion))]
 

@@ -17,7 +17,7 @@ from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Mo
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.reference_model import REFERENCE
-from rig.motion.geometry import NOMINAL, WRIST_1, flange_arm, flange_attitude
+from rig.motion.geometry import WRIST_1, DenavitHartenberg, flange_arm, flange_attitude
 from rig.motion.steps import Dwell, Plan, Sweep
 
 
@@ -30,8 +30,9 @@ def planned_read(
     site: Site,
     known: Uncertainty,
     range_g: float,
+    arm: DenavitHartenberg,
 ) -> Read:
-    """What the accelerometer of that sensor would read, with noise as its data sheet has it, on the nominal arm.
+    """What the accelerometer of that sensor would read, with noise as its data sheet has it, on an arm made so.
 
     Of attitudes that are gone through several times the last is held out, as in a run.
     """
@@ -43,7 +44,7 @@ def planned_read(
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), site.gravity_m_s2 * np.array(site.up)
     repeatability_rad = float(np.radians(known.repeatability_deg) / np.sqrt(3))
-    movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise), repeatability_rad)
+    movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise, arm), repeatability_rad)
     stood = [
         *(Stood(np.array(each.step.q_rad), None) for each in dwells),
         *(Stood(_began(each.step), each.step.joint - WRIST_1) for each in sweeps),
@@ -55,12 +56,12 @@ def planned_read(
     movement = replace(
         _reading(theta, movement),
         own=errors_of(sheet, pieces, 0.0, second_order=settings.second_order),
-        arm_turns=arm_turns(stood, NOMINAL, mounting),
+        arm_turns=arm_turns(stood, arm, mounting),
     )
     lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
-    arm = arm_patterns(theta, movement, stood, Known(NOMINAL, known.axis_deg, mounting, 0.0))
+    off = arm_patterns(theta, movement, stood, Known(arm, known.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(each.window_s) / 2 for each in pieces])
-    return Read(theta, movement, np.concatenate([lag, arm]), middles_s, second_order=settings.second_order)
+    return Read(theta, movement, np.concatenate([lag, off]), middles_s, second_order=settings.second_order)
 
 
 def _dwells(dwells: Sequence[Timed[Dwell]], mounting: Array, noise_m_s2_sqrt_hz: float) -> Dwells:
@@ -70,7 +71,9 @@ def _dwells(dwells: Sequence[Timed[Dwell]], mounting: Array, noise_m_s2_sqrt_hz:
     return Dwells(np.zeros((len(dwells), 3)), variances, attitudes)
 
 
-def _sweeps(sweeps: Sequence[Timed[Sweep]], mounting: Array, noise_m_s2_sqrt_hz: float) -> Sweeps:
+def _sweeps(
+    sweeps: Sequence[Timed[Sweep]], mounting: Array, noise_m_s2_sqrt_hz: float, arm: DenavitHartenberg
+) -> Sweeps:
     if not sweeps:
         return NO_SWEEPS
     steps = [each.step for each in sweeps]
@@ -81,7 +84,7 @@ def _sweeps(sweeps: Sequence[Timed[Sweep]], mounting: Array, noise_m_s2_sqrt_hz:
     places = list(dict.fromkeys(stations))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # mean, cosine and sine of so many readings
     lasting_s = np.array([np.subtract(*each.window_s[::-1]) for each in sweeps])
-    arms_m = np.array([flange_arm(q_rad, step.joint) for q_rad, step in zip(began, steps, strict=True)])
+    arms_m = np.array([flange_arm(q_rad, step.joint, arm) for q_rad, step in zip(began, steps, strict=True)])
     return Sweeps(
         harmonics_m_s2=np.zeros((len(sweeps), 3, 3)),
         covariances_m2_s4=noise_m_s2_sqrt_hz**2 / lasting_s[:, None, None] * waves,

@@ -66,6 +66,8 @@ def carry_out(
 
 def _about(folder: Path, configured: Configured, page: PageWish | None) -> "About":
     from rig.page.about import About
+    from rig.page.arm import built
+    from rig.turners.registry import kind_of
 
     config = configured.loaded.config
     parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
@@ -77,6 +79,7 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
         parts=parts,
         simulated=configured.loaded.simulated,
         storing=_storing(folder, configured),
+        arm=built(kind_of(config.turner).meant(config.turner).kinematics),
     )
 
 

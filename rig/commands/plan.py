@@ -37,5 +37,7 @@ def planned(options: Namespace) -> "Planned":
     found = configured(options.config, options.overrides, options.script)
     steps = found.phase.plan()
     config = found.loaded.config
-    refuse(kind_of(config.turner).problems([steps], config.turner, None))
-    return Planned(steps, config, repeated=found.phase.follows is not None)
+    kind = kind_of(config.turner)
+    refuse(kind.problems([steps], config.turner, None))
+    model = kind.meant(config.turner).model
+    return Planned(model, steps, config, repeated=found.phase.follows is not None)

@@ -18,9 +18,11 @@ from rig.config.judging_sections import (
 )
 from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget
+from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S
 from rig.config.section import (
     AccelerometerOrder,
     JointAngle,
+    ModelName,
     Offset,
     Section,
     SensorName,
@@ -30,7 +32,8 @@ from rig.config.section import (
 )
 from rig.config.sensor_catalogue import MAGNETOMETERS
 from rig.config.sensor_sections import MagnetometerSection, SensorSection, field_name
-from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG, SPEED_LIMIT_DEG_S
+
+HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
 
 
 class TurnerSection(Section):
@@ -51,8 +54,15 @@ class ArmSection(TurnerSection):
     """The robot arm and what it carries."""
 
     host: str = Field(min_length=1, max_length=253, description="name or address of the arm's controller")
+    model: ModelName = Field(
+        default="ur10e",
+        description="which arm it is: its lengths, limits and room are reckoned with, and its controller must agree; "
+        "`ur10_cb3` is the UR10 of the CB3 series",
+    )
     payload_kg: float = Field(
-        ge=0, le=PAYLOAD_LIMIT_KG, description="mass of all that the flange carries: fixture, board, cable"
+        ge=0,
+        le=PAYLOAD_RANGE_KG,
+        description="mass of all that the flange carries: fixture, board, cable; at most what the model can carry",
     )
     payload_centre_mm: tuple[Offset, Offset, Offset] = Field(
         default=(0.0, 0.0, 0.0), description="centre of mass of all this, x y z in the flange's frame"
@@ -62,19 +72,25 @@ class ArmSection(TurnerSection):
         description="end of a non-magnetic extension on which the sensors are mounted, x y z in the flange's "
         "frame; the plan keeps it, and everything between it and the flange, away from the arm",
     )
-    home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] = Field(
-        default=(0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
+    home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] | None = Field(
+        default=None,
         description="joint angles, base to wrist 3, of the home pose, around which the wrists turn; wrist 2 must be "
         "near ±90°, so that the axes of the three wrists point in three different directions",
+        json_schema_extra={"usual": HOMES},
     )
     transfer_speed_deg_s: float = Field(
-        default=120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the movements between sweeps"
+        default=120.0, ge=0.1, le=SPEED_RANGE_DEG_S, description="speed of the movements between sweeps"
     )
-    state_rate_hz: float = Field(default=125.0, ge=125, le=500, description="how many states the arm sends per second")
+    state_rate_hz: float = Field(
+        default=125.0,
+        ge=125,
+        le=500,
+        description="how many states the arm sends per second; a `ur10_cb3` sends 125 at most",
+    )
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
         description="where the arm's geometry comes from: `controller`, as the factory measured this arm; "
-        "`nominal`, the drawing of every UR10e (the controller must still say that it drives one)",
+        "`nominal`, the drawing of every arm of its model (the controller must still say that it drives one)",
     )
 
     @field_validator("host")

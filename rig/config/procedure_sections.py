@@ -9,8 +9,8 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rig.config.attitude_sets import SETS
 from rig.config.models import ProcedureSection, RigConfig
+from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
-from rig.config.ur10e_limits import ACCELERATION_LIMIT_DEG_S2, SPEED_LIMIT_DEG_S
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
-Speed = Annotated[float, Field(ge=0.5, le=SPEED_LIMIT_DEG_S)]  # slower, and the board cannot keep a sweep's readings
+Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
@@ -69,7 +69,7 @@ class SixSweepsSection(ProcedureSection):
     acceleration_deg_s2: float = Field(
         default=240.0,
         ge=0.1,
-        le=ACCELERATION_LIMIT_DEG_S2,
+        le=ACCELERATION_RANGE_DEG_S2,
         description="acceleration of every motion; the ramps of a sweep are outside the revolution that is averaged",
     )
     rest_s: float = Field(default=3.0, ge=0, le=3600, description="time of standing still after each sweep")
@@ -201,7 +201,7 @@ class AttitudesSection(ProcedureSection):
         default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
     )
     acceleration_deg_s2: float = Field(
-        default=240.0, ge=0.1, le=ACCELERATION_LIMIT_DEG_S2, description="acceleration of every motion"
+        default=240.0, ge=0.1, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
     )
 
     @field_validator("attitudes")

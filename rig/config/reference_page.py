@@ -154,7 +154,7 @@ def _world() -> Iterator[str]:
     yield from (
         "## The simulated laboratory",
         "",
-        "With a `world:` section a simulated UR10e, an emulated board and simulated KVH 1775s answer at `arm.host`,",
+        "With a `world:` section a simulated arm, an emulated board and simulated KVH 1775s answer at `arm.host`,",
         "`board.port` and `sensors.<name>.serial.port`. They answer on this computer only: the host must be a loopback",
         "address (127.x.y.z), and a port must be `socket://host:port`. If another simulated laboratory already has",
         "this address, a command takes a free one and says so; only `rig world` never changes the address.",

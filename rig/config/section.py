@@ -5,14 +5,16 @@ from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from rig.config.ur10e_limits import JOINT_LIMIT_DEG
+from rig.config.ranges import JOINT_RANGE_DEG
 
 Direction = Literal["cw", "ccw"]
+# The arms that can turn the sensors, each a row of `rig/motion/models/`.
+ModelName = Literal["ur3e", "ur5e", "ur7e", "ur10e", "ur12e", "ur16e", "ur20", "ur30", "ur10_cb3"]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 AccelerometerOrder = Literal[0, 1, 2]
-JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
+JointAngle = Annotated[float, Field(ge=-JOINT_RANGE_DEG, le=JOINT_RANGE_DEG)]
 Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.

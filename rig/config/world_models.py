@@ -1,11 +1,11 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from rig.config.section import RATIO, Section, SensorName, Vector3
+from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
@@ -110,11 +110,12 @@ class ResidueSection(Section):
 
 
 class SimulatedArmSection(Section):
-    """The simulated UR10e. Its ripple is locked to the joint angle, so it is zero in the mean over whole turns."""
+    """The simulated arm. Its ripple is locked to the joint angle, so it is zero in the mean over whole turns."""
 
-    model: Literal["ur10e", "ur5e", "ur20", "ur10"] = Field(
-        default="ur10e",
-        description="the arm that its controller reports; arms other than the UR10e are for tests of the refusal",
+    model: ModelName | None = Field(
+        default=None,
+        description="which arm it is; another one than `arm.model` is for tests of the refusal",
+        json_schema_extra={"usual": "as `arm.model`"},
     )
 
     serial_number: str = Field(
@@ -124,11 +125,14 @@ class SimulatedArmSection(Section):
         description="the serial number that the controller reports",
         json_schema_extra={"allowed": "at most 24 digits"},
     )
-    polyscope: str = Field(
-        default="5.14.0.0",
+    polyscope: str | None = Field(
+        default=None,
         pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
         description="version of the controller's software",
-        json_schema_extra={"allowed": "four numbers with dots between them"},
+        json_schema_extra={
+            "allowed": "four numbers with dots between them",
+            "usual": "`5.14.0.0`, of a `ur10_cb3` `3.15.8.0`",
+        },
     )
     dashboard: bool = Field(default=True, description="whether it has a dashboard server; a PolyScope X has none")
     primary: bool = Field(

@@ -16,7 +16,6 @@ from rig.estimation.arrays import Array
 
 ROUNDING = 1e-15
 WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
-UPPER_ARM_BESIDE_M = 0.1762  # shoulder_offset of Universal Robots' ROS description of the UR10e
 WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation errs once and twice a turn
 AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axes
     *(f"twist of wrist_{number}" for number in (1, 2, 3)),
@@ -60,7 +59,7 @@ class DenavitHartenberg:
         return len(self.theta_rad)
 
 
-NOMINAL = DenavitHartenberg(  # the maker's article 45257
+NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), which whatever does not say its arm was recorded with
     theta_rad=(0.0,) * 6,
     a_m=(0.0, -0.6127, -0.57155, 0.0, 0.0, 0.0),
     d_m=(0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655),
@@ -167,25 +166,28 @@ def flange_attitude(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array
 
 
 def distance_to_forearm(
-    q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0), arm: DenavitHartenberg = NOMINAL
+    q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0), arm: DenavitHartenberg = NOMINAL, *, beside_m: float = 0.0
 ) -> Array:
     """(…,) m from a point of the flange's frame, its centre if none is given, to the line from elbow to wrist 1.
 
-    For joint angles `q_rad` (…, 6).
+    For joint angles `q_rad` (…, 6). Or to a line that lies `beside_m` beside that, on the side of wrist 1.
     """
     frames = _frames(q_rad, arm)
     _, elbow, wrist = _bends(frames)
-    return _distance(_on_flange(frames, point_m), elbow, wrist)
+    beside = beside_m * frames[2][..., :3, 2]
+    return _distance(_on_flange(frames, point_m), elbow + beside, wrist + beside)
 
 
-def distance_to_upper_arm(q_rad: ArrayLike, point_m: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
+def distance_to_upper_arm(
+    q_rad: ArrayLike, point_m: ArrayLike, arm: DenavitHartenberg = NOMINAL, *, beside_m: float
+) -> Array:
     """(…,) m from a point of the flange's frame to the middle of the upper arm, shoulder to elbow; as above.
 
-    It lies beside the line that the drawing has for it (`UPPER_ARM_BESIDE_M`), on the side of wrist 1.
+    It lies `beside_m` beside the line that the drawing has for it, on the side of wrist 1.
     """
     frames = _frames(q_rad, arm)
     shoulder, elbow, _ = _bends(frames)
-    beside = UPPER_ARM_BESIDE_M * frames[1][..., :3, 2]
+    beside = beside_m * frames[1][..., :3, 2]
     return _distance(_on_flange(frames, point_m), shoulder + beside, elbow + beside)
 
 

@@ -1,92 +1,125 @@
-"""How near to its own forearm a plan brings what the arm carries. Pure."""
+"""How near to the arm itself a plan brings what it carries. Pure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import radians
 from typing import NamedTuple
 
 import numpy as np
 
-from rig.config.ur10e_limits import JOINT_LIMIT_RAD
 from rig.errors import Problem
 from rig.estimation.arrays import Array
 from rig.motion.carried import Carried
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
-from rig.motion.state import Joints
+from rig.motion.geometry import DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
+from rig.motion.model import TurnerModel
+from rig.motion.state import JointLimits, Joints
 from rig.motion.steps import Dwell, Plan, Rest, travel
 
-# From the flange's centre, and from that of its payload, to the line from elbow to wrist 1: how thick the forearm and
-# how large the payload are is not known, and both need that room.
-FOREARM_CLEARANCE_M = 0.15
-# Sweeps and the ways between them cannot keep that. About the usual home a sweep of wrist 2 takes the flange to 0.133 m
-# and the middle of a fixture to 0.120 m, the link that holds it off the forearm; a way between sweeps, to 0.118 m. The
-# forearm reaches 0.06 to 0.07 m from its line; 0.045 m are left for half a flange or half a fixture.
-SWEEP_CLEARANCE_M = 0.115
+# From the flange's centre, and from that of its payload, to the middle of a link a plan keeps its radius (`Tube`) and a
+# room beyond: how large the payload is is not known. Attitudes keep `dwell_room_m`. Sweeps and the ways between them
+# cannot: about a UR10e's usual home a sweep of wrist 2 takes the flange to 0.133 m and the middle of a fixture to
+# 0.120 m, the link that holds it off the forearm; a way between sweeps, to 0.118 m. They keep `sweep_room_m`: half a
+# flange or half a fixture.
 ALONG_THE_WAY_RAD = radians(2)
 ALONG_THE_EXTENSION_M = 0.05
 OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away"
 OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps beside the forearm"
 NEARER_HOME = "Bring the arm near its home pose from the pendant"
+OTHER_EXTENSION = "Take a shorter extension, or open the elbow in arm.home_deg"
+OTHER_ELBOW = "Bring wrist 2 in arm.home_deg, or in procedure.attitudes, farther from the upper arm: -60 instead of -90"
 
 
 class _Way(NamedTuple):
-    """The poses (N, 6) of a step, how near the forearm they may come, and what to do about it."""
+    """The poses (N, 6) of a step, the room they leave beyond the forearm, and what to do about it."""
 
     name: str
     q_rad: Array
-    least_m: float
+    room_m: float
     remedy: str
 
 
-def clearance_problems(plan: Plan, carried: Carried, arm: DenavitHartenberg = NOMINAL) -> list[Problem]:
-    """Dwells and motions that bring the flange, its payload's centre or its extension too near the forearm.
+def clearance_problems(
+    plan: Plan, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+) -> list[Problem]:
+    """Dwells and motions that bring the flange, its payload's centre or its extension too near forearm or upper arm.
 
-    An extension keeps clear of the upper arm as well. By lengths of `arm`. What begins or ends at an attitude keeps
-    `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`. The way from where the arm stands is judged where the plan
-    begins there.
+    By lengths of `arm`, or else the model's drawing. What begins or ends at an attitude leaves `dwell_room_m` beside
+    the forearm, all else `sweep_room_m`. The way from where the arm stands is judged where the plan begins there.
     """
-    extension = _along(carried)
-    near = [
-        Problem(
-            "forearm_too_near",
-            f"{way.name} brings the {what} within {distance_m:.3f} m of the forearm's line, "
-            f"{way.least_m:g} m is the least",
-            way.remedy,
-        )
-        for way in _ways(plan)
-        for what, distance_m in [_nearest(way.q_rad, carried, arm)]
-        if distance_m < way.least_m
-    ]
-    return near + [
-        Problem(
-            "upper_arm_too_near",
-            f"{way.name} brings the extension within {distance_m:.3f} m of the middle of the upper arm, "
-            f"{SWEEP_CLEARANCE_M:g} m is the least",
-            "Take a shorter extension, or open the elbow in arm.home_deg",
-        )
-        for way in (_ways(plan) if extension else ())
-        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p, arm).min()) for p in extension)]
-        if distance_m < SWEEP_CLEARANCE_M
-    ]
+    problems = []
+    for way in _ways(plan, model):
+        what, distance_m = _nearest_to_forearm(way.q_rad, carried, model, arm)
+        if distance_m < (least_m := _least_m(model.forearm.radius_m, way.room_m)):
+            problems.append(
+                Problem(
+                    "forearm_too_near",
+                    f"{way.name} brings the {what} within {distance_m:.3f} m of the forearm's "
+                    f"{'middle' if model.forearm.beside_m else 'line'}, {least_m:g} m is the least",
+                    way.remedy,
+                )
+            )
+    for way in _ways(plan, model):
+        what, distance_m = _nearest_to_upper_arm(way.q_rad, carried, model, arm)
+        if distance_m < (least_m := _least_m(model.upper_arm.radius_m, model.sweep_room_m)):
+            problems.append(
+                Problem(
+                    "upper_arm_too_near",
+                    f"{way.name} brings the {what} within {distance_m:.3f} m of the middle of the upper arm, "
+                    f"{least_m:g} m is the least",
+                    OTHER_EXTENSION if what == "extension" else OTHER_ELBOW,
+                )
+            )
+    return problems
 
 
-def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: Carried) -> bool:
-    """Whether a straight way in joint space is clear enough of the forearm for sweeps and what lies between them.
+def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: Carried, model: TurnerModel) -> bool:
+    """Whether a straight way in joint space is clear enough of the arm for sweeps and what lies between them.
 
-    By the nominal arm, of which plans are made before an arm is there.
+    By the model's drawing, of which plans are made before an arm is there.
     Nothing is said against one beyond the joints' limits, which is refused as that.
     """
-    if not _within_limits(start_q_rad, target_q_rad):
+    if not _within(model.limits, start_q_rad, target_q_rad):
         return True
-    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), carried, NOMINAL)
-    return distance_m >= SWEEP_CLEARANCE_M
+    q_rad = _between(start_q_rad, target_q_rad)
+    return _nearest_to_forearm(q_rad, carried, model)[1] >= _least_m(
+        model.forearm.radius_m, model.sweep_room_m
+    ) and _nearest_to_upper_arm(q_rad, carried, model)[1] >= _least_m(model.upper_arm.radius_m, model.sweep_room_m)
 
 
-def _nearest(q_rad: Array, carried: Carried, arm: DenavitHartenberg) -> tuple[str, float]:
+def _least_m(radius_m: float, room_m: float) -> float:
+    """How near to the middle of a link something may come."""
+    return round(radius_m + room_m, 6)
+
+
+def _nearest_to_forearm(
+    q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+) -> tuple[str, float]:
     """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
-    points = [("flange", np.zeros(3)), ("payload", np.array(carried.centre_m))]
-    points += [("extension", point) for point in _along(carried)]
-    distances = [(what, float(distance_to_forearm(q_rad, point, arm).min())) for what, point in points]
-    return min(distances, key=lambda each: each[1])
+    beside_m, lengths = model.forearm.beside_m, arm or model.drawing
+    return _least(
+        (what, distance_to_forearm(q_rad, point, lengths, beside_m=beside_m)) for what, point in _points(carried)
+    )
+
+
+def _nearest_to_upper_arm(
+    q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
+) -> tuple[str, float]:
+    """What comes nearest to the upper arm, as above."""
+    beside_m, lengths = model.upper_arm.beside_m, arm or model.drawing
+    return _least(
+        (what, distance_to_upper_arm(q_rad, point, lengths, beside_m=beside_m)) for what, point in _points(carried)
+    )
+
+
+def _least(distances: Iterable[tuple[str, Array]]) -> tuple[str, float]:
+    return min(((what, float(distance_m.min())) for what, distance_m in distances), key=lambda each: each[1])
+
+
+def _points(carried: Carried) -> Iterator[tuple[str, Array]]:
+    """What the flange carries, point by point in its frame, m."""
+    yield "flange", np.zeros(3)
+    yield "payload", np.array(carried.centre_m)
+    for point in _along(carried):
+        yield "extension", point
 
 
 def _along(carried: Carried) -> list[Array]:
@@ -96,9 +129,11 @@ def _along(carried: Carried) -> list[Array]:
     return [end * part / count for part in range(1, count + 1)] if end.any() else []
 
 
-def _within_limits(*poses: Joints) -> bool:
-    """False as well where an angle is no number."""
-    return bool(np.abs(poses).max() <= JOINT_LIMIT_RAD)
+def _within(limits: JointLimits, *poses: Joints) -> bool:
+    """False as well where an angle is no number, or no finite one."""
+    angles = np.array(poses)
+    inside = np.isfinite(angles) & (angles >= limits.least_rad) & (angles <= limits.greatest_rad)
+    return bool(inside.all())
 
 
 def _between(start_q_rad: Joints, target_q_rad: Joints) -> Array:
@@ -109,16 +144,16 @@ def _between(start_q_rad: Joints, target_q_rad: Joints) -> Array:
     return poses
 
 
-def _ways(plan: Plan) -> Iterator[_Way]:
+def _ways(plan: Plan, model: TurnerModel) -> Iterator[_Way]:
     """The way of each dwell and each motion; what is no way, or beyond the joints' limits, has a problem of its own."""
     for before, step, after in zip((None, *plan.steps), plan.steps, (*plan.steps[1:], None), strict=False):
         if isinstance(step, Dwell):
-            yield _Way(step.name, np.array([step.q_rad]), FOREARM_CLEARANCE_M, OTHER_ATTITUDES)
-        elif not isinstance(step, Rest) and _within_limits(step.start_q_rad, step.target_q_rad):
+            yield _Way(step.name, np.array([step.q_rad]), model.dwell_room_m, OTHER_ATTITUDES)
+        elif not isinstance(step, Rest) and _within(model.limits, step.start_q_rad, step.target_q_rad):
             q_rad = _between(step.start_q_rad, step.target_q_rad)
             if isinstance(before, Dwell) or isinstance(after, Dwell):
-                yield _Way(step.name, q_rad, FOREARM_CLEARANCE_M, OTHER_ATTITUDES)
+                yield _Way(step.name, q_rad, model.dwell_room_m, OTHER_ATTITUDES)
             elif before is None and step.target_q_rad == plan.home_q_rad:
-                yield _Way(step.name, q_rad, SWEEP_CLEARANCE_M, NEARER_HOME)
+                yield _Way(step.name, q_rad, model.sweep_room_m, NEARER_HOME)
             else:
-                yield _Way(step.name, q_rad, SWEEP_CLEARANCE_M, OTHER_HOME)
+                yield _Way(step.name, q_rad, model.sweep_room_m, OTHER_HOME)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from rig.config.ur10e_limits import ACCELERATION_LIMIT_RAD_S2, JOINT_LIMIT_RAD, SPEED_LIMIT_RAD_S
 from rig.errors import Problem
 from rig.estimation.arrays import Array
 from rig.motion.state import JOINT_NAMES, JointLimits, Joints
@@ -15,29 +14,30 @@ WIDER = ", or widen that limit in the arm's safety settings"
 ROUNDING = 1e-6  # of a limit
 
 
-def motion_problems(motion: Motion, told: JointLimits | None) -> list[Problem]:
-    """What takes a joint too far or too fast, by the data sheet or by what the controller told: the narrower counts."""
+def motion_problems(motion: Motion, ours: JointLimits, told: JointLimits | None) -> list[Problem]:
+    """What takes a joint too far or too fast, by the model's limits or by those its controller told: the narrower."""
     return [
-        *_position_problems(motion, told),
-        *_speed_problems(motion, None if told is None else told.speed_rad_s),
-        *_acceleration_problems(motion, None if told is None else told.acceleration_rad_s2),
+        *_position_problems(motion, ours, told),
+        *_speed_problems(motion, ours.speed_rad_s, None if told is None else told.speed_rad_s),
+        *_acceleration_problems(motion, ours.acceleration_rad_s2, None if told is None else told.acceleration_rad_s2),
     ]
 
 
-def _position_problems(motion: Motion, told: JointLimits | None) -> list[Problem]:
+def _position_problems(motion: Motion, ours: JointLimits, told: JointLimits | None) -> list[Problem]:
     problems = []
     for joint, name in enumerate(JOINT_NAMES):
-        least, _ = _narrower(JOINT_LIMIT_RAD, None if told is None else -told.least_rad[joint])
-        greatest, _ = _narrower(JOINT_LIMIT_RAD, None if told is None else told.greatest_rad[joint])
+        most = ours.greatest_rad[joint]
+        least, _ = _narrower(-ours.least_rad[joint], None if told is None else -told.least_rad[joint])
+        greatest, _ = _narrower(most, None if told is None else told.greatest_rad[joint])
         low, high = sorted((motion.start_q_rad[joint], motion.target_q_rad[joint]))
         if low < -least or high > greatest:
-            narrow = min(least, greatest) < JOINT_LIMIT_RAD
+            narrow = min(least, greatest) < most
             beyond = f"{math.degrees(-least):.1f}° to {math.degrees(greatest):.1f}°, the controller's limits"
             problems.append(
                 Problem(
                     "joint_limit",
                     f"{motion.name} takes {name} from {math.degrees(low):.1f}° to {math.degrees(high):.1f}°, beyond "
-                    f"{beyond if narrow else '±360°'}",
+                    f"{beyond if narrow else f'±{math.degrees(most):g}°'}",
                     "Raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0"
                     f"{WIDER if narrow else ''}",
                 )
@@ -45,10 +45,10 @@ def _position_problems(motion: Motion, told: JointLimits | None) -> list[Problem
     return problems
 
 
-def _speed_problems(motion: Motion, told_rad_s: Joints | None) -> list[Problem]:
+def _speed_problems(motion: Motion, ours_rad_s: Joints, told_rad_s: Joints | None) -> list[Problem]:
     problems = []
     for joint, speed in enumerate(motion.speed_rad_s * _shares(motion)):
-        limit, whose = _narrower(SPEED_LIMIT_RAD_S[joint], None if told_rad_s is None else told_rad_s[joint])
+        limit, whose = _narrower(ours_rad_s[joint], None if told_rad_s is None else told_rad_s[joint])
         if speed > limit:
             problems.append(
                 Problem(
@@ -61,10 +61,10 @@ def _speed_problems(motion: Motion, told_rad_s: Joints | None) -> list[Problem]:
     return problems
 
 
-def _acceleration_problems(motion: Motion, told_rad_s2: Joints | None) -> list[Problem]:
+def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, told_rad_s2: Joints | None) -> list[Problem]:
     problems = []
     for joint, acceleration in enumerate(motion.acceleration_rad_s2 * _shares(motion)):
-        limit, whose = _narrower(ACCELERATION_LIMIT_RAD_S2, None if told_rad_s2 is None else told_rad_s2[joint])
+        limit, whose = _narrower(ours_rad_s2[joint], None if told_rad_s2 is None else told_rad_s2[joint])
         if acceleration > limit:
             problems.append(
                 Problem(
@@ -85,7 +85,7 @@ def _shares(motion: Motion) -> Array:
 
 
 def _narrower(ours: float, told: float | None) -> tuple[float, str]:
-    """The narrower of the arm's limit by its data sheet and the one its controller tells, and whose that is.
+    """The narrower of the arm's own limit and the one its controller tells, and whose that is.
 
     The same number rounded differently is the same.
     """

@@ -2,12 +2,12 @@
 
 import math
 
-from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG
 from rig.errors import Problem
 from rig.motion.carried import Carried
-from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.keep_out import clearance_problems
 from rig.motion.limits import motion_problems
+from rig.motion.model import TurnerModel
 from rig.motion.state import JointLimits, Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
 
@@ -15,23 +15,26 @@ from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
 def plan_problems(
     plan: Plan,
     carried: Carried,
+    model: TurnerModel,
     *,
-    arm: DenavitHartenberg = NOMINAL,
+    arm: DenavitHartenberg | None = None,
     told: JointLimits | None = None,
 ) -> list[Problem]:
     """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
 
-    And what brings the flange or what it carries too near the arm. `told` are the controller's own limits, which count
-    where they are narrower; the lengths are those of `arm`.
+    And what brings the flange or what it carries too near the arm. All as the `model` can do it. `told` are the
+    controller's own limits, which count where they are narrower; the lengths are those of `arm`, or else the drawing's.
     """
     problems = step_problems(plan)
-    problems += [problem for motion in plan.motions if _travels(motion) for problem in motion_problems(motion, told)]
-    problems += clearance_problems(plan, carried, arm)
-    if not 0 <= carried.payload_kg <= PAYLOAD_LIMIT_KG:
+    travels = [motion for motion in plan.motions if _travels(motion)]
+    problems += [problem for motion in travels for problem in motion_problems(motion, model.limits, told)]
+    problems += clearance_problems(plan, carried, model, arm)
+    if not 0 <= carried.payload_kg <= model.payload_kg:
         problems.append(
             Problem(
                 "payload_too_heavy",
-                f"the payload of {carried.payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
+                f"the payload of {carried.payload_kg:g} kg is outside 0 to {model.payload_kg:g} kg, which a "
+                f"{model.name} carries",
                 "Weigh the fixture and correct arm.payload_kg",
             )
         )

@@ -9,7 +9,7 @@ from rig.data.events import BoardObserved
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
@@ -24,7 +24,7 @@ def revolution_on_the_board(
     *,
     first: int,
     settings: ObservationThresholds,
-    kinematics: DenavitHartenberg = NOMINAL,
+    kinematics: DenavitHartenberg,
 ) -> tuple[int, int, float]:
     """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
 

@@ -7,8 +7,8 @@ from typing import Any
 @dataclass(frozen=True, slots=True)
 class About:
     """What is known before anything has happened: the run's folder, whether it is replayed, whether the page may answer
-    the operator's questions, each sensor's part and serial number; of a recorded run what it says of its `arm`; the
-    command that stores a calibration of it on the board (`storing`), where there is a board that keeps it.
+    the operator's questions, each sensor's part and serial number; of the `arm` how it is built, of a recorded one its
+    names as well; the command that stores a calibration of it on the board (`storing`), where a board keeps it.
     """
 
     folder: str

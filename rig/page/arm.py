@@ -4,25 +4,31 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import JOINT_NAMES, ArmState, Report, RobotMode, RuntimeState, SafetyMode, State
 from rig.page.history import rounded
 
 
-def geometry(arm: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> dict[str, Any]:
+def built(chain: DenavitHartenberg) -> dict[str, Any]:
+    """How a turner is built, and how long its links are together, m, from joint to joint across the axes."""
+    return {"geometry": asdict(chain), "long_m": sum(map(abs, chain.a_m))}
+
+
+def geometry(chain: DenavitHartenberg, joints: Sequence[str] = JOINT_NAMES) -> dict[str, Any]:
     """A turner of which nothing is known but how it is built."""
-    return {"geometry": asdict(arm), "joints": list(joints), "q_rad": None, "missed": 0}
+    return {**built(chain), "joints": list(joints), "q_rad": None, "missed": 0}
 
 
 def connected(report: Report) -> dict[str, Any]:
-    """A turner that has answered."""
+    """A turner that has answered; how it is built where it says so."""
     known = {
         "model": report.model,
         "serial_number": report.serial_number,
         "host": report.host,
         "polyscope": report.software,
     }
-    return {**geometry(report.kinematics or NOMINAL, report.joints), **known, **stance(report.state)}
+    told = {} if report.kinematics is None else built(report.kinematics)
+    return {**told, "joints": list(report.joints), **known, **stance(report.state), "missed": 0}
 
 
 def stance(state: State) -> dict[str, Any]:

@@ -15,10 +15,11 @@ from rig.errors import Refused
 from rig.motion.carried import carried_by
 from rig.motion.geometry import flange_axes
 from rig.motion.keep_out import keeps_clear
+from rig.motion.model import home_of, model_of
 from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import Plan, Rest, Step, Sweep, trapezoid_duration
 from rig.plans.drift import drift_effect
-from rig.plans.ways import approach, in_radians, transfer
+from rig.plans.ways import approach, transfer
 
 # The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
 AXES_SPAN = 0.5
@@ -63,7 +64,7 @@ def plan_six_observation(
     Limits are not judged here: see `rig.motion.preflight`.
     Raises Refused `axes_do_not_span`.
     """
-    home = in_radians(arm.home_deg)
+    home = home_of(arm)
     _check_span(home)
     start = home if start_q_rad is None else start_q_rad
     sweeps = [sweep for sweep in _ordered_sweeps(arm, procedure) if sweep.index not in done]
@@ -84,7 +85,7 @@ def _check_span(home: Joints) -> None:
 @lru_cache(maxsize=16)
 def _ordered_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
     """All sweeps in the order the file names, or else the best one: the ways first, then the order of the wrists."""
-    home = in_radians(arm.home_deg)
+    home = home_of(arm)
 
     def harm(order: Order) -> float:
         trial = procedure.model_copy(update={"repeats": min(procedure.repeats, 2)})  # more of them repeat these
@@ -182,9 +183,9 @@ def _connected(
     """
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     yield from approach(start, home, speed, acceleration)
-    here, carried = home, carried_by(arm)
+    here, carried, model = home, carried_by(arm), model_of(arm)
     for sweep in sweeps:
-        if not _clear(here, sweep.start_q_rad, carried):
+        if not _clear(here, sweep.start_q_rad, carried, model):
             yield from transfer("transfer home", here, home, speed, acceleration)
             here = home
         yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)

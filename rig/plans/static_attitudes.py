@@ -8,6 +8,7 @@ import numpy as np
 
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import AttitudesSection
+from rig.motion.model import home_of
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, trapezoid_duration
 from rig.plans.shortest_way import shortest_way
@@ -27,7 +28,7 @@ def plan_static_attitudes(
     Limits and clearances are not judged here: see `rig.motion.preflight`; nor what the attitudes tell: see
     `rig.analysis.attitude_account`.
     """
-    home = in_radians(arm.home_deg)
+    home = home_of(arm)
     start = home if start_q_rad is None else start_q_rad
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     steps = (*approach(start, home, speed, acceleration), *dwells(arm, procedure, done))
@@ -39,7 +40,7 @@ def dwells(arm: ArmSection, procedure: AttitudesSection, done: Collection[int] =
 
     With field tests at home before them and after.
     """
-    home = in_radians(arm.home_deg)
+    home = home_of(arm)
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     attitudes = enumerate(_order(arm, procedure) * procedure.repeats, first)
     left = [Dwell(index, q, procedure.dwell_s, procedure.settle_s) for index, q in attitudes if index not in done]
@@ -58,7 +59,7 @@ def dwells(arm: ArmSection, procedure: AttitudesSection, done: Collection[int] =
 @lru_cache(maxsize=16)
 def _order(arm: ArmSection, procedure: AttitudesSection) -> tuple[Joints, ...]:
     """The attitudes' joint angles, in the order of the shortest way from home through all of them and back."""
-    home = in_radians(arm.home_deg)
+    home = home_of(arm)
     attitudes = [(*home[:3], *in_radians(wrists)) for wrists in procedure.attitudes]
     places = np.array([home, *attitudes])
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)

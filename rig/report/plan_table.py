@@ -25,8 +25,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked."""
+    """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked.
 
+    `model` is what the turner is called that it is for; None where its section does not say.
+    """
+
+    model: str | None
     plan: Plan
     config: RigConfig
     repeated: bool
@@ -72,6 +76,7 @@ def plan_document(planned: Planned) -> dict[str, Any]:
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
     document: dict[str, Any] = {
         "schema": "rig.plan/1",
+        "model": planned.model,
         "duration_s": plan.duration_s,
         "repeated": planned.repeated,
         "doubts": doubts(plan),
@@ -99,7 +104,11 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
 def _print_steps(planned: Planned, console: Console) -> None:
     """Every step, how long it all takes, and what is doubtful about it."""
     plan = planned.plan
-    table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
+    table = Table(
+        title=f"plan{'' if planned.model is None else f' for a {planned.model}'}, from the home pose",
+        title_justify="left",
+        box=SIMPLE,
+    )
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
         table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
     at_s = 0.0

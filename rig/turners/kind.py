@@ -46,6 +46,7 @@ class TurnerKind(Generic[SectionT, ReportT]):
     - `stance`: how it stands, in a line of text.
     - `problems`: all that is known to speak against driving the last of the plans, before anything moves: of the plans
       by themselves where there is no report. Pure.
+    - `meant`: which one the configuration means: as it is on the drawing, before anything has answered.
     - `made`: what a recording says of the one that was found. Raises `Refused` where it is not the one that was meant.
     - `carried`: what it is to be told of its load.
     - `fields`: what its states tell beyond times and joints, in the order of their `to_record`.
@@ -57,6 +58,7 @@ class TurnerKind(Generic[SectionT, ReportT]):
     look: Callable[[SectionT], ReportT]
     stance: Callable[[ReportT], str]
     problems: Callable[[Sequence[Plan], SectionT, ReportT | None], list[Problem]]
+    meant: Callable[[SectionT], Made]
     made: Callable[[SectionT, ReportT], Made]
     carried: Callable[[SectionT], Carried]
     words: Words

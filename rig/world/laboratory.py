@@ -38,10 +38,10 @@ class Laboratory:
         self._config, self._world = config, world
         arm = world.arm
         random = Random(world.seed)
-        model = simulated_model(arm)
+        model = simulated_model(arm, config.arm.model)
         ripples = [ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
         motion = Motion(
-            [radians(angle) for angle in config.arm.home_deg],
+            [radians(angle) for angle in config.arm.home_deg or model.home_deg],
             ripples,
             arm.encoder_step_rad,
             memory_s=1e-3 * max(max(each.delay_ms, each.accelerometer.delay_ms) for each in world.sensors.values()),
@@ -51,11 +51,10 @@ class Laboratory:
             vibration=_seen_vibration(arm, world.seed),
             speed_limit_rad_s=model.speed_rad_s,
         )
-        self.arm = TrueArm(arm, site_of(world.site), motion, random)
+        self.arm = TrueArm(arm, site_of(world.site), motion, random, model.drawing)
         about_x, about_y, about_z = arm.tcp_rotation_deg
-        major, minor, bugfix, build = (int(part) for part in arm.polyscope.split("."))
         self.robot = Robot(
-            Identity(arm.serial_number, (major, minor, bugfix, build)),
+            Identity(arm.serial_number, model.polyscope),
             motion,
             arm.remote_control,
             arm.speed_slider,

@@ -88,7 +88,7 @@ def test_errors_name_the_file_and_the_line_they_came_from(folder: Path) -> None:
     written(folder, text, "broken.yaml")
     path = written(folder, "base: broken.yaml\nboard:\n  baud: 9600\nlimits: {condition: -1}\n")
     found = problems_of(path)
-    assert found[0] == "arm.payload_kg (broken.yaml, line 4): 99: input should be less than or equal to 12.5"
+    assert found[0] == "arm.payload_kg (broken.yaml, line 4): 99: input should be less than or equal to 30"
     assert found[1].startswith("board.baud (line 3): 9600 is not allowed, did you mean 921600?")
     assert found[2] == "limits.condition (line 4): -1: input should be greater than 0"
     assert found[3].startswith("procedure.rest (broken.yaml, line 25): unknown key, did you mean rest_s?")

@@ -1,12 +1,11 @@
 """Configuration files: what is accepted, and how everything wrong is said at once."""
 
-import math
 from pathlib import Path
 
 import pytest
 import yaml
 
-from rig.config import ur10e_limits
+from rig.config import ranges
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.procedure_sections import SixObservationSection
 from rig.config.sensor_sections import SensorSection
@@ -42,7 +41,7 @@ def test_hardware_differs_from_the_demonstration_in_two_lines_and_the_world() ->
 
 def test_all_errors_are_reported_at_once_with_path_line_and_remedy() -> None:
     text = """\
-arm: {host: 127.0.0.2, payload_kg: 20}
+arm: {host: 127.0.0.2, payload_kg: 40}
 board:
   port: socket://127.0.0.2:7321
   baud: 9600
@@ -54,7 +53,7 @@ wrold: {}
 """
     found = problems_of(text)
     expected = [
-        "arm.payload_kg (line 1): 20: input should be less than or equal to 12.5",
+        "arm.payload_kg (line 1): 40: input should be less than or equal to 30",
         "board.baud (line 4): 9600 is not allowed, did you mean 921600?; allowed: 115200, 230400, 460800, 921600",
         "sensors.gyro.rate_hz (line 6): 200: not available; the nearest is 238; allowed: 14.9, 59.5,",
         "sensors.gyro.rnge_deg_s (line 6): unknown key, did you mean range_deg_s?",
@@ -242,7 +241,7 @@ def test_values_that_cannot_calibrate_are_refused_before_anything_moves(override
 
 
 def test_what_is_wrong_with_the_world_is_told_with_the_rest() -> None:
-    found = problems_of(demo_text(), "arm.payload_kg=20", "world.sensors.gyro.scale=3", "world.seeed=1")
+    found = problems_of(demo_text(), "arm.payload_kg=31", "world.sensors.gyro.scale=3", "world.seeed=1")
     assert [problem.split(":")[0].split(" ")[0] for problem in found] == [
         "arm.payload_kg",
         "world.sensors.gyro.scale",
@@ -253,13 +252,13 @@ def test_what_is_wrong_with_the_world_is_told_with_the_rest() -> None:
 @pytest.mark.parametrize(
     ("key", "limit"),
     [
-        ("arm.payload_kg", ur10e_limits.PAYLOAD_LIMIT_KG),
-        ("procedure.acceleration_deg_s2", math.degrees(ur10e_limits.ACCELERATION_LIMIT_RAD_S2)),
-        ("arm.transfer_speed_deg_s", ur10e_limits.SPEED_LIMIT_DEG_S),
-        ("arm.home_deg", math.degrees(ur10e_limits.JOINT_LIMIT_RAD)),
+        ("arm.payload_kg", ranges.PAYLOAD_RANGE_KG),
+        ("procedure.acceleration_deg_s2", ranges.ACCELERATION_RANGE_DEG_S2),
+        ("arm.transfer_speed_deg_s", ranges.SPEED_RANGE_DEG_S),
+        ("arm.home_deg", ranges.JOINT_RANGE_DEG),
     ],
 )
-def test_the_arm_s_limits_are_those_of_one_table(key: str, limit: float) -> None:
+def test_values_of_an_arm_range_as_far_as_any_arms(key: str, limit: float) -> None:
     def value(number: float) -> str:
         return f"{key}=[{number}, 0, 0, 0, -90, 0]" if key == "arm.home_deg" else f"{key}={number}"
 

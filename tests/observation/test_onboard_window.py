@@ -17,13 +17,20 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     sweeps = list(swept(run))
     start_s, end_s = sweeps[sweep].window.start_s, sweeps[sweep].window.end_s
     since_s = sweeps[sweep - 2].window.start_s if sweep >= 2 else 0.0
+    assert run.turner is not None
     samples, arm = run.samples["gyro"], run.states
     at_s = samples["board_time_us"] * 1e-6 * (1 + setup.drift) + setup.boot_s
     held = (at_s > since_s) & (at_s < end_s + 0.05)
     arm = arm[(arm["time_s"] > since_s) & (arm["time_s"] < end_s + 0.05)]
     first = int(np.searchsorted(arm["time_s"], start_s))
     start_us, end_us, speed_rad_s = revolution_on_the_board(
-        samples[held], run.sensors["gyro"], arm, sweeps[sweep].sweep, first=first, settings=run.settings.observation
+        samples[held],
+        run.sensors["gyro"],
+        arm,
+        sweeps[sweep].sweep,
+        first=first,
+        settings=run.settings.observation,
+        kinematics=run.turner.geometry,
     )
     middle_s = (start_us + end_us) / 2e6 * (1 + setup.drift) + setup.boot_s
     return middle_s - (start_s + end_s) / 2, float(np.degrees(speed_rad_s))

@@ -10,13 +10,14 @@ from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Refused
 from rig.motion.carried import Carried
 from rig.motion.geometry import flange_axes, flange_pose, flange_rate
-from rig.motion.preflight import plan_problems
+from rig.motion.model import home_of
 from rig.motion.steps import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.drift import drift_effect
 from rig.plans.six_sweeps import plan_six_observation
+from support.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
-HOME = tuple(math.radians(angle) for angle in ARM.home_deg)
+HOME = home_of(ARM)
 
 
 def plan(**settings: object) -> Plan:

@@ -14,7 +14,7 @@ from rig.config.procedure_sections import ImuSection, StaticAttitudesSection
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.motion.carried import Carried
-from rig.motion.preflight import plan_problems
+from rig.motion.model import home_of
 from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
 from rig.plans.imu import plan_imu
 from rig.plans.phase import first_phase
@@ -22,9 +22,10 @@ from rig.plans.registry import installed
 from rig.plans.shortest_way import shortest_way
 from rig.plans.static_attitudes import plan_static_attitudes
 from support.paths import CONFIGS
+from support.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
-HOME = tuple(math.radians(angle) for angle in ARM.home_deg)
+HOME = home_of(ARM)
 
 
 def plan(**settings: object) -> Plan:

@@ -7,6 +7,7 @@ sensors are off by lies within it and within the data sheets of rig/config/senso
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import permutations, product
 from pathlib import Path
 from types import MappingProxyType
@@ -95,10 +96,24 @@ def kvh(seed: int) -> dict[str, Any]:
     return changed
 
 
+def on_another_arm(model: str, seed: int) -> dict[str, Any]:
+    """As `quiet`, on another arm."""
+    document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
+    return document
+
+
+OTHER_ARMS = ("ur3e", "ur5e", "ur20", "ur10_cb3")
 FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
-    {"quiet": quiet, "noisy": noisy, "pair": pair, "imu": imu, "kvh": kvh}
+    {
+        "quiet": quiet,
+        "noisy": noisy,
+        "pair": pair,
+        "imu": imu,
+        "kvh": kvh,
+        **{model: partial(on_another_arm, model) for model in OTHER_ARMS},
+    }
 )
-WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10})
+WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys(OTHER_ARMS, 6)})
 
 
 def _document(name: str) -> dict[str, Any]:

@@ -162,6 +162,7 @@ KIND = TurnerKind(
     look=look,
     stance=lambda report: f"table at {report.state.q_rad[0]:.2f} rad",
     problems=problems,
+    meant=lambda section: Made("Toys", None, GEOMETRY),
     made=lambda section, report: Made("Toys", report.model, GEOMETRY),
     carried=lambda section: Carried(0.0),
     words=Words(

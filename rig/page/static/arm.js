@@ -3,7 +3,8 @@
 import { colours, fresh, FONT } from "./drawing.js";
 
 const AZIMUTH = 0.75, ELEVATION = 0.33; // radians, of whoever looks
-const THICK_M = [0.19, 0.17, 0.15, 0.12, 0.115, 0.1]; // of each joint's housing, where there are six
+const THICK_M = [0.19, 0.17, 0.15, 0.12, 0.115, 0.1]; // of each joint's housing, of an arm of six that is this long:
+const LONG_M = 1.18425; // the links of a UR10e
 const USUAL_THICK_M = 0.12;
 const TURNING = 0.02; // rad/s
 
@@ -12,7 +13,8 @@ export function drawArm(canvas, arm) {
   const { pen, width, height } = fresh(canvas);
   const paint = colours();
   const frames = framesOf(arm.geometry, arm.q_rad ?? arm.geometry.theta_rad.map(() => 0));
-  const size = Math.min(width / 2.2, height / 1.6); // pixels a metre
+  const grown = (arm.long_m || LONG_M) / LONG_M;
+  const size = Math.min(width / 2.2, height / 1.6) / grown; // pixels a metre
   const see = ([x, y, z]) => {
     const along = x * Math.cos(AZIMUTH) + y * Math.sin(AZIMUTH);
     const deep = -x * Math.sin(AZIMUTH) + y * Math.cos(AZIMUTH);

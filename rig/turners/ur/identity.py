@@ -1,22 +1,26 @@
-"""Which arm answers, and whether it is the one that the rig knows how to move: a UR10e. Pure.
+"""Which arm answers, and whether it is the one that the configuration names. Pure.
 
 Everything depends on it: how near a wrist comes to the forearm, how fast a joint may turn, what it carries. Controllers
 tell the type by a number of the maker's (his client library, `RobotType`), which later models share with earlier ones
-that are made alike; so the lengths decide, and the series, by the version of the software.
+that are made alike; so the lengths decide as well, and the series, by the version of the software.
 """
+
+from collections.abc import Mapping
+from typing import get_args
 
 import numpy as np
 
 from rig.config.models import ArmSection
+from rig.config.section import ModelName
 from rig.errors import Problem
-from rig.motion.geometry import LENGTHS, NOMINAL, DenavitHartenberg, lengths_m
+from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
+from rig.motion.model import TurnerModel, model_of, turner_model
 from rig.motion.state import ArmReport
 
 E_SERIES, POLYSCOPE_X = 5, 10  # the first major versions of their software; the CB3 series has 3
-UR10 = 2
 E_SERIES_MODELS = {
-    1: "UR5e or UR7e",
-    UR10: "UR10e or UR12e",  # made alike, for the same payload
+    1: "UR5e or UR7e",  # made alike, for other payloads
+    2: "UR10e or UR12e",  # made alike, for the same payload
     3: "UR3e",
     4: "UR16e",
     5: "UR18",
@@ -25,12 +29,9 @@ E_SERIES_MODELS = {
     8: "UR30",
     9: "UR15",
 }
-CB3_MODELS = {1: "UR5", UR10: "UR10", 3: "UR3"}
-DASHBOARD_NAMES = ("UR10", "UR10E", "UR12E")
+CB3_MODELS = {1: "UR5", 2: "UR10", 3: "UR3"}
 LENGTH_TOLERANCE_M = 0.01  # what factories find differs from the drawing by a few millimetres
-OTHER_ARM = (
-    "Correct arm.host, or mount the sensors on a UR10e or UR12e: no other arm's clearances and limits are known here"
-)
+OTHER_ARM = "Correct arm.host, or name the arm that is there in arm.model"
 
 
 def version_text(version: tuple[int, ...]) -> str:
@@ -43,15 +44,15 @@ def model_found(report: ArmReport) -> str | None:
 
     By its geometry or its dashboard where it does not tell the type.
     """
-    models = E_SERIES_MODELS if report.version[0] >= E_SERIES else CB3_MODELS
-    if report.setup is not None:
-        return models.get(report.setup.robot_type, f"arm of type {report.setup.robot_type}")
-    made_so = report.kinematics is not None and _other_length(report.kinematics) is None
-    return models[UR10] if made_so or _called_ur10(report) else None
+    models, robot_type = _models(report), _type_told(report)
+    return None if robot_type is None else models.get(robot_type, f"arm of type {robot_type}")
 
 
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """A controller of another series than the e-Series, which is stopped and asked in other ways."""
+    """A controller of another series than the e-Series, which is stopped and asked in other ways.
+
+    One of the CB3 series is none where the configuration names an arm of it.
+    """
     if version[0] >= POLYSCOPE_X:
         return Problem(
             "polyscope_x",
@@ -63,20 +64,24 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
         return Problem(
             "cb3_not_supported",
             f"the controller at {host} is one of the CB3 series (software {version_text(version)})",
-            "Use an e-Series arm with PolyScope 5, or turn the sensors by other means: docs/how-to/other-hardware.md",
+            "Set arm.model: ur10_cb3 if it drives a UR10 and has software 3.15, or use an arm with PolyScope 5",
         )
     return None
 
 
 def identity_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """Whether the arm that answers is the one that was meant, by series, type and lengths: one problem, or none."""
+    model, robot_type = model_of(arm), _type_told(report)
     if series := series_problem(report.host, report.version):
-        return [series]
+        if not (model.series == "CB3" and series.name == "cb3_not_supported"):
+            return [series]
+    elif model.series == "CB3":
+        return [_other(arm, report, f"by its software, {version_text(report.version)}")]
     setup, kinematics = report.setup, report.kinematics
     told = [] if setup is None else [setup.drawing]
     if kinematics is not None and (setup is None or arm.kinematics == "controller"):
         told.append(kinematics)
-    if not told and not _called_ur10(report):
+    if not told and robot_type is None:
         return [
             Problem(
                 "arm_not_identified",
@@ -85,24 +90,42 @@ def identity_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
                 "Enable the primary interface in the arm's security settings",
             )
         ]
-    if setup is not None and setup.robot_type != UR10:
-        return [_other(report, f"by its type, {setup.robot_type}")]
-    return [_other(report, why) for why in map(_other_length, told) if why is not None][:1]
+    if setup is not None and robot_type != model.robot_type:
+        return [_other(arm, report, f"by its type, {robot_type}")]
+    if not told and robot_type != model.robot_type:
+        return [_other(arm, report, f"its dashboard: {report.called!r}")]
+    return [_other(arm, report, why) for each in told if (why := _other_length(each, model)) is not None][:1]
 
 
-def _other_length(arm: DenavitHartenberg) -> str | None:
-    """What of it has most evidently another length than a UR10e's, if something has."""
-    lengths, nominal = lengths_m(arm), lengths_m(NOMINAL)
+def _models(report: ArmReport) -> Mapping[int, str]:
+    """The arms of a controller's series, by type."""
+    return E_SERIES_MODELS if report.version[0] >= E_SERIES else CB3_MODELS
+
+
+def _type_told(report: ArmReport) -> int | None:
+    """The type of arm: told as such, or else by the arm's lengths, or else by its name."""
+    if report.setup is not None:
+        return report.setup.robot_type
+    if report.kinematics is not None:
+        series = "CB3" if _models(report) is CB3_MODELS else "e-Series"
+        known = (model for model in map(turner_model, get_args(ModelName)) if model.series == series)
+        return next((model.robot_type for model in known if _other_length(report.kinematics, model) is None), None)
+    called = (report.called or "").strip().upper()
+    names = ((each, name.upper()) for each, words in _models(report).items() for name in words.split(" or "))
+    return next((each for each, name in names if called in (name, name.removesuffix("E"))), None)
+
+
+def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
+    """What of it has most evidently another length than the model's, if something has."""
+    lengths, nominal = lengths_m(arm), lengths_m(model.drawing)
     worst = int(np.argmax(np.abs(lengths - nominal)))
     if abs(lengths[worst] - nominal[worst]) <= LENGTH_TOLERANCE_M:
         return None
-    return f"its {LENGTHS[worst]} is {lengths[worst]:.3f} m, a UR10e's {nominal[worst]:.3f} m"
+    return f"its {LENGTHS[worst]} is {lengths[worst]:.3f} m, a {model.name}'s {nominal[worst]:.3f} m"
 
 
-def _other(report: ArmReport, why: str) -> Problem:
-    found = model_found(report) or "another arm"
-    return Problem("other_arm", f"the arm at {report.host} is no UR10e: the controller says {found}; {why}", OTHER_ARM)
-
-
-def _called_ur10(report: ArmReport) -> bool:
-    return report.called is not None and report.called.strip().upper() in DASHBOARD_NAMES
+def _other(arm: ArmSection, report: ArmReport, why: str) -> Problem:
+    found = model_found(report) or "arm that is not known"
+    named = f"an {found}" if found.startswith("arm") else f"a {found}"
+    what = f"the controller at {report.host} is {named}; configured is {arm.model} ({why})"
+    return Problem("other_arm", what, OTHER_ARM)

@@ -8,6 +8,7 @@ from pathlib import Path
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import carried_by
+from rig.motion.model import model_of
 from rig.motion.preflight import plan_problems
 from rig.motion.state import ARM_FIELDS, ArmReport, Made
 from rig.motion.steps import Plan
@@ -18,7 +19,8 @@ from rig.turners.ur.identity import identity_problems
 
 
 def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
-    return driver.Arm(section.host, on_state, section.state_rate_hz, log)
+    rate_hz = min(section.state_rate_hz, model_of(section).state_rate_hz)
+    return driver.Arm(section.host, on_state, rate_hz, log)
 
 
 def _look(section: ArmSection) -> ArmReport:
@@ -32,8 +34,13 @@ def _stance(report: ArmReport) -> str:
 
 def _problems(plans: Sequence[Plan], section: ArmSection, report: ArmReport | None) -> list[Problem]:
     if report is None:
-        return [problem for plan in plans for problem in plan_problems(plan, carried_by(section))]
+        return [problem for plan in plans for problem in plan_problems(plan, carried_by(section), model_of(section))]
     return preflight.preflight_problems(plans, section, report)
+
+
+def _meant(section: ArmSection) -> Made:
+    model = model_of(section)
+    return Made(model.maker, model.name, model.drawing)
 
 
 def _made(section: ArmSection, report: ArmReport) -> Made:
@@ -48,6 +55,7 @@ UR = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
+    meant=_meant,
     made=_made,
     carried=carried_by,
     words=Words(

@@ -8,7 +8,8 @@ import numpy as np
 from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import carried_by
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_axes
+from rig.motion.geometry import DenavitHartenberg, flange_axes
+from rig.motion.model import home_of, model_of
 from rig.motion.preflight import plan_problems, way_to_home
 from rig.motion.state import JOINT_NAMES, MAKER, ArmReport, Made
 from rig.motion.steps import Plan
@@ -37,6 +38,7 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
     return plan_problems(
         plan,
         carried_by(arm),
+        model_of(arm),
         arm=_geometry(arm, report),
         told=None if report.setup is None else report.setup.limits,
     )
@@ -103,7 +105,7 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     """What is wrong with the controller's account of its arm, where the configuration asks for it.
 
-    Wrists that turn about other axes than a UR10e's are none, or are not known: the directions are compared in the
+    Wrists that turn about other axes than the drawing's are none, or are not known: the directions are compared in the
     flange's frame at home.
     """
     if arm.kinematics == "nominal":
@@ -116,14 +118,14 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
                 "Enable the primary interface in the arm's security settings, or set arm.kinematics: nominal",
             )
         ]
-    home = np.radians(arm.home_deg)
-    told, nominal = (flange_axes(home, each)[:, WRISTS] for each in (report.kinematics, NOMINAL))
+    home, model = home_of(arm), model_of(arm)
+    told, nominal = (flange_axes(home, each)[:, WRISTS] for each in (report.kinematics, model.drawing))
     angles = np.arctan2(np.linalg.norm(np.cross(told, nominal, axis=0), axis=0), np.sum(told * nominal, axis=0))
     return [
         Problem(
             "kinematics_disagree",
             f"by what the controller says the axis of {JOINT_NAMES[joint]} lies {math.degrees(angle):.1f}° from a "
-            f"UR10e's, {math.degrees(MAX_DISAGREEMENT_RAD):g}° is allowed",
+            f"{model.name}'s, {math.degrees(MAX_DISAGREEMENT_RAD):g}° is allowed",
             "Check that the controller is set up for this arm, or set arm.kinematics: nominal",
         )
         for joint, angle in zip(WRISTS, angles, strict=True)
@@ -141,4 +143,5 @@ def made(arm: ArmSection, report: ArmReport) -> Made:
 
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
-    return NOMINAL if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics
+    """What is reckoned with: the factory's measure of this arm, or the drawing of its model."""
+    return model_of(arm).drawing if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics

@@ -43,8 +43,9 @@ VARIABLES = {
 CONTROLLER_VERSION = struct.Struct(">4I")  # major, minor, bugfix, build
 PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
 
-ANGLE_RAD, SPEED_RAD_S, MODES = 13.0, 20.0, range(-1, 64)  # no arm turns so far or so fast, or has other modes
-# A joint of the fastest arm of this kind turns by 3.3 rad/s; three times that is none.
+# No arm turns so far or so fast, or has other modes: a UR3e's wrist 3 turns without end, and counts its turns.
+ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
+# A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is none.
 ENCODER_RAD, FASTEST_RAD_S = 0.03, 10.0
 
 

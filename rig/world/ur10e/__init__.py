@@ -1,1 +1,1 @@
-"""The simulated UR10e controller: its joints, its programs, its servers."""
+"""The simulated controller of an arm of Universal Robots: its joints, its programs, its servers."""

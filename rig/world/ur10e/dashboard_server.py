@@ -1,6 +1,7 @@
 """The dashboard server, port 29999: one line in, one line out.
 
-Dashboard Server manual of the maker, e-Series. In local control it answers questions and stops; it starts nothing.
+Dashboard Server manual of the maker, e-Series. In local control it answers questions and stops; it starts nothing. One
+of the CB3 series does not know local control, nor questions about it.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from rig.world.ur10e.robot import Robot
 PORT = 29999
 LINE_BYTES = 1 << 16  # no command is so long
 UNLOCK_AFTER_S = 5.0
+E_SERIES = 5  # the first version of its software
 PROGRAMS = ("wait_program.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 TOO_EARLY = (
@@ -114,7 +116,9 @@ class DashboardSession:
         if key == "quit":
             self.closing = True
             return "Disconnected"
-        if key in self._questions:
+        if key in self._questions and not (
+            key == "is in remote control" and self._robot.identity.polyscope[0] < E_SERIES
+        ):
             return self._questions[key]()
         if key in self._orders:
             return self._orders[key]() if self._robot.remote_control else f"Failed to execute: {key}"

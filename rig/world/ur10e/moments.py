@@ -4,7 +4,6 @@ Each link's mass is thought of as sitting in its centre (maker's article 45257, 
 with is left out, and so is friction. The base stands upright and still, as the controller takes it to.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,16 +17,15 @@ from rig.world.ur10e.trajectory import Joints
 
 Array = NDArray[np.float64]
 
-MASSES_KG = (7.369, 13.051, 3.989, 2.1, 1.98, 0.615)
-CENTRES_M = (  # in the frame of what each link carries
-    (0.021, 0.0, 0.027),
-    (0.38, 0.0, 0.158),
-    (0.24, 0.0, 0.068),
-    (0.0, 0.007, 0.018),
-    (0.0, 0.007, 0.018),
-    (0.0, 0.0, -0.026),
-)
 STEP_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """The links' masses, kg, and their centres, m, in the frame of what each link carries."""
+
+    masses_kg: tuple[float, ...]
+    centres_m: tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +41,22 @@ class Load:
 
 @lru_cache(maxsize=4)  # several outputs and several clients ask for the same
 def load(
-    joints: tuple[Joints, Joints, Joints], payload_kg: float, payload_centre_m: tuple[float, ...], links: Links
+    joints: tuple[Joints, Joints, Joints],
+    payload_kg: float,
+    payload_centre_m: tuple[float, ...],
+    links: Links,
+    bodies: Bodies,
 ) -> Load:
     """Load of joints at angles (rad), speeds (rad/s), accelerations (rad/s²), with a payload in the flange's axes."""
     q, qd, qdd = (np.array(each) for each in joints)
-    masses = np.array([*MASSES_KG, payload_kg])
+    masses, own = np.array([*bodies.masses_kg, payload_kg]), np.array([*bodies.centres_m, payload_centre_m])
     rotations, places = _frames(q, links)
-    here = _centres(q, payload_centre_m, links)
-    before, after = (
-        _centres(q + sign * STEP_S * qd + STEP_S**2 / 2 * qdd, payload_centre_m, links) for sign in (-1, 1)
-    )
+    here = _centres(q, own, links)
+    before, after = (_centres(q + sign * STEP_S * qd + STEP_S**2 / 2 * qdd, own, links) for sign in (-1, 1))
     forces = masses[:, None] * ((after - 2 * here + before) / STEP_S**2 + GRAVITY)
     moments = [
         float(rotations[joint, :, 2] @ np.cross(here[joint:] - places[joint], forces[joint:]).sum(axis=0))
-        for joint in range(len(MASSES_KG))
+        for joint in range(len(bodies.masses_kg))
     ]
     weight = -rotations[-1].T @ forces[-1]
     turning = np.cross(np.array(payload_centre_m), weight)
@@ -70,10 +70,9 @@ def _frames(q: Array, links: Links) -> tuple[Array, Array]:
     return np.array(rotations), np.array(places)
 
 
-def _centres(q: Array, payload_centre_m: Sequence[float], links: Links) -> Array:
-    """(7, 3) centres of mass of the links and of the payload, m."""
+def _centres(q: Array, own: Array, links: Links) -> Array:
+    """(7, 3) centres of mass of the links and of the payload, m, from those in each one's `own` frame."""
     rotations, places = _frames(q, links)
-    own = np.array([*CENTRES_M, payload_centre_m])
     carried = [*range(1, len(places)), len(places) - 1]  # the payload sits where the last link does
     centres: Array = places[carried] + np.einsum("nij,nj->ni", rotations[carried], own)
     return centres

@@ -1,4 +1,4 @@
-"""The simulated UR10e controller without its sockets: modes, safety, registers, programs, and the joints."""
+"""The simulated controller without its sockets: modes, safety, registers, programs, and the joints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -310,8 +310,9 @@ class Robot:
             self.motion.fraction_wanted = self.speed_slider
 
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
-        if not 0.0 <= mass_kg <= 12.5:
-            raise ProgramError(f"payload {mass_kg} kg is outside 0 to 12.5 kg")
+        most_kg = self.model.payload_kg
+        if not 0.0 <= mass_kg <= most_kg:
+            raise ProgramError(f"payload {mass_kg} kg is outside 0 to {most_kg} kg")
         centre = tuple(float(each) for each in centre_m)
         if len(centre) != 3 or not all(map(isfinite, centre)):
             raise ProgramError(f"a payload's centre is three lengths, not {centre_m}")

@@ -21,6 +21,7 @@ DATA_BYTES = (
 )  # of the values of a recipe: the size of a package is a u16, the first byte its number
 INPUT_RECIPES = 255  # their number is a byte, and 0 says that there is none
 DEFAULT_HZ = 125.0  # version 1 has no frequency
+CB3_HZ, E_SERIES = 125.0, 5  # a controller before the e-Series goes no faster
 
 
 def package(kind: str, payload: bytes) -> bytes:
@@ -147,7 +148,8 @@ class RtdeSession:
             self._output = None
             refusal = package("O", b"\0" if self._version == 2 else b"")
             return self._say(f"a recipe of values of {size} bytes, the most is {DATA_BYTES}") + refusal
-        valid = "NOT_FOUND" not in kinds and bool(names) and 0.0 < frequency_hz <= TICKS_PER_SECOND
+        fastest_hz = TICKS_PER_SECOND if self._robot.identity.polyscope[0] >= E_SERIES else CB3_HZ
+        valid = "NOT_FOUND" not in kinds and bool(names) and 0.0 < frequency_hz <= fastest_hz
         self._output = Output(names, frequency_hz, 1 if self._version == 2 else None) if valid else None
         lead = bytes([valid]) if self._version == 2 else b""
         return package("O", lead + ",".join(kinds).encode())

@@ -11,7 +11,6 @@ from rig.world.ur10e.forward_kinematics import Rotation, Vector, flange_rate, fr
 from rig.world.ur10e.joint_errors import Errors, JointErrors
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import UR10E, ZERO6, Drawing, Links, links
-from rig.world.ur10e.models import MODELS
 from rig.world.ur10e.trajectory import Joints
 
 STILL: Vector = (0.0, 0.0, 0.0)
@@ -37,10 +36,11 @@ class TrueArm:
     `ideal`: nothing but the drawing, on a ground that does not turn: then the rate is all that anybody can feel of it.
     """
 
-    def __init__(self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random) -> None:
+    def __init__(
+        self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random, drawing: Drawing = UR10E
+    ) -> None:
         self._motion, self._site = motion, site
         self._speed = 1.0 + 1e-6 * section.clock_ppm
-        drawing = MODELS[section.model].drawing
         self._links = known_links(section.calibration, section.residue.twist_rad, drawing)
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
@@ -72,7 +72,7 @@ class TrueArm:
 
     def rate_at(self, time_s: float) -> Vector:
         """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
-        return STILL if self._motion.still else flange_rate(*self._motion.at(time_s))
+        return STILL if self._motion.still else flange_rate(*self._motion.at(time_s), self._links)
 
     def felt_at(self, time_s: float) -> Felt:
         """All that a body on the flange feels at a time inside the last tick or the motion's memory."""

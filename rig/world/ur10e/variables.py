@@ -55,13 +55,13 @@ def _volts_when_on(volts: float) -> Callable[[Robot], float]:
 def _load(robot: Robot) -> Load:
     motion = robot.motion
     joints = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2
-    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links)
+    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
 
 
 def _target_load(robot: Robot) -> Load:
     now = robot.motion.now
     joints = now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2
-    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links)
+    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links, robot.model.bodies)
 
 
 def _borne(of: Callable[[Robot], Load]) -> Get:

@@ -24,7 +24,6 @@ from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.motion.carried import Carried
-from rig.motion.preflight import plan_problems
 from rig.motion.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.plans.six_sweeps import plan_six_observation
@@ -34,6 +33,7 @@ from rig.turners.ur.preflight import arm_problems
 from support.arm_relay import relay
 from support.crowd import soon, watched_crowd
 from support.rtde_reader import RtdeReader
+from support.ur10e import plan_problems
 from support.waiting import wait_for
 from support.worlds import World, WorldHandle
 

@@ -1,7 +1,9 @@
-"""Which arm answers: a UR10e is moved, by its own lengths and limits, and any other is refused by its name."""
+"""Which arm answers: the configured one is moved, by its own lengths and limits; any other is refused by its name."""
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,14 @@ import pytest
 
 from rig.commands.configured import configured
 from rig.config.models import ArmSection
+from rig.config.section import ModelName
 from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
-from rig.motion.state import ArmReport
+from rig.motion.state import ArmReport, ArmSetup, JointLimits
 from rig.turners.ur.driver import look
 from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.preflight import preflight_problems
+from rig.world.ur10e.models import MODELS
 from support.commands import rig
 from support.told_runs import report
 from support.worlds import World, WorldHandle, hardware, worlds
@@ -57,7 +61,7 @@ def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> N
 @pytest.mark.parametrize(
     ("arm", "name", "words"),
     [
-        ({"model": "ur5e"}, "other_arm", "the controller says UR5e or UR7e; by its type, 1"),
+        ({"model": "ur5e"}, "other_arm", "is a UR5e or UR7e; configured is ur10e (by its type, 1)"),
         ({**X, "dashboard": False}, "polyscope_x", "PolyScope X (10.8.0)"),
     ],
     ids=["UR5e", "PolyScope X"],
@@ -87,9 +91,13 @@ def refusal(host: str) -> Problem:
 @pytest.mark.parametrize(
     ("arm", "name", "words"),
     [
-        ({"model": "ur20"}, "other_arm", "the controller says UR20"),
-        ({"model": "ur10"}, "other_arm", "its height of the shoulder is 0.127 m, a UR10e's 0.181 m"),
-        ({"model": "ur10", "polyscope": "3.15.8.0"}, "cb3_not_supported", "one of the CB3 series (software 3.15.8)"),
+        ({"model": "ur20"}, "other_arm", "is a UR20; configured is ur10e"),
+        (
+            {"model": "ur10_cb3", "polyscope": "5.14.0.0"},
+            "other_arm",
+            "its height of the shoulder is 0.127 m, a UR10e's 0.181 m",
+        ),
+        ({"model": "ur10_cb3"}, "cb3_not_supported", "one of the CB3 series (software 3.15.8)"),
         (X, "polyscope_x", "PolyScope X (10.8.0)"),
         ({"dashboard": False}, "no_dashboard", "does not answer"),
     ],
@@ -121,7 +129,7 @@ def test_an_arm_that_cannot_be_told_is_not_moved(world: World, seen: ArmReport) 
     assert closed.setup is None and closed.kinematics is None
     assert names(BY_NOMINAL, closed) == []  # its dashboard says UR10, its software e-Series: that is a UR10e or UR12e
     assert model_found(closed) == "UR10e or UR12e"
-    assert names(BY_NOMINAL, replace(closed, called="UR5")) == ["arm_not_identified"]
+    assert names(BY_NOMINAL, replace(closed, called="UR5")) == ["other_arm"]
     assert names(BY_NOMINAL, replace(closed, called="could not understand: 'get robot model'")) == [
         "arm_not_identified"
     ]
@@ -160,7 +168,9 @@ def test_a_factorys_calibration_is_still_a_ur10e_wherever_its_axes_meet(seen: Ar
     q = np.radians([[0, -90, 90, -90, angle, 0] for angle in range(-180, 180, 10)])
     np.testing.assert_allclose(distance_to_forearm(q, arm=measured), distance_to_forearm(q), atol=3e-3)
     end = (0.0, 0.0, 0.3)
-    np.testing.assert_allclose(distance_to_upper_arm(q, end, measured), distance_to_upper_arm(q, end), atol=3e-3)
+    for arm in (measured, NOMINAL):
+        far_m = distance_to_upper_arm(q, end, arm, beside_m=0.1762)
+        np.testing.assert_allclose(far_m, distance_to_upper_arm(q, end, beside_m=0.1762), atol=3e-3)
 
 
 def test_another_arms_clearance_is_by_its_own_lengths() -> None:
@@ -176,9 +186,45 @@ def test_another_arms_clearance_is_by_its_own_lengths() -> None:
 
 def test_nothing_else_is_said_of_an_arm_that_is_not_meant() -> None:
     plan = configured(Path("configs/demo.yaml")).phase.plan()
-    told = replace(report(plan.start_q_rad), called="UR5")
+    told = replace(report(plan.start_q_rad), called="an arm")
     assert names(ARM, told) == ["arm_not_identified"]
     assert [p.name for p in preflight_problems([plan], ARM, told)] == ["arm_not_identified"]
+
+
+ALIKE = ({"ur5e", "ur7e"}, {"ur10e", "ur12e"})  # their controllers say the same, and they are made alike
+
+
+def told_by(key: ModelName, told: ArmReport) -> ArmReport:
+    """What the controller of that model says, by the table of the simulated laboratory."""
+    world = MODELS[key]
+    a, d, quarters = zip(*world.drawing, strict=True)
+    drawing = DenavitHartenberg((0.0,) * 6, a, d, tuple(each * pi / 2 for each in quarters))
+    least = tuple(-limit for limit in world.limit_rad)
+    limits = JointLimits(least, world.limit_rad, world.speed_rad_s, (40.0,) * 6)
+    setup = ArmSetup(world.robot_type, drawing, limits)
+    return replace(told, version=world.polyscope, called=world.name, setup=setup, kinematics=drawing)
+
+
+@pytest.mark.parametrize("kinematics", ["controller", "nominal"])
+def test_no_arm_is_taken_for_another(kinematics: str) -> None:
+    """Of all pairs of a configured model and an arm that answers, with and without its primary interface's account."""
+    seen = report((0.0,) * 6)
+    for meant, found in product(MODELS, MODELS):
+        arm = ArmSection.model_validate(
+            {"host": "10.0.0.2", "payload_kg": 0.3, "model": meant, "kinematics": kinematics}
+        )
+        same = meant == found or {meant, found} in ALIKE
+        whole = told_by(found, seen)
+        for told in (whole, replace(whole, setup=None), replace(whole, setup=None, kinematics=None)):
+            said = names(arm, told)
+            assert (said == []) == same, (meant, found, said)
+            assert same or said[0] in ("other_arm", "cb3_not_supported")
+
+
+def test_the_refusal_names_both_arms() -> None:
+    (problem,) = identity_problems(ARM, told_by("ur5e", report((0.0,) * 6)))
+    assert problem.what == "the controller at 127.0.0.2 is a UR5e or UR7e; configured is ur10e (by its type, 1)"
+    assert "arm.model" in problem.remedy
 
 
 def test_no_arm_is_still_no_arm() -> None:

@@ -1,0 +1,100 @@
+"""What turns the flange, as data: each model of arm has a file in `models/`, with the sources of its figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from math import inf, pi, radians
+from typing import Any, Literal
+
+import yaml
+
+from rig.config.models import ArmSection
+from rig.config.section import ModelName
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.state import JointLimits, Joints
+
+Series = Literal["e-Series", "CB3"]
+CLIENT_SPEED_RAD_S = 3.14  # `ur_rtde` accepts no more, which is a little below 180°/s
+
+
+@dataclass(frozen=True, slots=True)
+class Tube:
+    """A link, as thick as `radius_m`, whose middle lies beside its line in the drawing, on the side of wrist 1."""
+
+    beside_m: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)  # each is loaded once, and is only equal to itself
+class TurnerModel:
+    """A model of arm: how it is made, what its joints may do, what it carries, how thick it is. SI units.
+
+    `robot_type` is what its controller tells of itself; models that are made alike share one. `sweep_room_m` and
+    `dwell_room_m` must be left between a link's surface and the middle of what the flange carries. `home_rad` is the
+    pose around which everything turns unless the configuration says another. `sources` says where figures are from.
+    """
+
+    key: str
+    name: str
+    maker: str
+    series: Series
+    robot_type: int
+    joints: tuple[str, ...]
+    drawing: DenavitHartenberg
+    limits: JointLimits
+    payload_kg: float
+    forearm: Tube
+    upper_arm: Tube
+    sweep_room_m: float
+    dwell_room_m: float
+    state_rate_hz: float
+    home_rad: Joints
+    sources: Mapping[str, str]
+
+
+@lru_cache
+def turner_model(key: ModelName) -> TurnerModel:
+    """The model that a configuration calls so. Raises FileNotFoundError when there is none."""
+    text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")
+    row: dict[str, Any] = yaml.safe_load(text)
+    joints = tuple(row["joints"])
+    greatest = tuple(inf if joint in row["endless"] else radians(row["range_deg"]) for joint in joints)
+    return TurnerModel(
+        key=key,
+        name=row["name"],
+        maker=row["maker"],
+        series=row["series"],
+        robot_type=row["robot_type"],
+        joints=joints,
+        drawing=DenavitHartenberg(
+            theta_rad=(0.0,) * len(joints),
+            a_m=tuple(row["a_m"]),
+            d_m=tuple(row["d_m"]),
+            alpha_rad=tuple(quarters * pi / 2 for quarters in row["alpha_quarters"]),
+        ),
+        limits=JointLimits(
+            least_rad=tuple(-angle for angle in greatest),
+            greatest_rad=greatest,
+            speed_rad_s=tuple(min(radians(speed), CLIENT_SPEED_RAD_S) for speed in row["speed_deg_s"]),
+            acceleration_rad_s2=(radians(row["acceleration_deg_s2"]),) * len(joints),
+        ),
+        payload_kg=row["payload_kg"],
+        forearm=Tube(**row["forearm"]),
+        upper_arm=Tube(**row["upper_arm"]),
+        sweep_room_m=row["room_m"]["sweep"],
+        dwell_room_m=row["room_m"]["dwell"],
+        state_rate_hz=row["state_rate_hz"],
+        home_rad=tuple(radians(angle) for angle in row["home_deg"]),
+        sources=row["sources"],
+    )
+
+
+def model_of(arm: ArmSection) -> TurnerModel:
+    """The model that an arm is, by its configuration."""
+    return turner_model(arm.model)
+
+
+def home_of(arm: ArmSection) -> Joints:
+    """(6,) rad of the pose around which everything turns: what the configuration says, or else the model's own."""
+    return model_of(arm).home_rad if arm.home_deg is None else tuple(radians(angle) for angle in arm.home_deg)
