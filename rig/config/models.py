@@ -20,6 +20,7 @@ from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget
 from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S
 from rig.config.section import (
+    RATIO,
     AccelerometerOrder,
     JointAngle,
     ModelName,
@@ -86,6 +87,13 @@ class ArmSection(TurnerSection):
         ge=125,
         le=500,
         description="how many states the arm sends per second; a `ur10_cb3` sends 125 at most",
+    )
+    robot_api_port: int = Field(
+        default=80,
+        ge=1,
+        le=65535,
+        description="TCP port of a PolyScope X's Robot API; a simulator may have it at another one",
+        json_schema_extra=RATIO,
     )
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",

@@ -128,13 +128,15 @@ class SimulatedArmSection(Section):
     polyscope: str | None = Field(
         default=None,
         pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
-        description="version of the controller's software",
+        description="version of the controller's software; from 10 on it is a PolyScope X",
         json_schema_extra={
             "allowed": "four numbers with dots between them",
             "usual": "`5.14.0.0`, of a `ur10_cb3` `3.15.8.0`",
         },
     )
-    dashboard: bool = Field(default=True, description="whether it has a dashboard server; a PolyScope X has none")
+    dashboard: bool = Field(
+        default=True, description="whether it has a dashboard server; a PolyScope X has none in any case"
+    )
     primary: bool = Field(
         default=True, description="whether the primary interface, which reports the model, is open in its settings"
     )

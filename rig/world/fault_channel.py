@@ -9,6 +9,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     pause · play · stop_program · speed_slider fraction · remote_control on
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
+    close_dashboard                             this one of them alone: what serves the pendant's screen is gone
     sensor_fault sensor fault   absent, other_part (its identity), damaged (a bit now and then), silent (no data-ready),
                                 stuck (it feels what it felt) or saturated (far more than its range); null: it is well
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
@@ -41,6 +42,7 @@ class World(Protocol):
     def kvh_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
+    def close_dashboard(self) -> None: ...
     def silence_arm(self, duration_s: float) -> None: ...
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
@@ -78,6 +80,7 @@ class ControlSession:
             "register_in_use": self._register_in_use,
             "register_free": self._register_free,
             "close_arm": self._close_arm,
+            "close_dashboard": world.close_dashboard,
             "silence_arm": self._silence_arm,
             "kvh_fault": self._kvh_fault,
             "kvh_power": self._kvh_power,

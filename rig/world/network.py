@@ -178,6 +178,7 @@ class Listener:
         gathers: bool,
     ) -> None:
         self._network, self._address = network, address
+        self.port = address[1]
         self._new_session, self._limit, self.lag_s, self.gathers = new_session, limit, lag_s, gathers
         self.silent = False
         self._socket: socket.socket | None = None
@@ -202,7 +203,9 @@ class Listener:
             raise Refused(
                 "port_in_use",
                 f"the simulated laboratory cannot listen on {host}:{port} ({error.strerror})",
-                "End the other simulation, or give this one another loopback address in arm.host and board.port",
+                "Give it a port above 1023, a PolyScope X's in arm.robot_api_port"
+                if isinstance(error, PermissionError)
+                else "End the other simulation, or give this one another loopback address in arm.host and board.port",
             ) from None
         listening.setblocking(False)
         self._network.selector.register(listening, selectors.EVENT_READ, self._accept)

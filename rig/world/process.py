@@ -26,7 +26,7 @@ from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
-from rig.world.ur10e import dashboard_server, primary, rtde, script_socket
+from rig.world.ur10e import dashboard_server, primary, robot_api, rtde, script_socket
 from rig.world.ur10e.robot import Robot
 
 if TYPE_CHECKING:
@@ -69,8 +69,11 @@ class World:
             self.arm_listeners = [
                 self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
                 for port, (new_session, lag_s) in ARM_PORTS.items()
-                if port not in _closed_ports(section.arm)
+                if port not in _closed_ports(section.arm, self.laboratory.robot)
             ]
+            if robot_api.offered(self.laboratory.robot):
+                new_session = partial(robot_api.RobotApiSession, self.laboratory.robot)
+                self.arm_listeners.append(self.network.listen(host, loaded.config.arm.robot_api_port, new_session))
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
@@ -118,6 +121,12 @@ class World:
         """The controller closes every connection; with `listen` it takes new ones."""
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
+
+    def close_dashboard(self) -> None:
+        """The dashboard alone closes its connections and takes no new ones."""
+        for listener in self.arm_listeners:
+            if listener.port == dashboard_server.PORT:
+                listener.close()
 
     def unplug_board(self) -> None:
         """Pull the board's cable: no power, no port."""
@@ -191,9 +200,9 @@ class World:
         self.network.close()
 
 
-def _closed_ports(arm: SimulatedArmSection) -> set[int]:
+def _closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:
     """What the simulated controller does not offer."""
-    closed = set() if arm.dashboard else {dashboard_server.PORT}
+    closed = set() if arm.dashboard and not robot.is_polyscope_x else {dashboard_server.PORT}
     return closed if arm.primary else closed | {script_socket.PRIMARY_PORT}
 
 

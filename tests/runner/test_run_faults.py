@@ -35,6 +35,14 @@ SOON_SWEEPING: dict[str, Any] = {
 }
 
 
+# The simulated controllers: by `make proof` every accident happens on both, the essential ones by `make test` too.
+KINDS: dict[str, dict[str, Any]] = {
+    "PolyScope 5": {},
+    "PolyScope X": {"arm": {"robot_api_port": 8077}, "world": {"arm": {"polyscope": "10.14.0.0"}}},
+}
+both = pytest.mark.parametrize("start", list(KINDS), indirect=True)
+
+
 class RunningRig:
     """`rig run` on a world that stays when the run ends, so that a test can ask what the arm does."""
 
@@ -83,12 +91,12 @@ class RunningRig:
         return self.process.returncode, errors
 
 
-@pytest.fixture
-def start(world: World, tmp_path: Path) -> Iterator[Start]:
+@pytest.fixture(params=["PolyScope 5", pytest.param("PolyScope X", marks=THOROUGH)])
+def start(world: World, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Start]:
     running: list[RunningRig] = []
 
     def run(changes: dict[str, Any] | None = None, *arguments: str, before: Any = None) -> RunningRig:
-        handle = world(merge(SOON_SWEEPING, changes or {}))
+        handle = world(merge(merge(KINDS[request.param], SOON_SWEEPING), changes or {}))
         if before is not None:
             handle.control(before)
         running.append(RunningRig(handle, tmp_path, *(arguments or ("--yes",))))
@@ -159,6 +167,7 @@ def test_three_ctrl_c_at_once_leave_the_word_that_the_arm_stands(start: Start) -
     assert "interrupted; the arm is stopped and at rest; " in errors.splitlines()[-1], errors
 
 
+@both
 def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
     rig = start()
     rig.until_sweeping()

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 
 from support.worlds import fresh_host
 
-PORTS = (29999, 30003, 30004)
+PORTS = (29999, 30001, 30003, 30004)
 
 
 class ArmRelay:

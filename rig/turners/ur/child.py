@@ -19,7 +19,7 @@ from rig.config.written_file import opened_to_append
 from rig.data.silence import Silence
 from rig.errors import Problem
 from rig.motion.state import ArmState
-from rig.turners.ur.dashboard import Dashboard
+from rig.turners.ur.asking import no_states
 from rig.turners.ur.identity import series_problem, version_text
 from rig.turners.ur.messages import (
     Connected,
@@ -35,7 +35,7 @@ from rig.turners.ur.messages import (
     TakeControl,
 )
 from rig.turners.ur.state_stream import NotSpoken, Packet, StateStream
-from rig.turners.ur.stopping import BRAKE_RAD_S2
+from rig.turners.ur.stopping import BRAKE_RAD_S2, STOP_S, Order, independent_ways
 
 HEARTBEAT_S = 0.01
 MOVE_POLL_S = 0.003
@@ -43,7 +43,7 @@ FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
-ABANDON_S = 5.0  # the last stop, over the dashboard or over the client, has so long
+ABANDON_S = 5.0  # the last stop, over the controller's own ports or else over the client, has so long
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -215,14 +215,14 @@ class _Child:
             self._control.stopScript()
 
     def abandon(self) -> NoReturn:
-        """Stop the arm that nobody supervises any more, over the dashboard or else over the client, and leave."""
+        """Stop the arm that nobody supervises any more, and leave.
+
+        Over the client where no port of the controller's own says that the program has ended.
+        """
         if self._holds_arm:
             # The client's own stop may wait for ever for a controller that is gone; the system's alarm ends that.
             signal.setitimer(signal.ITIMER_REAL, ABANDON_S)
-            try:
-                with Dashboard(self._host) as dashboard:
-                    dashboard.stop_program()
-            except OSError:
+            if not Order(self._host, independent_ways(self._states.version), STOP_S).program_ended():
                 self._brake(BRAKE_RAD_S2)
         _leave(1)
 
@@ -268,11 +268,7 @@ def _connection_failure(host: str, error: OSError) -> Problem:
             f"the controller at {host} does not know {error.what}; its software is {version_text(error.version)}",
             "Update it: the rig is tried with PolyScope 5.14",
         )
-    return Problem(
-        "no_arm_states",
-        f"the controller at {host} accepts connections but sends no states ({error})",
-        "Check that the arm has finished booting and that no firewall blocks port 30004",
-    )
+    return no_states(host, error)
 
 
 def _control_failure(host: str, reason: str) -> Problem:
@@ -291,5 +287,5 @@ def _control_failure(host: str, reason: str) -> Problem:
     return Problem(
         "control_not_taken",
         f"the arm at {host} did not start the control script ({reason})",
-        "Clear any stop on the pendant, close other programs, then start again",
+        "Clear any stop on the pendant, switch it to remote control, close other programs, then start again",
     )

@@ -66,6 +66,15 @@ def readiness(state: ArmState) -> Problem | None:
     return None
 
 
+def local_control(host: str) -> Problem:
+    """The pendant has not handed control over."""
+    return Problem(
+        "not_in_remote_control",
+        f"the arm at {host} is in local control",
+        "Switch the pendant to remote control (top right corner)",
+    )
+
+
 def program_interruption(state: ArmState) -> Problem | None:
     """Why the control program no longer runs, or None while it does."""
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):

@@ -18,7 +18,9 @@ class Dashboard:
     Every method raises `OSError` when the controller does not answer a command within `timeout_s`.
     """
 
-    def __init__(self, host: str, timeout_s: float = 0.4) -> None:
+    name = "dashboard"
+
+    def __init__(self, host: str, timeout_s: float) -> None:
         self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
         self._heard = bytearray()
         self._timeout_s = timeout_s

@@ -3,8 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import replace
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,22 +12,20 @@ from rig.errors import Fault, Problem, Refused, RigError
 from rig.motion.carried import Carried
 from rig.motion.state import ArmReport, ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
+from rig.turners.ur.asking import ANSWER_S, reported, stop_problem
 from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
-from rig.turners.ur.dashboard import Dashboard
-from rig.turners.ur.identity import model_found, series_problem
+from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
-from rig.turners.ur.primary import Account, read_account
-from rig.turners.ur.state_stream import NotSpoken, StateStream
-from rig.turners.ur.stopping import StopOutcome, Stopper
+from rig.turners.ur.robot_api import PORT as ROBOT_API_PORT
+from rig.turners.ur.robot_api import RobotApi
+from rig.turners.ur.stop_trial import stop_trial
+from rig.turners.ur.stopping import Order, StopOutcome, Stopper, Ways, independent_ways
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
 START_S = 5.0  # a move begins within this (wall time), or not at all
-LOOK_S = 2.0  # for whoever answers where no dashboard does
-LOOK_HZ = 125.0
-LAST_STOP_S = 0.8  # … and so long once more when no state has confirmed the stop
-ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
+LAST_STOP_S = 0.8  # the controller is told to stop for so long once more when no state has confirmed the stop
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
@@ -46,8 +43,9 @@ class Arm:
     """The arm at `host`; a context manager that starts receiving on entry and leaves the arm stopped.
 
     `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
-    `client_log` takes what the `ur_rtde` client itself prints. All methods raise `Fault` by name when the arm or its
-    driver fails: the arm is then stopped already. `Refused` means that nothing has moved.
+    `client_log` takes what the `ur_rtde` client itself prints; a PolyScope X is asked at `robot_api_port` too. All
+    methods raise `Fault` by name when the arm or its driver fails: the arm is then stopped already. `Refused` means
+    that nothing has moved.
     """
 
     def __init__(
@@ -56,12 +54,15 @@ class Arm:
         on_state: Callable[[ArmState], None] = lambda state: None,
         state_rate_hz: float = 125.0,
         client_log: Path | None = None,
+        *,
+        robot_api_port: int = ROBOT_API_PORT,
     ) -> None:
         self._host = host
+        self._robot_api_port = robot_api_port
         self._on_state = on_state
         self._period_s = 1 / state_rate_hz
         self._link = ChildLink(host, state_rate_hz, client_log, self._take, self._fail)
-        self._stopper = Stopper(host, self._link.send, self._seen_at_rest)
+        self._stopper = Stopper(host, self._ways, self._link.send, self._seen_at_rest)
         self._changed = threading.Condition()  # notified when anything below changes
         self._latest: ArmState | None = None
         self._connected: Connected | None = None
@@ -78,15 +79,13 @@ class Arm:
 
     def start(self) -> None:
         """Connect and receive; moves nothing and stops no program. Raises `Refused` when no arm answers."""
-        try:
-            Dashboard(self._host, timeout_s=LOOK_S).close()
-        except OSError as error:
-            raise Refused.of(_no_dashboard(self._host, error)) from error
         with self._link.patience():
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
         if isinstance(self._answer, Failed):
             raise Refused.of(self._answer.problem)
+        if problem := stop_problem(self._host, self._controller.version):
+            raise Refused.of(problem)
 
     @property
     def latest(self) -> ArmState:
@@ -97,30 +96,8 @@ class Arm:
 
     def report(self) -> ArmReport:
         """What the arm says about itself, for pre-flight."""
-        if self._connected is None:
-            raise RuntimeError("start() comes first")
         self.check()
-        try:
-            with Dashboard(self._host, ANSWER_S) as dashboard:
-                account = _account(self._host)
-                report = ArmReport(
-                    host=self._host,
-                    version=self._connected.version,
-                    polyscope=dashboard.polyscope(),
-                    serial_number=dashboard.serial_number(),
-                    remote_control=dashboard.in_remote_control(),
-                    program_running=dashboard.program_running(),
-                    payload_kg=self._connected.payload_kg,
-                    payload_centre_m=self._connected.payload_centre_m,
-                    state=self.latest,
-                    kinematics=account.kinematics,
-                    tcp_offset=account.tcp_offset,
-                    setup=account.setup,
-                    called=dashboard.robot_model(),
-                )
-                return replace(report, model=model_found(report))
-        except OSError as error:
-            raise Refused.of(_silent_dashboard(self._host, error)) from error
+        return reported(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
         """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
@@ -149,6 +126,8 @@ class Arm:
         self._stopper.descriptors.keep()
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
+            if is_polyscope_x(self._controller.version):
+                self._prove_the_stop()
             self._request(TakeControl(carried))
             self._wait(lambda: self._answer is not None)
             if isinstance(self._answer, Failed):
@@ -220,8 +199,7 @@ class Arm:
             self._stopper.descriptors.release()
         if self._holds_arm and (self._problem is not None or not outcome.at_rest):
             # A client that had lost the arm and found it again may have started its program anew, behind that stop.
-            with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:
-                dashboard.stop_program()
+            Order(self._host, self._ways(), LAST_STOP_S).program_ended()
 
     def __enter__(self) -> Self:
         try:
@@ -245,6 +223,15 @@ class Arm:
 
     # Inside -------------------------------------------------------------------------------------------------------
 
+    @property
+    def _controller(self) -> Connected:
+        if self._connected is None:
+            raise RuntimeError("start() comes first")
+        return self._connected
+
+    def _ways(self) -> Ways:
+        return independent_ways(self._controller.version)
+
     @contextmanager
     def _stopping_on_error(self) -> Iterator[None]:
         try:
@@ -252,6 +239,18 @@ class Arm:
         except BaseException:
             self.stop()
             raise
+
+    def _prove_the_stop(self) -> None:
+        """Raises `Refused` where the arm could not be stopped without the client."""
+        problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
+        if problem is not None:
+            self._holds_arm = False
+            raise Refused.of(problem)
+
+    def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
+        """Whether the arm's states show its program so within that time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 
     def _request(self, request: TakeControl | Move) -> None:
         self.check()
@@ -357,39 +356,7 @@ def _not_started(motion: Motion) -> Problem:
     )
 
 
-def _no_dashboard(host: str, error: OSError) -> Problem:
-    """What is there instead, for whoever looks for the mistake: no arm, or one that has no dashboard."""
-    try:
-        with StateStream(host, LOOK_HZ, LOOK_S) as states:
-            version = states.version
-    except NotSpoken as answer:
-        version = answer.version
-    except OSError:
-        return Problem(
-            "no_arm",
-            f"no arm answers at {host} ({error})",
-            "Check arm.host in the configuration, the network cable, and that the arm is switched on",
-        )
-    return series_problem(host, version) or _silent_dashboard(host, error)
-
-
-def _silent_dashboard(host: str, error: OSError) -> Problem:
-    return Problem(
-        "no_dashboard",
-        f"the dashboard server at {host} does not answer ({error})",
-        "Enable the dashboard server in the arm's security settings",
-    )
-
-
-def _account(host: str) -> Account:
-    """What the controller tells; nothing without its primary interface."""
-    try:
-        return read_account(host, ANSWER_S)
-    except OSError:
-        return Account()
-
-
-def look(host: str) -> ArmReport:
+def look(host: str, robot_api_port: int = ROBOT_API_PORT) -> ArmReport:
     """Look at the arm: receive and ask only; nothing moves and no program is stopped. Raises `Refused` by name."""
-    with Arm(host) as arm:
+    with Arm(host, robot_api_port=robot_api_port) as arm:
         return arm.report()

@@ -18,6 +18,7 @@ from rig.motion.model import TurnerModel, model_of, turner_model
 from rig.motion.state import ArmReport
 
 E_SERIES, POLYSCOPE_X = 5, 10  # the first major versions of their software; the CB3 series has 3
+POLYSCOPE_X_SINCE = (10, 10)  # older ones are not known to take programs and stops at their primary interface
 E_SERIES_MODELS = {
     1: "UR5e or UR7e",  # made alike, for other payloads
     2: "UR10e or UR12e",  # made alike, for the same payload
@@ -48,17 +49,23 @@ def model_found(report: ArmReport) -> str | None:
     return None if robot_type is None else models.get(robot_type, f"arm of type {robot_type}")
 
 
+def is_polyscope_x(version: tuple[int, ...]) -> bool:
+    """Whether that software is a PolyScope X, which has no dashboard."""
+    return version[:1] >= (POLYSCOPE_X,)
+
+
 def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
-    """A controller of another series than the e-Series, which is stopped and asked in other ways.
+    """A controller of another series, or of older software, than those the rig knows how to stop and to ask.
 
     One of the CB3 series is none where the configuration names an arm of it.
     """
-    if version[0] >= POLYSCOPE_X:
+    if is_polyscope_x(version) and version < POLYSCOPE_X_SINCE:
+        since = ".".join(map(str, POLYSCOPE_X_SINCE))
         return Problem(
             "polyscope_x",
-            f"the controller at {host} is a PolyScope X ({version_text(version)}): the ways in which the rig stops an "
-            "arm are not proved there",
-            "Use an arm with PolyScope 5, or turn the sensors by other means: docs/how-to/other-hardware.md",
+            f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig knows how to stop an arm "
+            f"there from {since} on",
+            f"Update it to {since} or newer, or turn the sensors by other means: docs/how-to/other-hardware.md",
         )
     if version[0] < E_SERIES:
         return Problem(

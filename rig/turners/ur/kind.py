@@ -20,11 +20,11 @@ from rig.turners.ur.identity import identity_problems
 
 def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
     rate_hz = min(section.state_rate_hz, model_of(section).state_rate_hz)
-    return driver.Arm(section.host, on_state, rate_hz, log)
+    return driver.Arm(section.host, on_state, rate_hz, log, robot_api_port=section.robot_api_port)
 
 
 def _look(section: ArmSection) -> ArmReport:
-    return driver.look(section.host)
+    return driver.look(section.host, section.robot_api_port)
 
 
 def _stance(report: ArmReport) -> str:

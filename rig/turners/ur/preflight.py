@@ -13,7 +13,7 @@ from rig.motion.model import home_of, model_of
 from rig.motion.preflight import plan_problems, way_to_home
 from rig.motion.state import JOINT_NAMES, MAKER, ArmReport, Made
 from rig.motion.steps import Plan
-from rig.turners.ur.condition import readiness
+from rig.turners.ur.condition import local_control, readiness
 from rig.turners.ur.identity import identity_problems, model_found
 
 # How far the first motion may swing the large joints through the room, and the wrists.
@@ -54,13 +54,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
         problems.append(unready)
     # On the loopback address of the robot's own simulator the client skips this check, and so does the pendant.
     if report.remote_control is False and report.host not in ("127.0.0.1", "localhost"):
-        problems.append(
-            Problem(
-                "not_in_remote_control",
-                f"the arm at {report.host} is in local control",
-                "Switch the pendant to remote control (top right corner)",
-            )
-        )
+        problems.append(local_control(report.host))
     if report.program_running:
         problems.append(
             Problem("program_running", f"a program runs on the arm at {report.host}", "Stop it on the pendant")

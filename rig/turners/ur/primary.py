@@ -4,7 +4,8 @@ Every UR is measured in the factory, and its controller reckons with what was fo
 the maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, holds
 sub-packages of the same form. Of these KinematicsInfo, type 5, and Configuration Data, type 6, are sent once after
 connecting: how the factory measured this arm, and for which arm the controller is set up; Cartesian Info, type 4, in
-every state: the tool centre point's pose, and where it stands in the flange's frame.)
+every state: the tool centre point's pose, and where it stands in the flange's frame. A robot message, type 20, holds a
+time stamp, a source and its kind; the version message, kind 3, is sent once after connecting.)
 """
 
 import socket
@@ -14,12 +15,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isnan
 
+from rig.errors.quoting import printable
 from rig.motion.geometry import DenavitHartenberg, Pose
 from rig.motion.state import ArmSetup, JointLimits
 
 PORT = 30001
 HEADER = struct.Struct(">iB")
 ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO, CONFIGURATION_DATA = 16, 4, 5, 6
+ROBOT_MESSAGE, VERSION_MESSAGE = 20, 3
+MESSAGE = struct.Struct(">QbB")  # time stamp, source, kind
+VERSION = struct.Struct(">BBii")  # major, minor, bugfix, build; the project's name comes before, the date after
 KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; how well it was calibrated
 CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
 # Of each joint least and greatest angle; of each speed and acceleration; defaults; a, d, α, θ; boards, type, sub-type.
@@ -32,15 +37,17 @@ VALUE_MAX = 1e4  # m or rad: axes that are almost parallel meet some hundred met
 class Account:
     """The arm's geometry, where its tool centre point stands in the flange's frame, and which arm it is.
 
-    None where it is not told.
+    `software` is the controller's, in its own words. None where it is not told.
     """
 
     kinematics: DenavitHartenberg | None = None
     tcp_offset: Pose | None = None
     setup: ArmSetup | None = None
+    software: str | None = None
 
     @property
     def complete(self) -> bool:
+        """Whether all is told that a look waits for; the software is told before it, or never."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 
@@ -57,15 +64,17 @@ def read_account(host: str, timeout_s: float) -> Account:
             if not data:
                 break
             buffer += data
-            for kind, payload in _taken(buffer):
+            for kind, payload in packages(buffer):
                 if kind == ROBOT_STATE:
                     account = _completed(account, payload)
+                elif kind == ROBOT_MESSAGE and (software := _software(payload)):
+                    account = replace(account, software=software)
     return account
 
 
 def _completed(account: Account, state: bytes) -> Account:
     """The account with what a robot state says, as far as it can be so."""
-    for kind, payload in _taken(bytearray(state)):
+    for kind, payload in packages(bytearray(state)):
         if kind == KINEMATICS_INFO and (values := _numbers(KINEMATICS, payload)[6:30]):
             told = DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
             account = replace(account, kinematics=told)
@@ -92,13 +101,25 @@ def _setup(payload: bytes) -> ArmSetup | None:
     )
 
 
+def _software(message: bytes) -> str | None:
+    """Name, version and date in a version message, as a dashboard says them; None for any other message."""
+    if len(message) <= MESSAGE.size or MESSAGE.unpack_from(message)[2] != VERSION_MESSAGE:
+        return None
+    name_end = MESSAGE.size + 1 + message[MESSAGE.size]
+    if len(message) < name_end + VERSION.size:
+        return None
+    name, date = message[MESSAGE.size + 1 : name_end], message[name_end + VERSION.size :]
+    version = ".".join(map(str, VERSION.unpack_from(message, name_end)))
+    return printable(f"{name.decode(errors='replace')} {version} ({date.decode(errors='replace').strip()})")
+
+
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
     """The numbers of a payload, whole ones first; none when it is too short for them, or no arm is made so."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
     return values if all(isinstance(each, int) or abs(each) <= VALUE_MAX for each in values) else ()
 
 
-def _taken(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
+def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
     """The whole packages at the beginning of the bytes, taken from them. Raises `ConnectionError` for other bytes."""
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)

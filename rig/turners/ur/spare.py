@@ -2,7 +2,7 @@
 
 import os
 
-SPARE = 8  # the dashboard's socket, and what finding a host's address by its name opens
+SPARE = 16  # the sockets of two ways, and what finding a host's address by its name opens for each
 
 
 class SpareDescriptors:

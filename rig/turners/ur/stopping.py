@@ -1,18 +1,98 @@
-"""Stopping the arm for good: over the dashboard and over the client at the same time, in a thread of its own."""
+"""Stopping the arm for good: over the controller's ports and over the client at the same time, in its own threads."""
 
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
+from typing import Protocol
 
 from rig.turners.ur.dashboard import Dashboard
+from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import Stop
+from rig.turners.ur.primary_stop import PrimaryStop
 from rig.turners.ur.spare import SpareDescriptors
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
-DASHBOARD_S = 0.8  # the dashboard has so long to answer
+WAY_S = 0.8  # a port of the controller has so long to answer
 ASK_S = 0.05  # … and is asked so often whether the program has ended
 BRAKE_RAD_S2 = 5.0
+
+
+class Way(Protocol):
+    """A connection to the controller by which its program is ended, over plain TCP and without `ur_rtde`.
+
+    Its methods raise `OSError` when the controller does not answer in time.
+    """
+
+    @property
+    def name(self) -> str: ...
+    def stop_program(self) -> object: ...
+    def program_running(self) -> bool: ...
+    def close(self) -> None: ...
+
+
+Ways = tuple[type[Dashboard] | type[PrimaryStop], ...]
+
+
+def independent_ways(version: tuple[int, ...]) -> Ways:
+    """The ways to end a program on a controller with that software, the one no arm is moved without first."""
+    return (PrimaryStop,) if is_polyscope_x(version) else (Dashboard, PrimaryStop)
+
+
+class Order:
+    """The order to end the program, given to the controller at `host` on all ways at once, each in its own thread.
+
+    One that hangs holds up no other. Each goes on to ask for at most `timeout_s` whether the program has ended.
+    """
+
+    def __init__(self, host: str, ways: Ways, timeout_s: float) -> None:
+        self._host = host
+        self._deadline_s = time.monotonic() + timeout_s
+        self._changed = threading.Condition()  # notified when anything below changes
+        self._under_way = len(ways)
+        self._ended = False
+        self._heard = False  # it was taken by the controller, or at least by its port
+        self._failures: list[str] = []
+        for way in ways:
+            threading.Thread(target=self._give, args=(way,), name=f"arm stop by {way.name}", daemon=True).start()
+
+    def program_ended(self) -> bool:
+        """Whether the controller says so on any way; waits for it as long as it may yet come."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._ended or self._under_way == 0, max(0.0, self._left_s))
+            return self._ended
+
+    @property
+    def words(self) -> str:
+        """What became of it."""
+        if self._heard:
+            return "the controller was told to stop"
+        return f"the controller did not take the stop ({'; '.join(self._failures) or 'no answer'})"
+
+    @property
+    def _left_s(self) -> float:
+        return self._deadline_s - time.monotonic()
+
+    def _give(self, way: type[Dashboard] | type[PrimaryStop]) -> None:
+        try:
+            with closing(way(self._host, min(WAY_S, self._left_s))) as connection:
+                connection.stop_program()
+                self._heard = True
+                self._ask(connection)
+        except OSError as error:
+            self._failures.append(f"{way.name}: {error}")
+        finally:
+            with self._changed:
+                self._under_way -= 1
+                self._changed.notify_all()
+
+    def _ask(self, connection: Way) -> None:
+        while not self._ended and self._left_s > 0.0:
+            if not connection.program_running():
+                self._ended = True
+            else:
+                time.sleep(ASK_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +107,20 @@ class StopOutcome:
 class Stopper:
     """Stops the arm at `host` when `begin` is first called; later calls change nothing.
 
-    `send` hands the child its request; `seen_at_rest(since_s, timeout_s)` waits for a state newer than `since_s`
-    (monotonic time) that shows the arm at rest and its program ended. No interrupt of the caller breaks a stop off: it
-    runs in its own thread.
+    `ways` tells the controller's independent ways, `send` hands the child its request; `seen_at_rest(since_s,
+    timeout_s)` waits for a state newer than `since_s` (monotonic time) that shows the arm at rest and its program
+    ended. No interrupt of the caller breaks a stop off: it runs in its own thread.
     """
 
-    def __init__(self, host: str, send: Callable[[Stop], None], seen_at_rest: Callable[[float, float], bool]) -> None:
+    def __init__(
+        self,
+        host: str,
+        ways: Callable[[], Ways],
+        send: Callable[[Stop], None],
+        seen_at_rest: Callable[[float, float], bool],
+    ) -> None:
         self._host = host
+        self._ways = ways
         self._send = send
         self._seen_at_rest = seen_at_rest
         self._starting = threading.Lock()
@@ -81,15 +168,10 @@ class Stopper:
         # In a thread of its own: a child that does not listen must not keep the stop from the controller.
         threading.Thread(target=self._send, args=(Stop(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
         self.descriptors.release()
-        try:
-            with Dashboard(self._host, timeout_s=DASHBOARD_S) as dashboard:
-                dashboard.stop_program()
-            delivered = "the controller was told to stop"
-        except OSError as error:
-            delivered = f"the controller's dashboard did not take the stop ({error})"
+        order = Order(self._host, self._ways(), STOP_S)
         if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
             return StopOutcome(True, "the arm is stopped and at rest")
-        if self._program_ended(began_s + STOP_S):
+        if order.program_ended():
             return StopOutcome(
                 False,
                 "the controller says that its program has ended, but no state shows that the arm is at rest",
@@ -97,18 +179,6 @@ class Stopper:
             )
         return StopOutcome(
             False,
-            f"{delivered}, but no state confirms that the arm is at rest",
+            f"{order.words}, but no state confirms that the arm is at rest",
             "Look at the arm and press the emergency stop if it moves",
         )
-
-    def _program_ended(self, deadline_s: float) -> bool:
-        """Whether the controller says so itself by then: what is left to ask when no states come."""
-        try:
-            while (left_s := deadline_s - time.monotonic()) > 0.0:
-                with Dashboard(self._host, timeout_s=left_s) as dashboard:
-                    if not dashboard.program_running():
-                        return True
-                time.sleep(ASK_S)
-        except OSError:
-            return False
-        return False

@@ -20,7 +20,7 @@ ROBOT_STATE, ROBOT_MESSAGE = 16, 20
 VERSION_MESSAGE = 3
 ACCELERATION_LIMIT_RAD_S2 = 40.0  # of every joint
 NOT_CALIBRATED, CALIBRATED = 0, 2  # what KinematicsInfo says of the links: those of the model, those of this arm
-PROJECT = b"URControl"
+PROJECT, BUILT = b"URControl", b"simulated"  # in place of a date, as the dashboard says it
 
 
 def package(kind: int, payload: bytes) -> bytes:
@@ -40,7 +40,7 @@ class PrimarySession:
     def greeting(self) -> bytes:
         major, minor, bugfix, build = self._robot.identity.polyscope
         name = bytes([len(PROJECT)]) + PROJECT
-        version = name + struct.pack(">BBii", major, minor, bugfix, build) + b"01-01-2024, 00:00:00"
+        version = name + struct.pack(">BBii", major, minor, bugfix, build) + BUILT
         return _message(self._robot, VERSION_MESSAGE, version) + _state(self._robot, (*STATE, *CONFIGURATION))
 
     @property

@@ -30,6 +30,7 @@ PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
+POLYSCOPE_X = (10,)  # its first version
 
 
 class Program(Protocol):
@@ -188,6 +189,11 @@ class Robot:
             self.runtime_state = RuntimeState.PLAYING
         elif self.runtime_state == RuntimeState.STOPPING and self.motion.standing:
             self.runtime_state = RuntimeState.STOPPED
+
+    @property
+    def is_polyscope_x(self) -> bool:
+        """Whether its software has a Robot API, or nothing, in place of a dashboard."""
+        return self.identity.polyscope >= POLYSCOPE_X
 
     # -- programs ------------------------------------------------------------------------------------------------
     @property

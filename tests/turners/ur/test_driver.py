@@ -35,7 +35,7 @@ from support.crowd import soon, watched_crowd
 from support.rtde_reader import RtdeReader
 from support.ur10e import plan_problems
 from support.waiting import wait_for
-from support.worlds import World, WorldHandle
+from support.worlds import World, WorldHandle, merge
 
 pytestmark = pytest.mark.slow
 
@@ -43,9 +43,19 @@ PAYLOAD = Carried(0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 
 
-@pytest.fixture
-def laboratory(world: World) -> WorldHandle:
-    return world({"world": {"time_scale": 4}})
+ROBOT_API_PORT = 8077  # which everybody may open
+KINDS: dict[str, dict[str, Any]] = {
+    "PolyScope 5": {},
+    "PolyScope X": {"arm": {"robot_api_port": ROBOT_API_PORT}, "world": {"arm": {"polyscope": "10.14.0.0"}}},
+}
+# Every test is made on both kinds by `make proof`; by `make test` on both where `both` says so.
+LATER = pytest.param("PolyScope X", marks=[pytest.mark.proof, pytest.mark.thorough])
+both = pytest.mark.parametrize("laboratory", list(KINDS), indirect=True)
+
+
+@pytest.fixture(params=["PolyScope 5", LATER])
+def laboratory(world: World, request: pytest.FixtureRequest) -> WorldHandle:
+    return world(merge(KINDS[request.param], {"world": {"time_scale": 4}}))
 
 
 def turn(start: Joints, angle_rad: float) -> Transfer:
@@ -76,10 +86,11 @@ class AtSpeed:
             self._act()
 
 
+@both
 def test_a_look_moves_nothing_and_stops_no_program(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as other:
         other.take_control(PAYLOAD)
-        report = look(laboratory.host)
+        report = look(laboratory.host, ROBOT_API_PORT)
         assert report.program_running
         assert report.remote_control
         assert report.payload_kg == pytest.approx(PAYLOAD.payload_kg)
@@ -199,6 +210,7 @@ def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laborato
         assert stands(laboratory) and laboratory.state()["q_rad"][WRIST_3] > -3.0
 
 
+@both
 def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:
     """No state confirms the stop, and the client's own program runs again before the client is ended."""
     with Arm(laboratory.host) as arm:
@@ -223,6 +235,7 @@ def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laborator
     wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
+@both
 @pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
 def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_second(
     laboratory: WorldHandle, name: str, kind: str
@@ -495,7 +508,7 @@ def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
         assert stands(laboratory)
 
 
-def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) -> None:
+def test_a_controller_that_is_gone_altogether_is_said_honestly(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
         cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
@@ -503,8 +516,28 @@ def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) 
             arm.move(turn(arm.latest.q_rad, 6.0), cut)
         assert time.monotonic() - cut.acted_s < crowd.stretched(2.0)
     assert fault.value.name == "arm_link_lost"
-    assert "dashboard did not take the stop" in fault.value.what
+    assert "the controller did not take the stop (" in fault.value.what
+    assert "primary interface: " in fault.value.what
     assert "press the emergency stop" in fault.value.remedy
+
+
+def test_a_dashboard_that_is_gone_leaves_the_primary_interface_to_stop_the_arm(world: World) -> None:
+    """And nothing else: the driver's process is hung, which the client lives in."""
+    laboratory = world({"world": {"time_scale": 4}})
+    others = set(multiprocessing.active_children())
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        (child,) = set(multiprocessing.active_children()) - others
+
+        def close_the_dashboard_and_hang_the_child() -> None:
+            laboratory.control({"do": "close_dashboard"})
+            os.kill(child.pid or 0, signal.SIGSTOP)
+
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), cut := AtSpeed(arm, close_the_dashboard_and_hang_the_child))
+        assert time.monotonic() - cut.acted_s < crowd.stretched(2.0)
+        assert fault.value.name == "arm_driver_hung" and "its program has ended" in fault.value.what
+        assert stands(laboratory) and laboratory.state()["q_rad"][WRIST_3] < 5.0
 
 
 def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
@@ -539,12 +572,32 @@ def test_control_is_refused_by_name_before_anything_moves(
 ) -> None:
     for order in orders:
         laboratory.control(order)
-    with Arm(laboratory.host) as arm:
+    with Arm(laboratory.host, robot_api_port=ROBOT_API_PORT) as arm:
         with pytest.raises(Refused) as refused:
             arm.take_control(PAYLOAD)
         assert refused.value.name == name
         assert refused.value.remedy
     assert not laboratory.state()["program_running"]
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ({"do": "remote_control", "on": False}, "the controller began no program that was sent to it there"),
+        ({"do": "close_arm", "listen": False}, "the controller does not answer"),
+    ],
+    ids=["local control", "closed"],
+)
+def test_a_polyscope_x_that_cannot_be_stopped_is_not_moved(world: World, order: dict[str, Any], words: str) -> None:
+    """Before 10.12 it does not tell whether it is in remote control, without which it takes no stop."""
+    laboratory = world({"world": {"time_scale": 4, "arm": {"polyscope": "10.10.0.0"}}})
+    with Arm(laboratory.host) as arm:
+        assert arm.report().remote_control is None
+        laboratory.control(order)
+        with pytest.raises(Refused) as refused:
+            arm.take_control(PAYLOAD)
+    assert refused.value.name == "stop_not_proved" and words in refused.value.what
+    assert not laboratory.state()["program_running"] and laboratory.state()["still_since_s"] == 0
 
 
 def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
@@ -579,7 +632,18 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM", "SIGINT", "SIGINT twice"])
+@pytest.mark.parametrize(
+    ("laboratory", "kind"),
+    [
+        ("PolyScope 5", "SIGKILL"),
+        ("PolyScope 5", "SIGTERM"),
+        ("PolyScope 5", "SIGINT"),
+        ("PolyScope 5", "SIGINT twice"),
+        ("PolyScope X", "SIGKILL"),
+        ("PolyScope X", "SIGINT"),
+    ],
+    indirect=["laboratory"],
+)
 def test_the_arm_is_stopped_when_the_program_itself_dies(laboratory: WorldHandle, tmp_path: Path, kind: str) -> None:
     script = tmp_path / "parent.py"
     script.write_text(PARENT)

@@ -62,7 +62,7 @@ def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> N
     ("arm", "name", "words"),
     [
         ({"model": "ur5e"}, "other_arm", "is a UR5e or UR7e; configured is ur10e (by its type, 1)"),
-        ({**X, "dashboard": False}, "polyscope_x", "PolyScope X (10.8.0)"),
+        (X, "polyscope_x", "PolyScope X 10.8.0"),
     ],
     ids=["UR5e", "PolyScope X"],
 )
@@ -98,10 +98,16 @@ def refusal(host: str) -> Problem:
             "its height of the shoulder is 0.127 m, a UR10e's 0.181 m",
         ),
         ({"model": "ur10_cb3"}, "cb3_not_supported", "one of the CB3 series (software 3.15.8)"),
-        (X, "polyscope_x", "PolyScope X (10.8.0)"),
+        (
+            {"polyscope": "10.9.9.0"},
+            "polyscope_x",
+            "PolyScope X 10.9.9, and the rig knows how to stop an arm there from 10.10",
+        ),
+        ({"polyscope": "10.10.0.0", "primary": False}, "no_primary_interface", "stops a PolyScope X there"),
+        ({"polyscope": "10.9.9.0", "primary": False}, "polyscope_x", "PolyScope X 10.9.9"),
         ({"dashboard": False}, "no_dashboard", "does not answer"),
     ],
-    ids=["UR20", "lengths", "CB3", "PolyScope X with a dashboard", "closed dashboard"],
+    ids=["UR20", "lengths", "CB3", "PolyScope X 10.9", "closed primary", "both", "closed dashboard"],
 )
 def test_a_look_tells_any_other_arm_by_name(world: World, arm: Mapping[str, Any], name: str, words: str) -> None:
     problem = refusal(world({"world": {"arm": arm}}).host)

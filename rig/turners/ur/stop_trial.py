@@ -1,0 +1,46 @@
+"""A trial of the stop, before anything moves: on a PolyScope X, where the only way beside the client's tells nothing.
+
+Its primary interface takes lines in remote control alone, which controllers before 10.12 do not tell, and acknowledges
+none. So it is given a program that moves nothing, and told to end it by the line that has to stop the arm.
+"""
+
+from collections.abc import Callable
+from contextlib import closing
+
+from rig.errors import Problem
+from rig.motion.state import RuntimeState
+from rig.turners.ur.condition import local_control
+from rig.turners.ur.primary_stop import PrimaryStop
+from rig.turners.ur.robot_api import RobotApi
+
+PROGRAM = "def rig_stop_trial():\n  while True:\n    sync()\n  end\nend\n"
+BEGIN_S = 5.0  # as long as the client's own program may take to begin
+END_S = 2.0
+
+
+def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], bool]) -> Problem | None:
+    """Why the arm at `host` could not be stopped by its primary interface, or None: a program was, just now.
+
+    `shows(state, timeout_s)` waits for a state of the arm in which its program is so.
+    """
+    if api.in_remote_control() is False:
+        return local_control(host)
+    try:
+        with closing(PrimaryStop(host, BEGIN_S)) as primary:
+            primary.send(PROGRAM)
+            if not shows(RuntimeState.PLAYING, BEGIN_S):
+                return _not_proved(host, "began no program that was sent to it there")
+            primary.stop_program()
+            if not shows(RuntimeState.STOPPED, END_S):
+                return _not_proved(host, "did not end a program that moves nothing, which may still run")
+    except OSError as error:
+        return _not_proved(host, f"does not answer ({error})")
+    return None
+
+
+def _not_proved(host: str, what: str) -> Problem:
+    return Problem(
+        "stop_not_proved",
+        f"the rig could not stop the arm at {host} by its primary interface (port 30001): the controller {what}",
+        "Switch the pendant to remote control, and enable the primary client interface in the security settings",
+    )
