@@ -50,13 +50,15 @@ class Curve:
 class Allowed:
     """What is known of arm, site and sensor, each as a standard deviation.
 
-    `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
+    `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; and of its
+    angle about what its encoder tells at one mark, `encoder_rad`, zero where all sweeps are whole turns; `jitter_s` of
     the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
     it is not known; `curve` is the sensor's nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
     """
 
     angles_rad: Array
     repeatability_rad: float
+    encoder_rad: float
     jitter_s: float
     earth_rad_s: Array
     curve: Curve
@@ -75,6 +77,7 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
         surroundings.uncertainty,
         (name, sensor.part, sensor.range_rad_s or 0.0),
         finds_curve=explained is not None and explained.nonlinearity is not None,
+        arcs=any(each.arc_rad is not None for each in result.observations),
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
         sensor=None if explained is None else explained.seen.sensor,
@@ -87,6 +90,7 @@ def allowed_of(
     of: tuple[str, str, float],
     *,
     finds_curve: bool,
+    arcs: bool,
     jitter_s: float,
     earth_rad_s: Array,
     sensor: KnownSensor | None,
@@ -99,6 +103,7 @@ def allowed_of(
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
+        encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
         jitter_s=jitter_s,
         earth_rad_s=earth_rad_s,
         curve=Curve(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
@@ -135,6 +140,7 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
     of_the_arm = np.concatenate(
         [
             _of_angles(pieces, known),
+            _of_marks(pieces, known.encoder_rad),
             _of_times(pieces, known.jitter_s),
             *_of_speeds(pieces),
             np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
@@ -156,11 +162,36 @@ def _of_angles(pieces: Pieces, known: Allowed) -> Array:
         if sweep < REST:
             for ends in _ends(stretch):
                 again.append(np.zeros(pieces.means_rad_s.shape))
-                again[-1][place] = np.hypot(known.repeatability_rad, stretch.unseen_rad) * ends
+                unseen_rad = np.hypot(stretch.unseen_rad, known.encoder_rad)
+                again[-1][place] = np.hypot(known.repeatability_rad, unseen_rad) * ends
     for visit in _visits(pieces):
         there = np.isin(pieces.sweep, visit)[:, None]
         again += [known.repeatability_rad * np.where(there, each[zero], 0.0) for zero in ZEROS]
     return np.concatenate([known.angles_rad[:, None, None] * each, again])
+
+
+def _of_marks(pieces: Pieces, encoder_rad: float) -> Array:
+    """Patterns of what a joint's encoder errs at each angle where parts of sweeps begin or end.
+
+    Marks that lie within a part's quarter are one: a sweep back has the same as the sweep there.
+    """
+    marks: list[tuple[int, float]] = []
+    found: list[Array] = []
+    for place, (sweep, stretch) in enumerate(zip(pieces.sweep, pieces.stretches, strict=True)):
+        if sweep <= REST or not encoder_rad:
+            continue
+        q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
+        moved = q_rad[1] - q_rad[0]
+        joint = int(np.argmax(np.abs(moved)))
+        axis = flange_axes(q_rad[0], stretch.motion.kinematics)[:, joint] / (stretch.end_s - stretch.start_s)
+        for end, angle in zip((-1.0, 1.0), q_rad[:, joint], strict=True):
+            apart = [abs(at - angle) if of == joint else np.inf for of, at in marks]
+            mark = next((each for each, by in enumerate(apart) if by < abs(moved[joint]) / 4), len(marks))
+            if mark == len(marks):
+                marks.append((joint, float(angle)))
+                found.append(np.zeros(pieces.means_rad_s.shape))
+            found[mark][place] += end * encoder_rad * axis
+    return np.array(found).reshape(-1, *pieces.means_rad_s.shape)
 
 
 def _visits(pieces: Pieces) -> list[list[int]]:

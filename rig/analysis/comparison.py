@@ -63,7 +63,8 @@ class Deviation:
 class RevolutionError:
     """Mean reading less mean reference over one whole turn, (3,) rad/s, and what noise leaves uncertain of it.
 
-    `gravity_rad_s` (3,) is what of it gravity adds to the reading, None where no calibration tells.
+    Or over an arc: `angle_rad` is how far the joint turned. `gravity_rad_s` (3,) is what of it gravity adds to the
+    reading, None where no calibration tells.
     """
 
     sweep: int
@@ -72,6 +73,7 @@ class RevolutionError:
     error_rad_s: Array
     std_rad_s: Array
     gravity_rad_s: Array | None
+    angle_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +232,6 @@ def _revolution_errors(
     stds = np.sqrt(np.diagonal(tested.covariance_rad2_s2 + known.covariance_rad2_s2, axis1=1, axis2=2))
     held = [None] * len(turns) if gravity_rad_s is None else gravity_rad_s
     return tuple(
-        RevolutionError(turn.sweep, turn.joint_name, turn.direction, error, std, gravity)
+        RevolutionError(turn.sweep, turn.joint_name, turn.direction, error, std, gravity, turn.angle_rad)
         for turn, error, std, gravity in zip(turns, errors, stds, held, strict=True)
     )

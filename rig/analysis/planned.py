@@ -82,6 +82,7 @@ def _told_from(
         known,
         of,
         finds_curve=len(speeds) > 1,
+        arcs=settings.has_arcs,
         jitter_s=0.0,
         earth_rad_s=any_earth_rate(known=site.earth_rate_rad_s is not None or settings.finds_earth_rate),
         sensor=known_sensor(known, of, np.zeros(len(at_s)), 0.0),

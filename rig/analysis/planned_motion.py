@@ -27,10 +27,10 @@ class Timed(Generic[StepT_co]):
 
     @property
     def window_s(self) -> tuple[float, float]:
-        """When what counts of it begins and ends: of a sweep its whole turn at constant speed."""
+        """When what counts of it begins and ends: of a sweep its whole turn, or its arc, at constant speed."""
         if not isinstance(self.step, Sweep):
             return self.start_s, self.end_s
-        middle, half = (self.start_s + self.end_s) / 2, np.pi / self.step.speed_rad_s
+        middle, half = (self.start_s + self.end_s) / 2, self.step.angle_rad / 2 / self.step.speed_rad_s
         return middle - half, middle + half
 
 

@@ -57,6 +57,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty)
         if run.settings.knows_returns
         else None,
+        encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
         sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
@@ -116,6 +117,26 @@ def _return_errors(turns: Sequence[Observation], rests: int, known: Uncertainty)
     return np.concatenate([off, np.zeros((len(off), rests, 3))], axis=1)
 
 
+def _encoder_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array | None:
+    """(P, N, 3) errors as in `Seen`, of what a joint's encoder errs at each mark where arcs begin or end.
+
+    Sweeps one way and the other have the same marks, so the same errors: these are no noise, and repeats do not lessen
+    them. None where all sweeps are whole turns, which end at the mark where they began.
+    """
+    arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
+    marks = list(dict.fromkeys((arc[0], end) for arc in arcs if arc is not None for end in arc[1:]))
+    if not marks:
+        return None
+    off = np.zeros((len(marks), len(turns) + rests, 3))
+    for place, (turn, arc) in enumerate(zip(turns, arcs, strict=True)):
+        if arc is not None:
+            joint, low, high = arc
+            by_one = known.angle_std_rad / (high - low) * turn.speed_rad_s * turn.axis_flange
+            off[marks.index((joint, high)), place] += by_one
+            off[marks.index((joint, low)), place] -= by_one
+    return off
+
+
 def _visits(turns: Sequence[Observation]) -> list[list[int]]:
     """The places of sweeps that follow each other about one axis."""
     found: list[list[int]] = [[0]]
@@ -170,6 +191,7 @@ def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: Ear
         state_jitter_freedom=surroundings.state_jitter_freedom,
         axis_rad=float(np.radians(known.axis_deg)),
         repeatability_rad=float(np.radians(known.repeatability_deg)),
+        angle_std_rad=0.0 if known.angle_std_deg is None else known.angle_std_rad,
         sensor_offset_m=known.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,

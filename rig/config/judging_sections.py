@@ -177,6 +177,13 @@ class UncertaintySection(Section):
         description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
         "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
     )
+    angle_std_deg: float | None = Field(
+        default=None,
+        ge=0,
+        le=5,
+        description="standard deviation of a joint's angle about what its encoder tells: for sweeps that are no whole "
+        "turns. No default, for no maker of these arms states it; whole turns do not need it",
+    )
     sensor_offset_mm: float = Field(
         default=50.0,
         ge=0,

@@ -28,6 +28,7 @@ __all__ = [
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
+LONGEST_SWEEP_S = 720  # once round at the slowest speed
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
@@ -66,6 +67,14 @@ class SixSweepsSection(ProcedureSection):
         description="several speeds in place of `speed_deg_s`: every sweep is made at each speed, which shows the "
         "nonlinearity of the sensor",
     )
+    arc_deg: float = Field(
+        default=360.0,
+        ge=30,
+        le=3600,
+        description="how far a sweep turns at constant speed, centred on `arm.home_deg`; 360 and its multiples are "
+        "whole turns, whose angle is known by closure of the circle; of any other the encoders tell it: "
+        "`uncertainty.angle_std_deg`",
+    )
     acceleration_deg_s2: float = Field(
         default=240.0,
         ge=0.1,
@@ -100,6 +109,11 @@ class SixSweepsSection(ProcedureSection):
         return self.earth_rate == "find"
 
     @property
+    def arcs(self) -> bool:
+        """Whether sweeps are no whole turns."""
+        return self.arc_deg % 360 != 0
+
+    @property
     def speeds(self) -> tuple[float, ...]:
         """The speeds at which every sweep is made, °/s."""
         return self.speeds_deg_s or (self.speed_deg_s,)
@@ -113,10 +127,27 @@ class SixSweepsSection(ProcedureSection):
                     f"procedure.{key} {max(self.speeds):g} is too fast for sensors.{name}.range_deg_s "
                     f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
                 )
+        yield from self._arc_problems(config)
         if config.site.latitude_deg is not None and config.site.heading_deg is None and not self.finds_earth_rate:
             yield "site needs latitude_deg and heading_deg, or neither; procedure.earth_rate: find needs no heading"
         if self.needs_reference:
             yield from verification_problems(config)
+
+    def _arc_problems(self, config: RigConfig) -> Iterator[str]:
+        """An arc that nobody knows well enough, or that takes longer than a board keeps readings."""
+        if self.arcs and config.uncertainty.angle_std_deg is None:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders tell how far a sweep went: give "
+                "uncertainty.angle_std_deg, how far a joint may be from the angle that its encoder tells"
+            )
+        if self.arcs and self.finds_earth_rate:
+            yield f"procedure.earth_rate: find needs whole turns, and procedure.arc_deg is {self.arc_deg:g}"
+        slowest = min(self.speeds)
+        if self.arc_deg / slowest > LONGEST_SWEEP_S:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} takes {self.arc_deg / slowest:.0f} s at {slowest:g} °/s: the "
+                f"board keeps the readings of {LONGEST_SWEEP_S} s"
+            )
 
 
 class SixObservationSection(SixSweepsSection):
@@ -266,6 +297,11 @@ class ImuSection(SixSweepsSection, AttitudesSection):
         """The problems of the sweeps and of the attitudes."""
         yield from SixSweepsSection.problems(self, config)
         yield from AttitudesSection.problems(self, config)
+        if self.arc_deg != 360:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} is not for imu: of each sweep an accelerometer's wave is found, "
+                "which is that of one whole turn; leave it at 360, or use six_observation"
+            )
 
     name: Literal["imu"] = Field(default="imu", description="this procedure")
     axes: Literal[3, 6] = Field(

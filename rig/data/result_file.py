@@ -211,7 +211,11 @@ class AverageEntry(Entry):
 
 
 class ObservationEntry(Entry):
-    """One revolution and the mean reading over it; of a joint, where an arm made it."""
+    """One revolution and the mean reading over it; of a joint, where an arm made it.
+
+    `angle_rad` is how far it turned: 2π, several of these, or an arc by the encoders. Results of before leave it out,
+    which know whole turns.
+    """
 
     sweep: int
     joint: str | None = None
@@ -220,6 +224,7 @@ class ObservationEntry(Entry):
     sign: Literal[1, -1]
     axis_flange: Vector3
     speed_rad_s: float
+    angle_rad: float | None = None
     speed_std_rad_s: float
     lost: int
     mean_rad_s: Vector3
@@ -344,6 +349,8 @@ class DeviationEntry(Entry):
 class RevolutionErrorEntry(Entry):
     """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known.
 
+    Or over an arc: `angle_rad` is how far the joint turned, left out in results of before, which know whole turns.
+
     With gravity the flange's circling, which is felt as gravity is.
     """
 
@@ -353,6 +360,7 @@ class RevolutionErrorEntry(Entry):
     error_rad_s: Vector3
     std_rad_s: Vector3
     gravity_rad_s: Vector3 | None = None
+    angle_rad: float | None = None
 
 
 class ComparisonEntry(Entry):

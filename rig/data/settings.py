@@ -102,6 +102,9 @@ class Site:
 class Uncertainty:
     """Half-widths of what no recording shows: all values between, either way, are equally likely.
 
+    But `angle_std_deg`, which is a standard deviation, None where nobody stated it: of a joint's angle about what its
+    encoder tells.
+
     Those of sensors stand by name: recordings of before do not say all of them, and take what is known of the part.
     `decision_rule` says whether a limit is held against the value alone ("simple") or against the value with its
     expanded uncertainty ("guard_band").
@@ -116,6 +119,7 @@ class Uncertainty:
     decision_rule: DecisionRule
     repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
     acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
+    angle_std_deg: Annotated[float, Field(ge=0)] | None = None
     nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     asymmetry_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
@@ -127,6 +131,13 @@ class Uncertainty:
     acceleration_bias_mg_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     acceleration_scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     acceleration_bias_instability_ug: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+
+    @property
+    def angle_std_rad(self) -> float:
+        """Standard deviation of a joint's angle. Raises Refused `angle_std_not_stated`."""
+        if self.angle_std_deg is None:
+            raise _angle_std_not_stated()
+        return float(np.radians(self.angle_std_deg))
 
     def of(self, what: OfSensor, name: str, part: str) -> float:
         """What is known of a sensor of that name; what is known of the part where nothing is said of the sensor."""
@@ -154,12 +165,13 @@ class Elsewhere:
 
 @dataclass(frozen=True, slots=True)
 class PlannedSweep:
-    """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed."""
+    """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed, how far it turns."""
 
     index: int
     joint_name: str
     direction: str
     speed_rad_s: Positive
+    angle_rad: Positive = 2 * np.pi  # as all were in recordings of before
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,6 +254,13 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def has_arcs(self) -> bool:
+        """Whether a sweep is planned that is no whole turn."""
+        from rig.motion.steps import closes
+
+        return not all(closes(sweep.angle_rad) for sweep in self.planned_sweeps)
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
@@ -296,12 +315,20 @@ def settings_from_json(text: str) -> RunSettings:
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
-    """The settings of a new run; `plan` is that of the whole procedure."""
+    """The settings of a new run; `plan` is that of the whole procedure.
+
+    Raises Refused `angle_std_not_stated` where it has arcs that nobody says how well the encoders tell.
+    """
     reference = None
     if config.reference is not None:
         name, section = config.reference
         reference = KnownReference(name, section.turntable.scale, section.turntable.bias_rad_s)
-    return RunSettings(
+    uncertainty = _uncertainty(config)
+    planned = tuple(
+        PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s, sweep.angle_rad)
+        for sweep in plan.sweeps
+    )
+    settings = RunSettings(
         procedure=config.procedure.name,
         then_verify=config.procedure.then_verify,
         observation=ObservationThresholds(**config.observation.model_dump()),
@@ -309,17 +336,27 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         to_calibrate=tuple(config.to_calibrate),
         reference=reference,
         home_q_rad=plan.home_q_rad,
-        planned_sweeps=tuple(
-            PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
-        ),
+        planned_sweeps=planned,
         matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
         site=_site(config.site),
-        uncertainty=_uncertainty(config),
+        uncertainty=uncertainty,
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
         extension_m=config.turner.extension_m,
         reckoning=RECKONING,
+    )
+    if settings.has_arcs and uncertainty.angle_std_deg is None:
+        raise _angle_std_not_stated()
+    return settings
+
+
+def _angle_std_not_stated() -> Refused:
+    return Refused(
+        "angle_std_not_stated",
+        "a sweep is no whole turn, so the encoders tell how far it went, and nobody says how well",
+        "Give uncertainty.angle_std_deg, how far a joint may be from the angle that its encoder tells, or sweep whole "
+        "turns",
     )
 
 

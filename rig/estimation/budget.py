@@ -18,6 +18,7 @@ from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.vector_fit import Explained, Seen
 
 CLOCK = "controller clock"
+ENCODERS = "turner's encoders"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -99,10 +100,11 @@ class Budget:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
+    """What no recording shows: half-widths, but for what is named `std` and `state_jitter_s`.
 
-    `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width` is there where it is that of any
-    such clock; `axis_rad` is the direction of each swept axis, `repeatability_rad` an angle that is come back to,
+    These are standard uncertainties. `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width`
+    is there where it is that of any such clock; `axis_rad` is the direction of each swept axis, `repeatability_rad` an
+    angle that is come back to, `angle_std_rad` that of a joint about what its encoder tells, at the ends of arcs,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
     how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
     `counts_freedom` says whether they make the coverage factor.
@@ -122,6 +124,7 @@ class Unknown:
     earth_freedom: float = np.inf
     counts_freedom: bool = True
     repeatability_rad: float = 0.0
+    angle_std_rad: float = 0.0
 
 
 def uncounted(unknown: Unknown) -> Unknown:
@@ -171,6 +174,10 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
             float(np.degrees(unknown.repeatability_rad)),
         )
         yield assumed("arm's repeatability", half_width, "°", "uncertainty.repeatability_deg", again)
+    if seen.encoder_errors_rad_s is not None:
+        spread = of(seen.encoder_errors_rad_s @ matrix.T)
+        stated = 2 * float(np.degrees(unknown.angle_std_rad))
+        yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off

@@ -33,10 +33,11 @@ class Seen:
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
     own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
-    for each time they do, None in recordings of before; `arms_m` (N, 3) a way from the axis that turns to where the
-    sensor is taken to sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3): with
-    how many degrees of freedom the variances are known. `sensor` is what is known of the sensor beforehand, None in
-    recordings of before.
+    for each time they do, None in recordings of before; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
+    at the ends of arcs, None where all sweeps are whole turns; `arms_m` (N, 3) a way from the axis that turns to where
+    the sensor is taken to sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3):
+    with how many degrees of freedom the variances are known. `sensor` is what is known of the sensor beforehand, None
+    in recordings of before.
     """
 
     means_rad_s: Array
@@ -53,6 +54,7 @@ class Seen:
     arms_m: Array | None = None
     noise_freedom: Array | float = np.inf
     sensor: KnownSensor | None = None
+    encoder_errors_rad_s: Array | None = None
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
@@ -84,9 +86,10 @@ class Seen:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """(P, N, 3) what both kinds of errors of the arm's angles add."""
+        """(P, N, 3) what all kinds of errors of the arm's angles add."""
         none = np.zeros((0, *self.means_rad_s.shape))
-        return np.concatenate([none, *(e for e in (self.axis_errors_rad_s, self.return_errors_rad_s) if e is not None)])
+        kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s)
+        return np.concatenate([none, *(each for each in kinds if each is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
         """What a sensor of that F (3, 3) may do beside the model."""

@@ -13,6 +13,8 @@ from rig.motion.state import Joints
 
 # Joint angles closer than this are the same place: well above the encoder's step, well below anything that matters.
 SAME_PLACE_RAD = 1e-4
+TURN_RAD = 2 * math.pi
+CLOSED_RAD = 1e-6  # what rounding may take from a whole turn, or add to it
 
 
 class Motion(Protocol):
@@ -34,12 +36,12 @@ class Motion(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """One wrist through one revolution at constant speed, with ramps and margins outside the revolution.
+    """One wrist through one revolution, or an arc, at constant speed, with ramps and margins outside of it.
 
     `index` counts the procedure's sweeps and dwells from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw"
     for a growing joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity
     in the flange frame, sign included, as of the nominal arm. `revolution_rad` is the (low, high) joint angle of the
-    revolution: exactly 2π, centred on the home pose.
+    revolution or the arc, centred on the home pose.
     """
 
     index: int
@@ -61,6 +63,12 @@ class Sweep:
     @property
     def target_q_rad(self) -> Joints:
         return self.end_q_rad
+
+    @property
+    def angle_rad(self) -> float:
+        """How far it turns while it is averaged: exactly 2π n where that is n whole turns."""
+        low, high = self.revolution_rad
+        return TURN_RAD * round((high - low) / TURN_RAD) if closes(high - low) else high - low
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +142,19 @@ class Plan:
     @property
     def motions(self) -> tuple[Sweep | Transfer, ...]:
         return tuple(step for step in self.steps if isinstance(step, (Sweep, Transfer)))
+
+
+def closes(angle_rad: float) -> bool:
+    """Whether an angle is one or several whole turns: then it is known by the closure of the circle."""
+    turns = round(angle_rad / TURN_RAD)
+    return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSED_RAD
+
+
+def turn_words(angle_rad: float) -> str:
+    """An angle in words: a whole turn, so many of them, or degrees."""
+    turns = round(angle_rad / TURN_RAD)
+    whole = "a whole turn" if turns == 1 else f"{turns} whole turns"
+    return whole if closes(angle_rad) else f"{math.degrees(angle_rad):g}°"
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:

@@ -19,7 +19,7 @@ from rig.observation.windows import Window
 
 MIN_RATE_RAD_S = 0.01
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
-ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
+ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
 
 
 class ArmMotion:
@@ -87,7 +87,7 @@ class ArmMotion:
         return angle
 
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
-        """The whole turn of a sweep that was made in a window.
+        """The whole turn, or the arc, of a sweep that was made in a window.
 
         Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
         `other_joint_moved`.
@@ -106,6 +106,7 @@ class ArmMotion:
             axis_errors=growing * axis_errors(began, sweep.joint, self.kinematics),
             arm_m=flange_arm(began, sweep.joint, self.kinematics),
             station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
+            angle_rad=sweep.angle_rad,
         )
 
     def table(self) -> dict[str, Array]:

@@ -23,21 +23,22 @@ class Passing:
     """What comes and goes in a turn of n readings.
 
     The arm's rate less its mean (n,), as the encoders have it where that is `covered` (n,); columns `turning` (n, k) of
-    once and twice a turn.
+    once and twice a turn, of an arc less their means. Whole turns are `closed`.
     """
 
     rate_rad_s: Array
     covered: NDArray[np.bool_]
     turning: Array
+    closed: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Averaging:
     """One way of averaging readings (n, 3) in steps of a count.
 
-    `turned(readings, count, passing)` is the mean over a whole turn; `rested(readings, time_s, window, count)` that of
-    an arm which stands, and from when to when it is said to last. Beside a harmonic `colour(residuals)` is the factor
-    on the variance by residuals (n,) that are not white, `swings(residuals)` are the columns of what swings in
+    `turned(readings, count, passing)` is the mean over whole turns or an arc; `rested(readings, time_s, window, count)`
+    that of an arm which stands, and from when to when it is said to last. Beside a harmonic `colour(residuals)` is the
+    factor on the variance by residuals (n,) that are not white, `swings(residuals)` are the columns of what swings in
     residuals (n, 3), None where one line alone is looked for.
     """
 
@@ -71,7 +72,7 @@ def _turned(readings: Array, count: float, passing: Passing) -> Mean:
 def _turned_beside_lines(readings: Array, count: float, passing: Passing) -> Mean:
     """Does so too, and few readings tell no lines."""
     if len(readings) >= FEWEST and passing.covered.all():
-        return mean_beside_lines(readings, count, passing.turning, passing.rate_rad_s)
+        return mean_beside_lines(readings, count, passing.turning, passing.rate_rad_s, closed=passing.closed)
     return _turned(readings, count, passing)
 
 

@@ -33,16 +33,21 @@ class Noise:
     freedom: Array
 
 
-def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array) -> Mean:
-    """The mean of readings (n, 3) in steps of `count`, evenly spaced, over a whole turn.
+def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array, *, closed: bool = True) -> Mean:
+    """The mean of readings (n, 3) in steps of `count`, evenly spaced, over whole turns (`closed`) or an arc.
 
     `turning` (n, k) comes and goes in a turn. `rate` (n,) is the arm's less its mean, as the encoders have it: they see
     not all that vibrates, and some that does not, so it counts only for what no line explains. What it has of the lines
-    themselves is missing from the mean: see `rig.observation.arm_beside_lines`.
+    themselves is missing from the mean: see `rig.observation.arm_beside_lines`. Where a turn is not closed a ripple of
+    it does not end where it began. So beside its lines the rate has a mean of its own, which is left out of the fit: it
+    would be told from the readings' mean badly.
     """
     steady = np.column_stack([np.ones(len(readings)), turning])
     cycles = lines(readings - steady @ fitted(steady, readings), STANDS_OUT)
     shaking = _columns(cycles, len(readings))
+    if shaking.size and not closed:
+        others = np.column_stack([steady, shaking])
+        rate = rate - others @ fitted(others, rate[:, None])[:, 0]
     columns = np.column_stack([steady, shaking, rate])
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=None)
     noise = noise_of(readings - columns @ coefficients, int(rank), count, BRIEF if shaking.size else MEMORIES)

@@ -51,7 +51,7 @@ class Motion(KnownMotion, Protocol):
         ...
 
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
-        """The whole turn of a sweep made in a window. Raises Fault where there is none, or no proper one."""
+        """The whole turn or the arc of a sweep made in a window. Raises Fault where there is none, or no proper one."""
         ...
 
 

@@ -1,8 +1,10 @@
 """From a recording to averaged revolutions: what the estimators see.
 
-An observation is the mean reading over exactly one turn of a joint. Over a whole turn the mean speed is 2π/T whatever
-the servo's vibration, so the vibration is no noise either: the noise's variance comes from what is left of the readings
-once lines and the arm's measured rate are taken out of them. What of a line the encoders see is taken out of 2π/T too.
+An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
+speed is 2π/T whatever the servo's vibration, over an arc it is Δθ/T by the encoders at its ends. Either way the mean
+times T is the integral of the readings between the ends, so the vibration is no noise either: the noise's variance
+comes from what is left of the readings once lines and the arm's measured rate are taken out of them. What of a line the
+encoders see is taken out of 2π/T too.
 The mean comes first; squaring is the estimator's business.
 
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
@@ -43,7 +45,9 @@ MIN_RESTS = 3  # to tell whether the bias drifts
 class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
 
-    Of a mean beside lines, `speed_rad_s` and `axis_flange` are beside what the encoders see of the same lines.
+    Or an arc of `angle_rad` at Δθ/T; `arc_rad` are the joint's angles at its ends, the lower first, None of whole
+    turns, over which no encoder errs. Of a mean beside lines, `speed_rad_s` and `axis_flange` are beside what the
+    encoders see of the same lines.
 
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
@@ -67,6 +71,8 @@ class Observation:
     axis_errors: Array | None = None
     arm_m: Array | None = None
     acceleration: SweptAcceleration | None = None
+    angle_rad: float | None = None
+    arc_rad: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,11 +220,14 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-    waves = [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]
+    waves = np.array([wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]).T
+    if not turn.closed:
+        waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
     passing = Passing(
         motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s,
         covered,
-        np.array(waves).T,
+        waves,
+        turn.closed,
     )
     found = averaging.turned(stream.readings_rad_s[inside], stream.sensor.channel(RATE).resolution, passing)
     average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
@@ -241,6 +250,8 @@ def _observation(
         average=average,
         axis_errors=turn.axis_errors,
         arm_m=turn.arm_m,
+        angle_rad=turn.angle_rad,
+        arc_rad=None if turn.closed else sweep.revolution_rad,
     )
 
 

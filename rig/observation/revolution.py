@@ -1,4 +1,4 @@
-"""The arm's side of an observation: when a joint turned through exactly one revolution, and whether properly."""
+"""The arm's side of an observation: when a joint turned through exactly its revolution or arc, and whether properly."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.motion.steps import Sweep
+from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
 
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
@@ -20,7 +20,7 @@ MIN_SPEED_FRACTION = 0.995
 
 @dataclass(frozen=True, slots=True)
 class Revolution:
-    """Exactly 2π of joint travel between two controller times.
+    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc as far as the encoders tell.
 
     `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
     the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
@@ -37,16 +37,22 @@ class Revolution:
     axis_errors: Array
     arm_m: Array
     station: tuple[float, ...]
+    angle_rad: float = TURN_RAD
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is whole turns: over these an encoder errs by nothing, and gravity's share averages out."""
+        return closes(self.angle_rad)
 
     @property
     def duration_s(self) -> float:
-        """Duration T of the revolution."""
+        """Duration T of the turn."""
         return self.end_s - self.start_s
 
     @property
     def speed_rad_s(self) -> float:
-        """2π/T: the mean speed, whatever the vibration."""
-        return float(2 * np.pi / self.duration_s)
+        """Δθ/T, of a revolution 2π/T: the mean speed, whatever the vibration."""
+        return float(self.angle_rad / self.duration_s)
 
     @property
     def speed_std_rad_s(self) -> float:
@@ -73,7 +79,7 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
     where, (low, high) = describe(sweep), sweep.revolution_rad
     time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
     travelled = angle - low if sweep.direction == "ccw" else high - angle
-    first, last = _inside(travelled, high - low, where)
+    first, last = _inside(travelled, high - low, sweep)
     turning = states[first : last + 1]
     gap = float(np.diff(time_s[first - 1 : last + 2]).max())
     if gap > MAX_STATE_GAP_S:
@@ -98,7 +104,7 @@ def arm_states_lost(where: str, extent: str) -> Fault:
     )
 
 
-def _inside(travelled: Array, turn_rad: float, where: str) -> tuple[int, int]:
+def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
     """Indices of the first and the last state within the revolution, which has states before and after it."""
     entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
     exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
@@ -107,9 +113,13 @@ def _inside(travelled: Array, turn_rad: float, where: str) -> tuple[int, int]:
     turned = float(np.ptp(travelled)) if len(travelled) else 0.0
     raise Fault(
         "incomplete_revolution",
-        f"in {where} the joint turned {np.degrees(turned):.0f}° and not through the whole revolution",
+        f"in {describe(sweep)} the joint turned {np.degrees(turned):.0f}° and not through {_extent(sweep)}",
         "Repeat the sweep; resume the run if it was interrupted",
     )
+
+
+def _extent(sweep: Sweep) -> str:
+    return "the whole revolution" if sweep.angle_rad == TURN_RAD else turn_words(sweep.angle_rad)
 
 
 def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:

@@ -8,19 +8,24 @@ import numpy as np
 from rig.config.section import Vector3
 from rig.motion.geometry import flange_attitude
 from rig.motion.state import Joints
-from rig.motion.steps import Dwell, Rest, Step, Sweep, Transfer
+from rig.motion.steps import Dwell, Rest, Step, Sweep, Transfer, closes
 
+ON_THE_WAY = 24  # poses of an arc
 NEGLIGIBLE = 1e-6  # of the largest singular value: what attitudes do not tell is left alone
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is averaged: the flange's rate, where the arm stands (a sweep: begins), when, how long."""
+    """What is averaged: the flange's rate, where the arm stands (a sweep: begins), when, how long.
+
+    `on_the_way` are poses evenly along an arc; there are none along whole turns.
+    """
 
     rate_rad_s: Vector3
     q_rad: Joints
     middle_s: float
     duration_s: float
+    on_the_way: tuple[Joints, ...] = ()
 
 
 def drift_effect(steps: Sequence[Step]) -> float:
@@ -37,6 +42,9 @@ def drift_effect(steps: Sequence[Step]) -> float:
     turning = speeds[:, 0] > 0
     axes = rates[turning] / speeds[turning]
     downwards[turning] = np.sum(downwards[turning] * axes, axis=1, keepdims=True) * axes  # the mean over a whole turn
+    for place, look in enumerate(looks):
+        if look.on_the_way:
+            downwards[place] = flange_attitude(np.array(look.on_the_way)).mean(axis=0) @ (0.0, 0.0, -1.0)
     middles = np.array([look.middle_s for look in looks])
     ramp = (middles - middles.mean()) / np.ptp(middles)
     root = np.sqrt([look.duration_s for look in looks])
@@ -47,6 +55,15 @@ def drift_effect(steps: Sequence[Step]) -> float:
     return float(np.sqrt(taken[:3] @ taken[:3] + 3 * taken[3] ** 2))  # the three axes drift alike
 
 
+def _on_the_way(sweep: Sweep) -> tuple[Joints, ...]:
+    if closes(sweep.angle_rad):
+        return ()
+    q_rad = np.tile(sweep.start_q_rad, (ON_THE_WAY, 1))
+    low, high = sweep.revolution_rad
+    q_rad[:, sweep.joint] = low + (np.arange(ON_THE_WAY) + 0.5) / ON_THE_WAY * (high - low)
+    return tuple(map(tuple, q_rad.tolist()))
+
+
 def _looks(steps: Sequence[Step]) -> Iterator[Look]:
     """The sweeps, the rests after them, and the dwells."""
     time_s, here = 0.0, None
@@ -55,7 +72,7 @@ def _looks(steps: Sequence[Step]) -> Iterator[Look]:
         match step:
             case Sweep():
                 x, y, z = (step.speed_rad_s * axis for axis in step.axis_flange)
-                yield Look((x, y, z), step.start_q_rad, middle_s, step.duration_s)
+                yield Look((x, y, z), step.start_q_rad, middle_s, step.duration_s, _on_the_way(step))
                 here = step.end_q_rad
             case Transfer():
                 here = step.target_q_rad

@@ -56,8 +56,9 @@ def plan_six_observation(
     """The movement of SIX, Section III: each wrist in its order turns one way, rests, turns back, rests.
 
     With `axes: 6` wrist 1 turns about three axes more, with wrists 2 and 3 turned; with several speeds all of it is
-    made at each. What the file leaves open of order and directions is chosen so that a steady drift of the bias does
-    least harm (`drift_effect`). The whole series repeats `procedure.repeats` times.
+    made at each. A sweep turns by `arc_deg` about the home pose, once round if nothing else is said. What the file
+    leaves open of order and directions is chosen so that a steady drift of the bias does least harm (`drift_effect`).
+    The whole series repeats `procedure.repeats` times.
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly, and it ends
     at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
@@ -148,7 +149,8 @@ def _sweep(
 ) -> Sweep:
     joint, pose = station.joint, station.pose_q_rad
     speed, acceleration = math.radians(speed_deg_s), math.radians(procedure.acceleration_deg_s2)
-    half_travel = math.pi + math.radians(procedure.margin_deg) + speed**2 / (2 * acceleration)
+    half = math.radians(procedure.arc_deg) / 2
+    half_travel = half + math.radians(procedure.margin_deg) + speed**2 / (2 * acceleration)
     sign = 1 if direction == "ccw" else -1
     x, y, z = (sign * axis for axis in _axis(station))
     return Sweep(
@@ -162,7 +164,7 @@ def _sweep(
         speed_rad_s=speed,
         acceleration_rad_s2=acceleration,
         duration_s=trapezoid_duration(2 * half_travel, speed, acceleration),
-        revolution_rad=(pose[joint] - math.pi, pose[joint] + math.pi),
+        revolution_rad=(pose[joint] - half, pose[joint] + half),
     )
 
 

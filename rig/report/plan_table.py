@@ -14,7 +14,7 @@ from rich.table import Table
 from rig.config.models import RigConfig
 from rig.motion.doubts import doubts
 from rig.motion.state import JOINT_NAMES, Joints
-from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
+from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, closes, turn_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
@@ -119,6 +119,8 @@ def _print_steps(planned: Planned, console: Console) -> None:
     console.print(table)
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
     console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
+    if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:
+        console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, as far as the encoders tell that")
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(

@@ -6,7 +6,7 @@ from math import degrees
 from rig.motion.doubts import doubts
 from rig.motion.preflight import way_to_home
 from rig.motion.state import Report
-from rig.motion.steps import Plan
+from rig.motion.steps import Plan, turn_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 from rig.turners.kind import Words
@@ -28,7 +28,8 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
         f"First it goes home: {turns or 'it is there already'}.",
     ]
     if plan.sweeps:
-        lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than a whole turn each.")
+        far = turn_words(max(sweep.angle_rad for sweep in plan.sweeps))
+        lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than {far} each.")
     if plan.dwells:
         lines.append(f"Then it stands still in {len(plan.dwells)} attitudes; settling may add {plan.settling_s:.0f} s.")
     if repeated is not None:

@@ -178,9 +178,9 @@ class Rig:
             self.devices.turner.move(transfer, lambda: self._watch(transfer))
 
     def sweep(self, sweep: Sweep) -> None:
-        """Turn one wrist through a whole revolution at constant speed and note when it began and ended.
+        """Turn one wrist through a whole revolution, or an arc, at constant speed and note when it began and ended.
 
-        Afterwards, while the arm stands still, the board averages the revolution as well when it calibrates along.
+        Afterwards, while the arm stands still, the board averages it as well when it calibrates along.
         Raises `unplanned_motion`.
         """
         self._refuse_unplanned(sweep)

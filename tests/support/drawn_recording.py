@@ -26,6 +26,7 @@ from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sam
 WRISTS = (3, 4, 5)
 WAVE_SHARE = 0.3  # as the solver has it
 OUTWARDS_S = 0.1  # in which a joint that begins to move comes to where its friction holds it
+ARC_WAVES = np.arange(1, 5)  # of encoders: at ends 90°, 180° and 270° apart they err independently of each other
 OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
 
 
@@ -81,11 +82,16 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt."""
+    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt.
+
+    The truth beside it: `scale` (3,) at the sweeps' speed, either way, and what was read at each time without turning.
+    """
 
     run: RunData
     time_s: Array
     felt_rad_s: Array
+    scale: Array
+    bias_rad_s: Array
 
 
 def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
@@ -106,20 +112,20 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     known = motion.settings.uncertainty
     assert known is not None
     board_s, time_s = sample_times(setup, motion)
-    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng)
+    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng, setup.encoders_err)
     to_flange = flange_attitude(q_rad, arm)
     place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
     pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
     room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
     turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
-    felt = _felt(turned, pull, kind, rng)
+    felt, scale = _felt(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
     run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
     nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}  # is stated of this sensor beside what is of its kind
     of_its_kind = replace(known, **nothing)
     settings = replace(run.settings, uncertainty=of_its_kind)
-    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt)
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
 
 
 def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
@@ -137,13 +143,22 @@ def _counts(read: Array, kind: Kind) -> Array:
 
 
 def _beside_the_encoders(
-    motion: Motion, time_s: Array, known: Uncertainty, rng: np.random.Generator
+    motion: Motion, time_s: Array, known: Uncertainty, rng: np.random.Generator, encoders_err: float
 ) -> tuple[Array, Array, DenavitHartenberg]:
     """True angles and speeds, and how the arm is made; the encoders see neither."""
     q, qd = motion.joints(time_s)
     axis_rad, again_rad = np.radians([known.axis_deg, known.repeatability_deg])
     true, speed = q.copy(), qd.copy()
     once, twice = WAVE_SHARE * axis_rad / np.sqrt(3) * rng.standard_normal((2, 2, 6))
+    encoders = rng.spawn(1)[0].standard_normal((len(ARC_WAVES), 2, 6))  # drawn beside all else
+    if motion.settings.has_arcs:
+        encoders *= encoders_err * known.angle_std_rad / np.sqrt(len(ARC_WAVES))
+        once, twice = np.zeros((2, 2, 6))  # are among them
+        for joint in WRISTS:
+            angle, home = np.outer(q[:, joint], ARC_WAVES), motion.plan.home_q_rad[joint] * ARC_WAVES
+            cos, sin = encoders[:, :, joint].T
+            true[:, joint] += (np.cos(angle) - np.cos(home)) @ cos + (np.sin(angle) - np.sin(home)) @ sin
+            speed[:, joint] *= 1 + (np.cos(angle) * ARC_WAVES) @ sin - (np.sin(angle) * ARC_WAVES) @ cos
     for joint in WRISTS:
         e = q[:, joint]
         (a, b), (c, d) = once[:, joint], twice[:, joint]
@@ -168,18 +183,20 @@ def _beside_the_encoders(
     return true, speed, replace(NOMINAL, alpha_rad=alpha)
 
 
-def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> Array:
-    """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity."""
+def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, speed_rad_s: float) -> tuple[Array, Array]:
+    """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity; and its scale (3,)."""
     part = PARTS[kind.sensor.part]
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
     most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
-    along = along @ (np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad))
+    leaning = np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad)
+    along = along @ leaning
     cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
     scale = rng.uniform(0.9, 1.1, 3)
     even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
     felt: Array = along * (1 + cube * along**2 + even * along) / scale + pull @ to_gravity.T
-    return felt
+    whole = np.linalg.norm(leaning, axis=0)
+    return felt, scale / (whole * (1 + cube * (whole * speed_rad_s) ** 2))
 
 
 def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:

@@ -34,7 +34,7 @@ arm: {{host: 192.0.2.1, payload_kg: 0.35}}
 board: {{port: /dev/ttyACM0}}
 sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
 procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}{procedure}}}
-limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}
+limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}{uncertainty}
 """
 PROVENANCE = Provenance(
     started_utc="2026-11-21T00:00:00+00:00",
@@ -78,6 +78,8 @@ class Setup:
     follows_crystal: bool | None = False  # the board's word on its clock
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
     procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
+    angle_std_deg: float | None = None  # as it is stated of the encoders
+    encoders_err: float = 1.0  # as many times what is stated
     odd_per_rad_s: float = 0.0  # of each axis
     even_per_rad_s: float = 0.0
     told: DenavitHartenberg | None = None  # how its controller says it is made
@@ -99,6 +101,9 @@ class Motion:
             rest_s=setup.rest_s,
             repeats=setup.repeats,
             procedure="".join(f", {key}: {value}" for key, value in setup.procedure),
+            uncertainty=""
+            if setup.angle_std_deg is None
+            else f"\nuncertainty: {{angle_std_deg: {setup.angle_std_deg}}}",
         )
         config = parse(self.config).config
         assert isinstance(config.procedure, SixSweepsSection)

@@ -16,6 +16,7 @@ from rig.data.provenance import calls_itself_simulated
 from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
+from rig.motion.steps import closes, turn_words
 from rig.report.certificate.stated import Stated
 from rig.report.kinds.kind import Found, Without
 from rig.report.kinds.registry import kinds, shown
@@ -84,6 +85,16 @@ class Certificate:
     def elsewhere(self) -> bool:
         """Whether the readings were recorded elsewhere, and a file tells the motion."""
         return self.provenance.motion_file is not None
+
+    @property
+    def turns(self) -> str:
+        """What the sweeps turned through, in words."""
+        return f"turns by {' and '.join(self.arcs)}" if self.arcs else "whole turns"
+
+    @property
+    def arcs(self) -> tuple[str, ...]:
+        """How far sweeps went that were no whole turns."""
+        return tuple(sorted({turn_words(angle) for angle in _angles_rad(self.result) if not closes(angle)}))
 
     @property
     def arm(self) -> str:
@@ -265,11 +276,23 @@ def _marks(
         yield "Not valid: the measurement failed its own checks"
 
 
+def _angles_rad(result: ResultDocument) -> Iterator[float]:
+    """How far the sweeps went; those of results of before were whole turns."""
+    for sensor in result.sensors.values():
+        yield from (each.angle_rad for each in sensor.observations if each.angle_rad is not None)
+    for found in result.verification.values():
+        yield from (each.angle_rad for each in found.after.revolutions if each.angle_rad is not None)
+
+
 def _traceable(result: ResultDocument, stated: Stated) -> bool:
-    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference."""
+    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference.
+
+    Encoders, which tell how far an arc went, hang on none.
+    """
     compared = result.clock is not None and any(each.by == BY_COMPUTER for each in result.clock.comparisons)
     measured = bool(result.sensors) and not is_simulated(result, stated)
-    return measured and compared and stated.where.time_reference is not None
+    whole = all(map(closes, _angles_rad(result)))
+    return measured and compared and whole and stated.where.time_reference is not None
 
 
 def _referred(

@@ -152,7 +152,7 @@ def _statements(c: Certificate) -> Iterator[Element]:
     time = c.stated.where.time_reference
     chain = f"The unit of time hangs on {time}." if c.traceable else "No metrological traceability is claimed."
     if c.gyroscopes:
-        angles = "as a file states them" if c.elsewhere else "whole turns, 2π by closure of the circle"
+        angles = "as a file states them" if c.elsewhere else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
     if c.accelerometers:
         origin = c.stated.where.gravity_reference or "not stated"
@@ -167,6 +167,12 @@ def _statements(c: Certificate) -> Iterator[Element]:
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
     for check in c.conformity:
         yield _conformity(check, rule)
+
+
+def _angles(c: Certificate) -> str:
+    if c.arcs:
+        return f"{' and '.join(c.arcs)} by the turner's encoders, whose error is a contributor of the uncertainty"
+    return "whole turns, 2π by closure of the circle"
 
 
 def _claimed(traceable: bool) -> str:
@@ -221,7 +227,7 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
 def _method(c: Certificate) -> str:
     if c.elsewhere:
         return "readings recorded elsewhere, of a motion that a file tells"
-    return c.words.briefly
+    return c.words.briefly.format(turns=c.turns)
 
 
 def _arm(c: Certificate) -> Element:

@@ -39,7 +39,7 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
         for name, sensor in recording.run.sensors.items():
             yield from _readings(recording, name, sensor, after)
             if sensor.measures(RATE):
-                turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
+                turned = "Turns by an angle about a unit vector in the flange's frame; those of angle 0 are rests."
                 yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
 
 
@@ -62,7 +62,7 @@ def _readings(recording: ObservedRun, name: str, sensor: RecordedSensor, after: 
 
 def _sweeps(recording: ObservedRun, name: str) -> dict[str, Array]:
     seen = recording.sensors[name]
-    rows = [(turn.average.start_s, turn.average.end_s, *turn.axis_flange, 2 * np.pi) for turn in seen.revolutions]
+    rows = [(turn.average.start_s, turn.average.end_s, *turn.axis_flange, turn.angle_rad) for turn in seen.revolutions]
     rows += [(rest.start_s, rest.end_s, 0.0, 0.0, 0.0, 0.0) for rest in seen.rests]
     names = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")
     return _split(names, np.array(sorted(rows), dtype=np.float64).reshape(-1, len(names)))
