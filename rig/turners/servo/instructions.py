@@ -1,0 +1,86 @@
+"""What the servo is told, each a few writes on its line: to make ready, to go, to brake, to be left alone."""
+
+from rig.errors import Problem, Refused
+from rig.turners.servo.bus import Bus
+from rig.turners.servo.moves import Move
+from rig.turners.servo.registers import (
+    DRIVE_MODE,
+    EXTENDED_POSITION,
+    GOAL,
+    OPERATING_MODE,
+    POSITION,
+    PROFILE,
+    TIME_BASED,
+    TORQUE,
+    WATCHDOG,
+    Register,
+)
+
+BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
+
+
+def make_ready(bus: Bus, watchdog: int) -> None:
+    """Have the servo hold its shaft where it is, watched by its watchdog. Raises Refused by name, BusError.
+
+    `watchdog` is in the register's units. Operating mode and drive mode lie in the EEPROM and are written when they are
+    others; writing the mode sets the profile to zero, which is as fast as it can, so the profile comes after it and the
+    goal after the profile, both before the torque.
+    """
+    for register, wanted in ((DRIVE_MODE, TIME_BASED), (OPERATING_MODE, EXTENDED_POSITION)):
+        if bus.look_up(register) != (wanted,):
+            bus.write(register, wanted)
+            _read_back(bus, register, wanted)
+    bus.write(WATCHDOG, 0)  # also clears a stop of before, in which goals are refused
+    _stay(bus)
+    bus.write(TORQUE, 1)
+    bus.write(WATCHDOG, watchdog)
+    if (found := bus.look_up(WATCHDOG)) != (watchdog,):
+        raise Refused.of(
+            Problem(
+                "servo_watchdog_not_armed",
+                f"the servo's watchdog was set to {watchdog} and reads {found[0]}",
+                "Switch the servo off and on; update its firmware if it stays",
+            )
+        )
+
+
+def go(bus: Bus, move: Move) -> None:
+    """Begin a move. Raises Refused `servo_setting_not_kept`, BusError.
+
+    The profile is written and read back before every goal: after a stop of the watchdog it is zero, and a goal would be
+    a jump. The goal is absolute, so that a second one, after a lost reply, asks for nothing more.
+    """
+    bus.write(PROFILE, move.ramp_ms, move.total_ms)
+    _read_back(bus, PROFILE, move.ramp_ms, move.total_ms)
+    bus.write(GOAL, move.goal)
+
+
+def brake(bus: Bus) -> None:
+    """Stop where the shaft is, with a short ramp, and hold it there. Raises BusError."""
+    _stay(bus)
+
+
+def disarm(bus: Bus) -> None:
+    """Let the servo hold its shaft without anybody speaking to it. Raises BusError."""
+    bus.write(WATCHDOG, 0)
+
+
+def _stay(bus: Bus) -> None:
+    bus.write(PROFILE, BRAKE_RAMP_MS, BRAKE_MS)
+    bus.write(GOAL, *bus.look_up(POSITION))
+
+
+def _read_back(bus: Bus, register: Register, *wanted: int) -> None:
+    found = bus.look_up(register)
+    if found != wanted:
+        raise Refused.of(
+            Problem(
+                "servo_setting_not_kept",
+                f"{register.name} of the servo was set to {_listed(wanted)} and reads {_listed(found)}",
+                "End other programs that use the servo; switch it off and on, then start again",
+            )
+        )
+
+
+def _listed(values: tuple[int, ...]) -> str:
+    return ", ".join(map(str, values))

@@ -1,0 +1,42 @@
+"""The latency timer of FTDI converters, which keep what has come for 16 ms unless they are told otherwise.
+
+Adapters for these servos (U2D2 and its like) have such a chip. Linux shows its timer in
+/sys/bus/usb-serial/devices/ttyUSB*/latency_timer; asked for low latency (TIOCSSERIAL, which pyserial does and needs no
+rights) the driver sets it to 1 ms. Other ports have no such file and nothing to set.
+"""
+
+from contextlib import suppress
+from pathlib import Path
+
+import serial
+
+from rig.errors import Refused
+
+DEVICES = Path("/sys/bus/usb-serial/devices")
+BEARABLE_MS = 2
+
+
+def lower_latency(port: serial.Serial, path: str, devices: Path = DEVICES) -> None:
+    """Have what comes handed on at once. Raises Refused `servo_adapter_slow` where the timer stays long."""
+    timer = devices / Path(path).resolve().name / "latency_timer"
+    with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port that has no such thing
+        port.set_low_latency_mode(True)
+    found_ms = _read_ms(timer)
+    if found_ms is not None and found_ms > BEARABLE_MS:
+        with suppress(OSError):
+            timer.write_text("1")
+        found_ms = _read_ms(timer)
+    if found_ms is not None and found_ms > BEARABLE_MS:
+        raise Refused(
+            "servo_adapter_slow",
+            f"the adapter at {path} hands on what the servo says only every {found_ms} ms, and that cannot be changed",
+            f"Write 1 into {timer} as root, or add a udev rule: "
+            'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"',
+        )
+
+
+def _read_ms(timer: Path) -> int | None:
+    try:
+        return int(timer.read_text())
+    except (OSError, ValueError):
+        return None

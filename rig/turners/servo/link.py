@@ -1,0 +1,259 @@
+"""The thread that has the servo's line: it polls states, does what it is asked between two, and notices faults."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rig.data.silence import crowding
+from rig.errors import Problem
+from rig.turners.servo.bus import Bus, BusError, Denied, Lost, PortGone
+from rig.turners.servo.models import TICKS, ServoModel
+from rig.turners.servo.preflight import hardware_problem
+from rig.turners.servo.registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
+from rig.turners.servo.state import ServoState, decode, now_s
+
+LOST_MOST, SILENCE_S = 5, 0.4  # so many states in a row may be lost, and so long none may come
+LOOK_S = 0.1  # between two looks at what the block of states does not hold: torque and watchdog, by turns
+HELD_UP_S = 0.05  # a transaction that took longer says nothing about when the position was measured
+TICK_S, TICK_SHARE = 0.005, 0.02  # the servo's clock agrees with ours to this, or the reply is a late one
+UNLIKE_MOST = 4  # … and after so many in a row it is the servo's clock that began anew
+JOB_S = 5.0  # somebody who asks for something waits so long
+
+Job = Callable[[Bus], Any]
+
+
+class Stopped(BusError):
+    """An instruction that is not sent any more."""
+
+
+class Link:
+    """Polls `bus` every `period_s`. `on_state` and `on_problem` run on its thread; after a problem it goes on."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        model: ServoModel,
+        period_s: float,
+        on_state: Callable[[ServoState], None],
+        on_problem: Callable[[Problem], None],
+    ) -> None:
+        self._bus, self._model, self._period_s = bus, model, period_s
+        self._on_state, self._on_problem = on_state, on_problem
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._closing = threading.Event()
+        self._woken = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="servo", daemon=True)
+        self._error_bits = 0
+        self._latest: ServoState | None = None
+        self._unlike = 0
+        self._lost, self._damaged, self._heard_s = 0, 0, time.monotonic()
+        self._looks = 0
+        self._quiet_until_s = 0.0
+        self._stopping = False
+        self.torque_off = False  # and not by the rig
+        self.supervising = False  # torque is on and the watchdog armed: anything else is a problem
+        self.turned_s = time.monotonic()  # when the thread last came round
+
+    def start(self) -> None:
+        """Begin to poll."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread, unless the system holds it up; the bus stays open."""
+        self._closing.set()
+        self._woken.set()
+        if self._thread.ident is not None:
+            self._thread.join(1.0)
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still polls."""
+        return self._thread.is_alive()
+
+    def stop(self, work: Callable[[Bus], None]) -> None:
+        """Have a stop done before anything else; what was asked for and has not begun is not done any more."""
+        self._stopping = True
+        self._jobs.appendleft(lambda: work(self._bus))
+        self._woken.set()
+
+    def keep_quiet(self, duration_s: float) -> None:
+        """Send nothing for so long, so that the servo's watchdog stops it."""
+        self._quiet_until_s = time.monotonic() + duration_s
+
+    def call(self, job: Job, *, also_stopped: bool = False) -> Any:
+        """Have something done between two states; what it returns, or raises.
+
+        Raises PortGone when nobody does it, and Stopped after a stop, unless it is to be done `also_stopped`.
+        """
+        done = threading.Event()
+        outcome: dict[str, Any] = {}
+
+        def carry_out() -> None:
+            try:
+                if self._stopping and not also_stopped:
+                    raise Stopped("a stop came first")
+                outcome["value"] = job(self._bus)
+            except Exception as error:
+                outcome["error"] = error
+            done.set()
+
+        self._jobs.append(carry_out)
+        self._woken.set()
+        if not done.wait(JOB_S):
+            raise PortGone("the thread that has the line does not come round")
+        if "error" in outcome:
+            raise outcome["error"]
+        return outcome["value"]
+
+    # Its thread -------------------------------------------------------------------------------------------------
+    def _run(self) -> None:
+        due_s = looked_s = time.monotonic()
+        try:
+            while not self._closing.is_set():
+                self.turned_s = time.monotonic()
+                self._woken.clear()
+                if self.turned_s < self._quiet_until_s:
+                    self._closing.wait(self._period_s)
+                    continue
+                while self._jobs:
+                    self._jobs.popleft()()
+                self._poll()
+                if time.monotonic() - looked_s > LOOK_S:
+                    looked_s = time.monotonic()
+                    self._look()
+                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                if not self._jobs:
+                    self._woken.wait(max(0.0, due_s - time.monotonic()))
+        except Exception as error:
+            self._on_problem(
+                Problem("servo_driver_died", f"the servo's driver has failed ({error!r})", "Report it, with the log")
+            )
+
+    def _poll(self) -> None:
+        try:
+            began_s = now_s()
+            data = self._bus.read_bytes(STATE)
+            ended_s, host_s = now_s(), time.monotonic()
+            if self._bus.alert or self._error_bits:
+                self.torque_off = True
+                (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
+        except (Lost, Denied) as error:
+            self._count_lost(damaged=not isinstance(error, Lost) or error.damaged)
+            return
+        except PortGone as error:
+            self._fail(_port_lost(error))
+            self._closing.wait(self._period_s)
+            return
+        self._heard_s, self._lost, self._damaged = time.monotonic(), 0, 0
+        state = decode(data, self._model, (began_s, ended_s), host_s, self._error_bits)
+        if self._fresh(state):
+            self._latest = state
+            self._on_state(state)
+        if self._error_bits and self.supervising:
+            self._fail(hardware_problem(self._error_bits))
+
+    def _fresh(self, state: ServoState) -> bool:
+        """Whether the reply is of now, by the servo's own clock."""
+        before = self._latest
+        if state.took_s > HELD_UP_S:
+            return False
+        if before is None:
+            return True
+        since_s = state.time_s - before.time_s
+        counted_s = 1e-3 * ((state.tick - before.tick) % TICKS)
+        wrap_s = 1e-3 * TICKS
+        unlike_s = abs((counted_s - since_s + wrap_s / 2) % wrap_s - wrap_s / 2)
+        if unlike_s < TICK_S + TICK_SHARE * since_s + state.took_s:
+            self._unlike = 0
+            return True
+        self._unlike += 1
+        self._bus.settle()
+        if self._unlike > UNLIKE_MOST:
+            self._unlike = 0
+            if self.supervising:
+                self._fail(_restarted())
+            return True
+        return False
+
+    def _look(self) -> None:
+        """Look at what the block does not hold."""
+        if not self.supervising:
+            return
+        self._looks += 1
+        register = WATCHDOG if self._looks % 2 else TORQUE
+        try:
+            (value,) = self._bus.read(register)
+            if register is TORQUE and not value:  # mostly a shutdown, whose reason may not have been read yet
+                self.torque_off = True
+                (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
+        except (Lost, Denied):
+            return  # the states count what is lost
+        except PortGone as error:
+            self._fail(_port_lost(error))
+            return
+        if register is TORQUE and not value:
+            self._fail(hardware_problem(self._error_bits) if self._error_bits else _torque_lost())
+        elif register is WATCHDOG and value == TRIPPED:
+            self._fail(_tripped())
+
+    def _count_lost(self, damaged: bool) -> None:
+        self._lost += 1
+        self._damaged += damaged
+        silent_s = time.monotonic() - self._heard_s
+        if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * crowding():
+            self._fail(_silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
+        try:
+            self._bus.settle()
+        except PortGone as error:
+            self._fail(_port_lost(error))
+
+    def _fail(self, problem: Problem) -> None:
+        self._on_problem(problem)
+
+
+def _port_lost(error: PortGone) -> Problem:
+    return Problem(
+        "servo_port_lost",
+        f"the servo's port has failed ({error})",
+        "Look at the adapter and its cable, then start again",
+    )
+
+
+def _silent(silent_s: float, mostly_damaged: bool) -> Problem:
+    if mostly_damaged:
+        return Problem(
+            "servo_replies_damaged",
+            f"only damaged replies have come from the servo for {silent_s:.1f} s",
+            "Look for a second servo with its ID, and at the cable and the adapter's ground",
+        )
+    return Problem(
+        "servo_link_lost",
+        f"no reply has come from the servo for {silent_s:.1f} s",
+        "Look at its supply and its cable, then start again",
+    )
+
+
+def _restarted() -> Problem:
+    return Problem(
+        "servo_restarted",
+        "the servo's clock began anew: it was switched off, or started again, and has forgotten its goal and its turns",
+        "Look at its supply; hold the board, and start again",
+    )
+
+
+def _torque_lost() -> Problem:
+    return Problem(
+        "servo_torque_lost",
+        "the servo's torque is off, and the rig did not switch it off",
+        "End other programs that use the servo; hold the board, and start again",
+    )
+
+
+def _tripped() -> Problem:
+    return Problem(
+        "servo_watchdog_tripped",
+        "the servo's watchdog has stopped it: no instruction came in time",
+        "Look at the load of the computer and at the cable, then start again",
+    )

@@ -1,0 +1,128 @@
+"""The first look at a servo: who answers, and how it is set up. Nothing moves, and nothing outlasts its supply."""
+
+import time
+
+from rig.errors import Refused
+from rig.turners.servo.bus import Bus, BusError, Lost
+from rig.turners.servo.models import SPEED_RAD_S, model_of
+from rig.turners.servo.registers import (
+    DRIVE_MODE,
+    FIRMWARE,
+    HARDWARE_ERROR,
+    HOMING_OFFSET,
+    MODEL_NUMBER,
+    OPERATING_MODE,
+    RETURN_LEVEL,
+    SECONDARY_ID,
+    SHUTDOWN,
+    STARTUP,
+    STARTUP_FIRMWARE,
+    STATE,
+    TEMPERATURE_LIMIT,
+    TORQUE,
+    VELOCITY_LIMIT,
+    VOLTAGE_LIMITS,
+    WATCHDOG,
+    WATCHDOG_FIRMWARE,
+)
+from rig.turners.servo.state import ServoReport, decode, now_s
+
+PINGS = 4
+LISTEN_S = 0.012  # after each ping, for another's answer
+ROUND_TRIPS = 15
+ANSWER_ALL = 2  # of Status Return Level: every write is acknowledged
+
+
+def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
+    """What the servo says about itself. Raises Refused `no_servo`, `servo_not_alone`, `other_servo`."""
+    try:
+        _ping(bus, port, servo_id)
+        _have_all_answered(bus)
+        return _report(bus, port, servo_id)
+    except BusError as error:
+        raise Refused(
+            "servo_garbled",
+            f"the servo with ID {servo_id} at {port} answers, but not as it should ({error})",
+            "Look for a second servo with its ID, and at the cable and the adapter's ground",
+        ) from error
+
+
+def _ping(bus: Bus, port: str, servo_id: int) -> None:
+    """See that a ping brings one answer and no more; one odd answer in four may be a late one."""
+    found = odd = 0
+    for _ in range(PINGS):
+        try:
+            bus.ping()
+            found += 1
+            odd += bus.more_came(LISTEN_S)
+        except Lost as lost:
+            odd += lost.damaged
+            bus.settle()
+    if odd > 1:
+        raise Refused(
+            "servo_not_alone",
+            f"to a ping of ID {servo_id} at {port} more comes than one answer",
+            "Give every servo on the line an ID of its own, or unplug the others",
+        )
+    if found == 0:
+        raise Refused(
+            "no_servo",
+            f"no servo with ID {servo_id} answers at {port}",
+            "Check its supply and cable, and servo.id and servo.baud (57600 as delivered; protocol 2.0)",
+        )
+
+
+def _have_all_answered(bus: Bus) -> None:
+    """Have writes acknowledged (a setting of the RAM): else nobody knows whether a goal has arrived."""
+    try:
+        (level,) = bus.read(RETURN_LEVEL)
+    except Lost:
+        bus.settle()
+        level = 0
+    if level != ANSWER_ALL:
+        bus.write_unheard(RETURN_LEVEL, ANSWER_ALL)
+        bus.settle()  # which it may acknowledge already
+
+
+def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
+    (number,) = bus.look_up(MODEL_NUMBER)
+    model = model_of(number)
+    if model is None:
+        raise Refused(
+            "other_servo",
+            f"the servo at {port} has the model number {number}, which the rig does not know",
+            "Use an XL430-W250, XM430-W350 or XM430-W210",
+        )
+    (firmware,) = bus.look_up(FIRMWARE)
+    high, low = bus.look_up(VOLTAGE_LIMITS)
+    (hardware_error,) = bus.look_up(HARDWARE_ERROR)
+    round_trips, states = [], []
+    for _ in range(ROUND_TRIPS):
+        began_s = now_s()
+        try:
+            data = bus.read_bytes(STATE)
+            states.append(decode(data, model, (began_s, now_s()), time.monotonic(), hardware_error))
+        except Lost:
+            bus.settle()
+        round_trips.append(now_s() - began_s)
+    if not states:
+        raise Lost(damaged=True)
+    return ServoReport(
+        port=port,
+        servo_id=servo_id,
+        model=model,
+        firmware=firmware,
+        drive_mode=bus.look_up(DRIVE_MODE)[0],
+        operating_mode=bus.look_up(OPERATING_MODE)[0],
+        secondary_id=bus.look_up(SECONDARY_ID)[0],
+        homing_offset=bus.look_up(HOMING_OFFSET)[0],
+        temperature_limit_c=bus.look_up(TEMPERATURE_LIMIT)[0],
+        voltage_limits_v=(low / 10, high / 10),
+        velocity_limit_rad_s=bus.look_up(VELOCITY_LIMIT)[0] * SPEED_RAD_S,
+        startup=bus.look_up(STARTUP)[0] if firmware >= STARTUP_FIRMWARE else None,
+        shutdown=bus.look_up(SHUTDOWN)[0],
+        torque_on=bool(bus.look_up(TORQUE)[0]),
+        watchdog=bus.look_up(WATCHDOG)[0] if firmware >= WATCHDOG_FIRMWARE else None,
+        round_trip_s=sorted(round_trips)[ROUND_TRIPS // 4],  # the line's: this computer may be busy
+        state=states[-1],
+    )

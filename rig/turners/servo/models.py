@@ -1,0 +1,50 @@
+"""The servos this driver knows, a row each, and the units of their registers.
+
+Source: ROBOTIS e-Manual, pages of the models: "Specifications" (stall torque, no-load speed, both at 12 V) and "Control
+Table" (numbers, units).
+"""
+
+import math
+from dataclasses import dataclass
+
+PULSES = 4096  # a turn; 12 bits, 0.088°
+PULSE_RAD = 2 * math.pi / PULSES
+FARTHEST = 1_048_575  # pulses either way in extended position mode: 256 turns
+SPEED_RAD_S = 0.229 * 2 * math.pi / 60  # Present Velocity, Velocity Limit: 0.229 rev/min
+LONGEST_MS = 32_737  # of a time-based profile
+TICKS = 32_768  # Realtime Tick counts milliseconds and begins anew
+
+# A servo that is to carry what it turns smoothly may be asked for a fifth of what stalls it: the maker's performance
+# graphs are measured with a rising load and end there ("note on performance graph").
+LOAD_SHARE = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """One model: its name in a configuration, its model number, what stalls it at 12 V, and how it tells its load.
+
+    `load_unit`: one count of register 126, in A where the servo senses its current, else as a share of full load.
+    """
+
+    name: str
+    number: int
+    stall_torque_nm: float
+    no_load_rad_s: float
+    senses_current: bool
+
+    @property
+    def load_unit(self) -> float:
+        """One count of register 126."""
+        return 2.69e-3 if self.senses_current else 1e-3
+
+
+MODELS = (
+    ServoModel("xl430_w250", 1060, 1.5, 61 * 2 * math.pi / 60, senses_current=False),
+    ServoModel("xm430_w350", 1020, 4.1, 46 * 2 * math.pi / 60, senses_current=True),
+    ServoModel("xm430_w210", 1030, 3.0, 77 * 2 * math.pi / 60, senses_current=True),
+)
+
+
+def model_of(number: int) -> ServoModel | None:
+    """The model with that number in its register 0."""
+    return next((model for model in MODELS if model.number == number), None)

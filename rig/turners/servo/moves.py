@@ -1,0 +1,68 @@
+"""A movement as the servo is told of it: a goal in pulses, and a profile in milliseconds. Pure.
+
+Only the time-based profile is used (firmware 42 and later). The velocity-based one knows speeds in steps of 1.37° a
+second and accelerations in steps of 21° a second²: a sweep of 60° a second could not be asked for. A time of the whole
+move in milliseconds asks for the same sweep to 2e-4.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from rig.errors import Problem
+from rig.motion.steps import Motion
+from rig.turners.servo.models import FARTHEST, LONGEST_MS, PULSE_RAD
+
+SHORTEST_MS = 20  # of a profile: a few of the servo's control steps; 0 would be as fast as it can
+
+
+class Move(NamedTuple):
+    """A goal, and the times of the whole move and of each of its ramps."""
+
+    goal: int
+    total_ms: int
+    ramp_ms: int
+
+
+def move_of(motion: Motion) -> Move:
+    """The nearest that the servo can be asked for: ramps by acceleration, both ramps within the whole time."""
+    total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
+    ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
+    return Move(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
+
+
+def cruise_rad_s(from_rad: float, move: Move) -> float:
+    """The speed between the ramps, rad/s: the way of a trapezoid by its times."""
+    way_rad = abs(move.goal * PULSE_RAD - from_rad)
+    return way_rad / (1e-3 * (move.total_ms - move.ramp_ms))
+
+
+def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> list[Problem]:
+    """What of these movements the servo cannot do; one of each kind."""
+    found: dict[str, Problem] = {}
+    for motion in motions:
+        move = move_of(motion)
+        speed_rad_s = cruise_rad_s(motion.start_q_rad[0], move)
+        if abs(move.goal) > FARTHEST:
+            problem = Problem(
+                "servo_out_of_range",
+                f"{motion.name} ends {move.goal} pulses from zero, and the servo counts {FARTHEST} either way",
+                "Switch the servo off and on, so that it forgets its turns, and plan fewer",
+            )
+        elif move.total_ms > LONGEST_MS:
+            problem = Problem(
+                "servo_move_too_long",
+                f"{motion.name} takes {motion.duration_s:.1f} s, and the servo knows none longer than "
+                f"{1e-3 * LONGEST_MS:.1f} s",
+                "Turn faster, or fewer turns at a time",
+            )
+        elif speed_rad_s > velocity_limit_rad_s:
+            problem = Problem(
+                "servo_too_fast",
+                f"{motion.name} needs {speed_rad_s:.2f} rad/s, and the servo's velocity limit is "
+                f"{velocity_limit_rad_s:.2f} rad/s",
+                "Turn slower; raise Velocity Limit (44) only as far as the servo's no-load speed",
+            )
+        else:
+            continue
+        found.setdefault(problem.name, problem)
+    return list(found.values())

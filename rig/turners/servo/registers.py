@@ -1,0 +1,69 @@
+"""The registers this driver uses (ROBOTIS e-Manual, "Control Table"), and what their values mean."""
+
+import struct
+from typing import NamedTuple
+
+
+class Register(NamedTuple):
+    """Where a value stands, little-endian, and as what: a format of `struct`."""
+
+    address: int
+    form: str
+    name: str
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return struct.calcsize(self.form)
+
+    def pack(self, *values: int) -> bytes:
+        """Values as bytes."""
+        return struct.pack(self.form, *values)
+
+    def unpack(self, data: bytes) -> tuple[int, ...]:
+        """Bytes as values, with their signs."""
+        return struct.unpack(self.form, data)
+
+
+MODEL_NUMBER = Register(0, "<H", "Model Number")
+FIRMWARE = Register(6, "<B", "Firmware Version")
+RETURN_DELAY = Register(9, "<B", "Return Delay Time")
+DRIVE_MODE = Register(10, "<B", "Drive Mode")
+OPERATING_MODE = Register(11, "<B", "Operating Mode")
+SECONDARY_ID = Register(12, "<B", "Secondary ID")
+HOMING_OFFSET = Register(20, "<i", "Homing Offset")
+TEMPERATURE_LIMIT = Register(31, "<B", "Temperature Limit")
+VOLTAGE_LIMITS = Register(32, "<HH", "Max Voltage Limit, Min Voltage Limit")
+VELOCITY_LIMIT = Register(44, "<I", "Velocity Limit")
+STARTUP = Register(60, "<B", "Startup Configuration")
+SHUTDOWN = Register(63, "<B", "Shutdown")
+TORQUE = Register(64, "<B", "Torque Enable")
+RETURN_LEVEL = Register(68, "<B", "Status Return Level")
+HARDWARE_ERROR = Register(70, "<B", "Hardware Error Status")
+WATCHDOG = Register(98, "<B", "Bus Watchdog")
+PROFILE = Register(108, "<II", "Profile Acceleration, Profile Velocity")
+GOAL = Register(116, "<i", "Goal Position")
+POSITION = Register(132, "<i", "Present Position")
+# Realtime Tick, Moving, Moving Status, Present PWM, Present Current or Load, Present Velocity, Present Position,
+# Velocity Trajectory, Position Trajectory, Present Input Voltage, Present Temperature: one block, one packet.
+STATE = Register(120, "<HBBhhiiiiHB", "Realtime Tick … Present Temperature")
+
+WATCHDOG_FIRMWARE, TIMED_FIRMWARE, STARTUP_FIRMWARE = 38, 42, 45  # the first with Bus Watchdog, timed profile, …
+EXTENDED_POSITION = 4  # of Operating Mode: whole turns, ±256
+TIME_BASED = 4  # of Drive Mode: bit 2 and no other, so ccw counts up and nothing but Torque Enable switches torque on
+NO_SECONDARY_ID = 253  # … and above
+WATCHDOG_S, WATCHDOG_MOST, TRIPPED = 0.020, 127, 255
+BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20  # Shutdown, Hardware Error Status
+ERROR_WORDS = {
+    BY_VOLTAGE: "input voltage",
+    BY_HEAT: "overheating",
+    BY_ENCODER: "encoder",
+    BY_SHOCK: "electrical shock",
+    BY_LOAD: "overload",
+}
+
+
+def error_words(bits: int) -> str:
+    """Hardware Error Status in words, with its number: the manual's pages do not agree on one of the bits."""
+    found = [word for bit, word in ERROR_WORDS.items() if bits & bit] or ["unknown"]
+    return f"{', '.join(found)} (0x{bits:02x})"

@@ -1,0 +1,115 @@
+"""Stopping the shaft for good, in a thread of its own.
+
+1. Goal Position becomes Present Position, with a short profile: the shaft brakes and is held. Torque stays on: without
+   it an unbalanced board would fall, and no gear of these servos locks.
+2. Where that is not acknowledged, nobody speaks to the servo any more, until its own watchdog has stopped it.
+3. A *state* newer than the stop tells whether the shaft stands.
+
+None of this is a safety function. Only the switch of the servo's supply is sure.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig.turners.servo.bus import Bus, BusError
+from rig.turners.servo.instructions import brake
+from rig.turners.servo.link import Link
+from rig.turners.servo.registers import TRIPPED, WATCHDOG
+
+STOP_S = 0.95  # a stop is confirmed within this, or not at all
+TOLD_S = 0.25  # the servo has so long to acknowledge
+SURE = "only the switch of its supply is sure"
+
+
+@dataclass(frozen=True, slots=True)
+class StopOutcome:
+    """Whether the shaft was seen at rest, in words; `remedy` is empty where nothing is left to do."""
+
+    at_rest: bool
+    what: str
+    remedy: str = ""
+
+
+class Stopper:
+    """Stops the shaft when `begin` is first called; later calls change nothing.
+
+    `seen_at_rest(since_s, timeout_s)` waits for states newer than `since_s` (monotonic time) that show the shaft at
+    rest; `lets_go()` tells whether the servo has switched its motor off. No interrupt of the caller breaks a stop off.
+    """
+
+    def __init__(
+        self, link: Link, watchdog_s: float, seen_at_rest: Callable[[float, float], bool], lets_go: Callable[[], bool]
+    ) -> None:
+        self._link, self._watchdog_s = link, watchdog_s
+        self._seen_at_rest, self._lets_go = seen_at_rest, lets_go
+        self._starting = threading.Lock()
+        self._thread = threading.Thread(target=self._stop, name="servo stop")
+        self._ended = threading.Event()
+        self._outcome = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
+
+    @property
+    def begun(self) -> bool:
+        """Whether a stop has been asked for."""
+        return self._thread.ident is not None
+
+    def begin(self) -> None:
+        """Begin to stop, and return at once."""
+        with self._starting:
+            if not self.begun:
+                self._thread.start()
+
+    def outcome(self) -> StopOutcome:
+        """Stop the shaft if that has not begun, and wait for the result; less than 1 s.
+
+        An interrupt meanwhile is raised when the result is there.
+        """
+        self.begin()
+        interrupt = None
+        while not self._ended.is_set():
+            try:
+                self._ended.wait()
+            except KeyboardInterrupt as impatient:
+                interrupt = impatient
+        if interrupt is not None:
+            raise interrupt
+        return self._outcome
+
+    def _stop(self) -> None:
+        try:
+            self._outcome = self._stopped()
+        finally:
+            self._ended.set()
+
+    def _stopped(self) -> StopOutcome:
+        began_s = time.monotonic()
+        told = threading.Event()
+
+        def tell(bus: Bus) -> None:
+            try:
+                if not _stopped_itself(bus):
+                    brake(bus)
+                told.set()
+            except BusError:
+                pass  # the watchdog has it
+
+        self._link.stop(tell)
+        if not told.wait(TOLD_S):
+            self._link.keep_quiet(2 * self._watchdog_s)
+        seen = self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic())
+        if seen and self._lets_go():
+            return StopOutcome(True, "the shaft stands, but its motor is off", "Hold the board: nothing else may")
+        if seen:
+            return StopOutcome(True, "the shaft stands, and the servo holds it")
+        delivered = "the servo has taken the stop" if told.is_set() else "the servo did not acknowledge the stop"
+        return StopOutcome(
+            False,
+            f"{delivered}, and no state shows that the shaft stands",
+            f"Look at the shaft: its watchdog stops it {self._watchdog_s:.1f} s after the last instruction, but {SURE}",
+        )
+
+
+def _stopped_itself(bus: Bus) -> bool:
+    """Whether the watchdog has stopped the servo, which takes no goal then."""
+    return bus.read(WATCHDOG) == (TRIPPED,)

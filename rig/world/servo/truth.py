@@ -1,0 +1,48 @@
+"""What a simulated servo and its line are in truth: nobody but the world knows it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class ServoTruth:
+    """One servo. Angles and rates are the shaft's.
+
+    `left` are EEPROM settings other than the factory's, by the manual's names. The encoder reads e₁ sin(θ + φ₁) +
+    e₂ sin(2θ + φ₂) too much; AS5045-class parts are out by ±1.3° in all. The gear's ripple is a share of the rate,
+    `ripple_per_turn` times a turn; the shaft follows the profile by `lag_s` later. `tick_ppm` is how much too fast its
+    clock goes. With torque off the shaft falls with `fall_deg_s` (0: what it carries is balanced).
+    """
+
+    model: str = "XM430-W350"
+    firmware: int = 48
+    left: Mapping[str, int] = field(default_factory=dict)
+    start_deg: float = 30.0
+    encoder_once_deg: float = 1.0
+    encoder_once_phase_deg: float = 40.0
+    encoder_twice_deg: float = 0.3
+    encoder_twice_phase_deg: float = 110.0
+    encoder_noise_deg: float = 0.06
+    backlash_deg: float = 0.25
+    ripple_fraction: float = 0.07
+    ripple_per_turn: int = 20
+    lag_s: float = 0.015
+    tick_ppm: float = 3000.0
+    temperature_c: float = 31.0
+    voltage_v: float = 12.0
+    boot_s: float = 0.2
+    overload_after_s: float = 1.5
+    fall_deg_s: float = 0.0
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class LineTruth:
+    """The way between host and servos. `latency_ms`: the converter hands on what came this often (0: at once).
+
+    `echo`: the host hears itself, as with converters of one wire. `reply_delay_ms`: every reply comes so much later.
+    """
+
+    latency_ms: float = 0.0
+    echo: bool = False
+    reply_delay_ms: float = 0.0

@@ -1,0 +1,168 @@
+"""The servo's driver with the maker's client against the simulated servo: moves, rests, states, and a stop."""
+
+import math
+import signal
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from rig.errors import Fault, Refused
+from rig.observation.turn_speed import turn_speed
+from rig.turners.servo.driver import Servo
+from rig.turners.servo.state import SERVO_STATE_DTYPE, ServoState
+from rig.world.servo.truth import ServoTruth
+from support.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
+from support.servo_on_a_wire import SET_UP, servo_on_a_wire
+
+
+def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
+    with servo_on_a_wire() as wire:
+        before_rad = wire.angle_rad
+        with Servo(wire.port, MODEL) as servo:
+            report = servo.report()
+            assert (report.model.name, report.firmware) == (MODEL, 48)
+            assert report.voltage_limits_v == (9.5, 16.0)
+            assert not report.torque_on
+            assert servo.problems(BOARD) == []
+        assert wire.angle_rad == before_rad
+        assert wire.do("register", "Torque Enable") == 0
+
+
+def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() -> None:
+    states: list[ServoState] = []
+    with servo_on_a_wire() as wire:
+        with held(wire, on_state=states.append) as servo:
+            assert wire.do("register", "Bus Watchdog") == 100
+            for by_deg in (60.0, -60.0):
+                before_rad = wire.angle_rad
+                servo.move(turn(servo.latest.q_rad[0], by_deg))
+                turned_deg = math.degrees(wire.angle_rad - before_rad)
+                assert abs(turned_deg - by_deg) < 4.0, "the encoder is out by 1.3° either way, and there is play"
+                assert abs(wire.rate_rad_s) < STANDS_RAD_S
+        assert wire.do("register", "Torque Enable") == 1
+        assert wire.do("register", "Bus Watchdog") == 0
+    assert all(one.time_s < other.time_s for one, other in pairwise(states))
+    record = np.array([state.to_record() for state in states], SERVO_STATE_DTYPE)
+    assert record["q_rad"].shape == (len(states), 1)
+    assert np.ptp(record["q_rad"]) > math.radians(55.0)
+
+
+def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured() -> None:
+    states: list[ServoState] = []
+    with (
+        servo_on_a_wire(ServoTruth("XM430-W210", left=SET_UP)) as wire,
+        Servo(wire.port, "xm430_w210", states.append, watchdog_s=2.0) as servo,
+    ):
+        servo.take_control(BOARD)
+        motion = turn(servo.latest.q_rad[0], 500.0, speed_deg_s=300.0)
+        servo.move(motion)
+    time_s = np.array([state.time_s for state in states])
+    q_rad = np.array([state.q_rad[0] for state in states])
+    speed = math.radians(20.0)
+    even = (q_rad > motion.start_q_rad[0] + speed) & (q_rad < motion.target_q_rad[0] - speed)
+    found = turn_speed(time_s[even], q_rad[even])
+    assert abs(found.speed_rad_s / motion.speed_rad_s - 1.0) < 6 * found.speed_std_rad_s / motion.speed_rad_s + 2e-3
+
+
+def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profile() -> None:
+    with servo_on_a_wire(ServoTruth(left={"Baud Rate": 3})) as wire:
+        with held(wire) as servo:
+            servo.move(turn(servo.latest.q_rad[0], 20.0))
+        assert (wire.do("register", "Operating Mode"), wire.do("register", "Drive Mode")) == (4, 4)
+
+
+def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
+    """Its profile is zero then, which is as fast as the servo can."""
+    states: list[ServoState] = []
+    with servo_on_a_wire() as wire:
+        with held(wire):
+            wire.do("put", "Bus Watchdog", 255)
+            wire.do("put", "Profile Velocity", 0)
+            wire.do("put", "Profile Acceleration", 0)
+        with held(wire, on_state=states.append) as servo:
+            servo.move(turn(servo.latest.q_rad[0], 40.0, speed_deg_s=60.0))
+        assert max(abs(state.qd_rad_s[0]) for state in states) < math.radians(60.0) * 1.15
+
+
+def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
+    with servo_on_a_wire() as wire, held(wire) as servo:
+        began_s = servo.latest.time_s
+        servo.rest(0.3)
+        assert 0.3 <= servo.latest.time_s - began_s < 0.5
+
+
+def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
+    with servo_on_a_wire() as wire, held(wire) as servo:
+        told: list[float] = []
+
+        def stop() -> None:
+            told.append(time.monotonic())
+            assert servo.stop().at_rest
+
+        with pytest.raises(Fault) as fault:
+            servo.move(turn(servo.latest.q_rad[0], 300.0), at_speed(wire, stop))
+        assert fault.value.name == "servo_stopped"
+        assert time.monotonic() - told[0] < 1.0
+        assert abs(wire.rate_rad_s) < STANDS_RAD_S
+        assert wire.do("register", "Torque Enable") == 1
+        with pytest.raises(Fault):
+            servo.rest(0.1)
+
+
+def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None:
+    with servo_on_a_wire() as wire:
+        with pytest.raises(KeyboardInterrupt) as interrupt, held(wire) as servo:
+            watch = at_speed(wire, lambda: signal.raise_signal(signal.SIGINT))
+            servo.move(turn(servo.latest.q_rad[0], 300.0), watch)
+        assert abs(wire.rate_rad_s) < STANDS_RAD_S
+        assert "the shaft stands" in interrupt.value.__notes__[0]
+
+
+def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> None:
+    def disk_full() -> None:
+        raise OSError(28, "No space left on device")
+
+    with servo_on_a_wire() as wire:
+        with pytest.raises(OSError), held(wire) as servo:
+            servo.move(turn(servo.latest.q_rad[0], 300.0), at_speed(wire, disk_full))
+        assert abs(wire.rate_rad_s) < STANDS_RAD_S
+
+
+def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
+    armed: list[bool] = []
+
+    def take(state: ServoState) -> None:
+        if armed and abs(state.qd_rad_s[0]) > 1.0:
+            raise ValueError("not mine")
+
+    with servo_on_a_wire() as wire:
+        with pytest.raises(Fault) as fault, held(wire, on_state=take) as servo:
+            armed.append(True)
+            servo.move(turn(servo.latest.q_rad[0], 300.0))
+        assert fault.value.name == "servo_state_not_taken"
+        assert abs(wire.rate_rad_s) < STANDS_RAD_S
+
+
+def test_one_program_at_a_time_has_the_port() -> None:
+    with servo_on_a_wire() as wire, Servo(wire.port, MODEL):
+        with pytest.raises(Refused) as refused, Servo(wire.port, MODEL):
+            pass
+        assert refused.value.name == "servo_port_in_use"
+
+
+@pytest.mark.parametrize("name", ["servo_out_of_range", "servo_too_fast", "servo_move_too_long"])
+def test_a_move_that_the_servo_cannot_make_is_not_begun(name: str) -> None:
+    motion = {
+        "servo_out_of_range": turn(1700.0, 90.0, 120.0),
+        "servo_too_fast": turn(0.5, 90.0, 400.0),
+        "servo_move_too_long": turn(0.5, 360.0, 8.0),
+    }[name]
+    with servo_on_a_wire() as wire:
+        with pytest.raises(Fault) as fault, held(wire) as servo:
+            assert [problem.name for problem in servo.problems(BOARD, [motion])] == [name]
+            before_rad = wire.angle_rad
+            servo.move(motion)
+        assert fault.value.name == name
+        assert abs(wire.angle_rad - before_rad) < math.radians(0.5)
