@@ -21,7 +21,7 @@ from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.own_errors import KnownSensor, own_errors
-from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
+from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.arm_motion import ArmMotion
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
@@ -52,13 +52,15 @@ class Allowed:
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; and of its
     angle about what its encoder tells at one mark, `encoder_rad`, zero where all sweeps are whole turns; `jitter_s` of
-    the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
-    it is not known; `curve` is the sensor's nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
+    the times of the arm's states; `mount_rad` of an item that was mounted anew, about each axis; `earth_rad_s` (3, k)
+    of the Earth's rate in the base's frame, for each way in which it is not known; `curve` is the sensor's
+    nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
     """
 
     angles_rad: Array
     repeatability_rad: float
     encoder_rad: float
+    mount_rad: float
     jitter_s: float
     earth_rad_s: Array
     curve: Curve
@@ -104,6 +106,7 @@ def allowed_of(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
+        mount_rad=float(np.radians(uncertainty.mount_deg) / np.sqrt(3)),
         jitter_s=jitter_s,
         earth_rad_s=earth_rad_s,
         curve=Curve(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
@@ -143,6 +146,7 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
             _of_marks(pieces, known.encoder_rad),
             _of_times(pieces, known.jitter_s),
             *_of_speeds(pieces),
+            *_of_mounts(pieces, known.mount_rad),
             np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
         ]
     )
@@ -183,7 +187,7 @@ def _of_marks(pieces: Pieces, encoder_rad: float) -> Array:
         q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
         moved = q_rad[1] - q_rad[0]
         joint = int(np.argmax(np.abs(moved)))
-        axis = flange_axes(q_rad[0], stretch.motion.kinematics)[:, joint] / (stretch.end_s - stretch.start_s)
+        axis = stretch.motion.axes(q_rad[0])[:, joint] / (stretch.end_s - stretch.start_s)
         for end, angle in zip((-1.0, 1.0), q_rad[:, joint], strict=True):
             apart = [abs(at - angle) if of == joint else np.inf for of, at in marks]
             mark = next((each for each, by in enumerate(apart) if by < abs(moved[joint]) / 4), len(marks))
@@ -215,13 +219,13 @@ def turned_by(stretch: Stretch, steps: int) -> Array:
     motion = stretch.motion
     q_rad = motion.angles(np.linspace(stretch.start_s, stretch.end_s, steps + 1))
     middle, moved = (q_rad[1:] + q_rad[:-1]) / 2, np.diff(q_rad, axis=0)
-    axes = flange_axes(middle, motion.kinematics)
+    axes = motion.axes(middle)
     off = np.zeros((len(ANGLES), 3))
     for joint, first in _waves_of(motion).items():
         if np.ptp(q_rad[:, joint]) < STANDS_RAD:
             continue
         for here, by in zip(middle, moved[:, joint], strict=True):
-            off[: len(AXIS_ERRORS)] += by * axis_errors(here, joint, motion.kinematics)
+            off[: len(AXIS_ERRORS)] += by * motion.axis_errors(here, joint)
         waves = [wave(times * q_rad[:, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
         off[first : first + len(WAVES)] += np.diff(waves) @ axes[:, :, joint]
     return off / (stretch.end_s - stretch.start_s)
@@ -236,7 +240,7 @@ def _waves_of(motion: ArmMotion) -> dict[int, int]:
 def _ends(stretch: Stretch) -> list[Array]:
     """(3,) rad/s for a radian by which one joint that moved was elsewhere before a way, or after it; for each."""
     q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
-    axes = flange_axes(q_rad, stretch.motion.kinematics) / (stretch.end_s - stretch.start_s)
+    axes = stretch.motion.axes(q_rad) / (stretch.end_s - stretch.start_s)
     moved = [joint for joint in _waves_of(stretch.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
     return [end[:, joint] for joint in moved for end in axes]
 
@@ -260,6 +264,14 @@ def _of_speeds(pieces: Pieces) -> list[Array]:
     """Patterns of sweeps whose ends lie between arm states that are far apart."""
     off = pieces.speed_std[:, None] * pieces.rates_rad_s
     return [np.where((pieces.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(pieces.sweep)]
+
+
+def _of_mounts(pieces: Pieces, mount_rad: float) -> list[Array]:
+    """Patterns of an item that sits a little off in every stage but the first, against which they all are held."""
+    mounts = [stretch.motion.mount.tobytes() for stretch in pieces.stretches]
+    off = mount_rad * np.cross(np.eye(3)[:, None, :], pieces.rates_rad_s)
+    _, *others = dict.fromkeys(mounts)
+    return [np.where(np.array([each == other for each in mounts])[:, None], off, 0.0) for other in others]
 
 
 def _curved(stretches: Sequence[Stretch], matrix: Array, curve: Curve) -> Array:

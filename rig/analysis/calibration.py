@@ -27,7 +27,7 @@ from rig.estimation.vector_fit import Explained, Seen, explain
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
 from rig.observation.observe import Observation
-from rig.observation.observed_run import ObservedRun, observe_runs
+from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_sweeps
 
@@ -112,11 +112,11 @@ def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
     raise Refused("unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}")
 
 
-def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
+def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
     """All recordings of one calibration; those without a finished sweep add nothing.
 
-    The thresholds are those of the first recording. Raises Refused `different_sensors`; Fault `duplicated_observation`
-    and as `observe_run` does.
+    The thresholds are those of the first recording; `turned` is as of `observe_runs`. Raises Refused
+    `different_sensors`; Fault `duplicated_observation` and as `observe_run` does.
     """
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
@@ -125,7 +125,7 @@ def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
             "Solve them one by one",
         )
     _check_recordings(runs)
-    return observe_runs(runs)
+    return observe_runs(runs, turned)
 
 
 def solve_observed(

@@ -7,11 +7,12 @@ import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.allowance import allow, allowed
-from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.consistency import consistency
 from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import (
@@ -142,7 +143,7 @@ def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) ->
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """The sweeps in the recordings of a run so far that contradict the others; none where they cannot be solved."""
     try:
-        recordings = observe_recordings(runs)
+        recordings, _ = observe_as_mounted(runs)
         if not recordings or not runs[0].settings.planned_sweeps:
             return frozenset()
         sensors = runs[0].settings.to_calibrate

@@ -3,17 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import pairwise
 
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.bias_drift import bias_drifts
-from rig.analysis.calibration import SensorResult, known_estimator, observe_recordings, solve_observed
+from rig.analysis.calibration import SensorResult, known_estimator, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
 from rig.analysis.magnetic_field import calibrate_magnetometers
+from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.of_kinds import kinds_on_arm
 from rig.analysis.onboard_check import agreement
 from rig.analysis.outcome import DEFAULT_ESTIMATOR, Origin, Outcome
@@ -44,7 +46,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     if (read := runs[0].elsewhere) is not None:
         return _elsewhere(runs, read, estimator)
     chosen = known_estimator(estimator)
-    recordings = observe_recordings(runs)
+    recordings, mounts = observe_as_mounted(runs)
     if not recordings:
         raise Fault(
             "too_few_observations",
@@ -82,6 +84,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
             *(check for each in of_kinds for check in each.checks),
         ),
         of_kinds=of_kinds,
+        mounts=mounts,
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
@@ -216,7 +219,11 @@ def _origin(runs: Sequence[RunData]) -> Origin:
     return Origin(
         recorded=runs[0].provenance,
         stored_calibrations=runs[-1].provenance.stored_calibrations,
-        resumed_utc=tuple(run.provenance.started_utc for run in runs[1:]),
+        resumed_utc=tuple(
+            run.provenance.started_utc
+            for before, run in pairwise(runs)
+            if run.settings.stage == before.settings.stage  # else the item was mounted anew between them
+        ),
         verified_utc=(),
         solved_utc=datetime.now(UTC),
     )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rig.analysis.clock import ClockCheck
     from rig.analysis.elsewhere import OfSensor
     from rig.analysis.magnetic_field import MagnetometerResult
+    from rig.analysis.mounts import FoundMount
     from rig.analysis.of_kinds import KindFound
     from rig.analysis.onboard_check import Agreement
     from rig.analysis.told_from import ToldFrom
@@ -53,7 +54,7 @@ class Outcome:
     `drifts` are there where attitudes were repeated to watch the bias. `told_from` says of gyroscopes what may happen
     in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
     `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too. `of_kinds` is what the
-    solvers of installed kinds of sensors found.
+    solvers of installed kinds of sensors found. `mounts` say how the item sat in the stages after the first.
     """
 
     settings: "RunSettings"
@@ -71,6 +72,7 @@ class Outcome:
     told_from_in_reference: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
     elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
     of_kinds: "tuple[KindFound, ...]" = ()
+    mounts: "tuple[FoundMount, ...]" = ()
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:

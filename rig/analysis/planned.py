@@ -45,7 +45,7 @@ def planned_told_from(config: RigConfig, plan: Plan) -> Told:
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
     rates: dict[str, tuple[ToldFrom, ...]] = {}
-    if plan.sweeps:
+    if plan.sweeps and not plan.stages:  # what several mountings tell together is not foretold
         turned = planned_pieces(plan, site, np.array(settings.extension_m), model_of(config.arm).drawing)
         rates = {
             name: _told_from(name, each, turned, settings, rate, site=site, known=known)

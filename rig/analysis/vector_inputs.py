@@ -41,7 +41,10 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    arms_m = arms_of([turn for turn, _ in turns], run.settings)
+    arms_m = np.concatenate(
+        [arms_of(each.sensors[sensor].revolutions, run.settings, each.motion.mount) for each in recordings]
+    )
+    mounted = [each.run.settings.stage for each in recordings for _ in each.sensors[sensor].revolutions]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -58,6 +61,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         if run.settings.knows_returns
         else None,
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
+        mount_errors_rad_s=_mount_errors(turned, mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
         sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
@@ -88,9 +92,13 @@ def known_sensor(
     )
 
 
-def arms_of(turns: Sequence[Observation], settings: RunSettings) -> Array:
-    """(M, 3) from the axis that turns to where the sensors sit, in the flange's frame; zero where it is left out."""
-    known = [turn.arm_m + np.array(settings.extension_m) if turn.arm_m is not None else np.zeros(3) for turn in turns]
+def arms_of(turns: Sequence[Observation], settings: RunSettings, mount: Array | None = None) -> Array:
+    """(M, 3) from the axis that turns to where the sensors sit, in the item's frame; zero where it is left out.
+
+    The `mount` (3, 3) takes the flange's frame, in which the extension stands, into the item's; None: they are one.
+    """
+    extension_m = np.array(settings.extension_m) if mount is None else mount @ np.array(settings.extension_m)
+    known = [turn.arm_m + extension_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
     return np.reshape(known, (-1, 3)) * settings.knows_own_motion
 
 
@@ -135,6 +143,23 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, known: Uncertainty
             off[marks.index((joint, high)), place] += by_one
             off[marks.index((joint, low)), place] -= by_one
     return off
+
+
+def _mount_errors(turned: Array, stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
+    """(3 S, N, 3) errors as in `Seen`, of an item that may sit off its mount by `mount_deg` about each axis; or None.
+
+    The frame of the item is that of the first of S stages: three patterns each are of the others' own mounts, and the
+    last three of the first one's, which all others differ from alike.
+    """
+    first, *others = dict.fromkeys(stages)
+    if not others:
+        return None
+    std = np.radians(mount_deg) / np.sqrt(3)
+    by_axis = std * np.cross(np.eye(3)[:, None, :], turned)
+    own = [np.where(np.equal(stages, stage)[:, None], by_axis, 0.0) for stage in others]
+    of_first = np.where(np.equal(stages, first)[:, None], 0.0, -by_axis)
+    found = np.concatenate([*own, of_first])
+    return np.concatenate([found, np.zeros((len(found), rests, 3))], axis=1)
 
 
 def _visits(turns: Sequence[Observation]) -> list[list[int]]:
@@ -192,6 +217,7 @@ def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: Ear
         axis_rad=float(np.radians(known.axis_deg)),
         repeatability_rad=float(np.radians(known.repeatability_deg)),
         angle_std_rad=0.0 if known.angle_std_deg is None else known.angle_std_rad,
+        mount_rad=float(np.radians(known.mount_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,

@@ -152,4 +152,4 @@ def pull_m_s2(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:
     place_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
     acceleration = np.diff(place_m, n=2, axis=0) / step_s**2
     felt = np.einsum("nji,nj->ni", pose[1:-1, :3, :3], down_m_s2 - acceleration)
-    return np.asarray(felt.mean(axis=0), dtype=np.float64)
+    return np.asarray(way.motion.mount @ felt.mean(axis=0), dtype=np.float64)

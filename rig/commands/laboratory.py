@@ -1,21 +1,23 @@
 """Starts the simulated laboratory a configuration asks for, in a process of its own, and stops it afterwards."""
 
 import json
+import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rig.errors import Problem, Refused
 
 STOP_TIMEOUT_S = 5.0
+MOUNT_TIMEOUT_S = 30.0
 
 
 @contextmanager
-def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator[None]:
-    """Run the world of a configuration, given as its text, for the length of the `with` block.
+def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator[str]:
+    """Run the world of a configuration, given as its text, for the `with` block; the address of its control channel.
 
     Should steps of it come late, it writes to the file `late` what held them; to stderr where it is None.
 
@@ -41,13 +43,28 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
                     f"the simulated laboratory ended with status {process.wait()} before it was ready",
                     "What it said stands above; `rig world CONFIG` runs it alone",
                 )
-            yield
+            yield str(answer["control"])
         finally:
             kept_open.close()
             try:
                 process.wait(STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+def hands_of(control: str) -> Callable[[int], None]:
+    """What mounts the item for a stage, from 0: the simulated operator, who knows nothing but the stage's number.
+
+    `control` is the laboratory's control channel. Raises OSError where it is gone.
+    """
+    host, _, port = control.rpartition(":")
+
+    def mount(stage: int) -> None:
+        with socket.create_connection((host, int(port)), MOUNT_TIMEOUT_S) as channel:
+            channel.sendall(json.dumps({"do": "mount", "stage": stage}).encode() + b"\n")
+            channel.makefile("rb").readline()
+
+    return mount
 
 
 @contextmanager

@@ -67,6 +67,6 @@ def begun(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
         try:
             yield folder, found
         except Refused as refused:
-            if refused.name == "not_confirmed":
+            if refused.name in ("not_confirmed", "not_mounted"):
                 discard(folder)
             raise

@@ -184,6 +184,12 @@ class UncertaintySection(Section):
         description="standard deviation of a joint's angle about what its encoder tells: for sweeps that are no whole "
         "turns. No default, for no maker of these arms states it; whole turns do not need it",
     )
+    mount_deg: float = Field(
+        default=1.0,
+        ge=0,
+        le=10,
+        description="how far the item may sit off the mounting that each of `procedure.stages` states, about each axis",
+    )
     sensor_offset_mm: float = Field(
         default=50.0,
         ge=0,

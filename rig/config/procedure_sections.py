@@ -11,6 +11,7 @@ from rig.config.attitude_sets import SETS
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
+from rig.config.stage_section import StageSection, Wrist
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -25,7 +26,6 @@ __all__ = [
     "VerifySection",
 ]
 
-Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # once round at the slowest speed
@@ -114,6 +114,11 @@ class SixSweepsSection(ProcedureSection):
         return self.arc_deg % 360 != 0
 
     @property
+    def mountings(self) -> tuple[StageSection, ...]:
+        """The stages, in which the item is mounted anew; none where it stays as it is."""
+        return ()
+
+    @property
     def speeds(self) -> tuple[float, ...]:
         """The speeds at which every sweep is made, °/s."""
         return self.speeds_deg_s or (self.speed_deg_s,)
@@ -159,11 +164,27 @@ class SixObservationSection(SixSweepsSection):
         description="if the calibration passes, store it on the board, then repeat the movement with readings "
         "that the board corrects, and compare them with the reference's",
     )
+    stages: tuple[StageSection, ...] = Field(
+        default=(),
+        max_length=12,
+        description="mountings of the item, gone through one after the other",
+    )
 
     @property
     def then_verify(self) -> bool:
         """Whether the file asks for a verification after the calibration."""
         return self.verify
+
+    @property
+    def mountings(self) -> tuple[StageSection, ...]:
+        """The stages that the file names."""
+        return self.stages
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """The problems of the sweeps; a verification compares one whole movement, not several mountings."""
+        yield from SixSweepsSection.problems(self, config)
+        if self.stages and self.verify:
+            yield "procedure.verify repeats one movement with one mounting: leave out procedure.stages, or verify"
 
 
 class VerifySection(SixSweepsSection):

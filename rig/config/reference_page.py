@@ -187,6 +187,8 @@ def _section_of(schema: Schema) -> Schema | None:
     """What a key holds if that is a section or several, be it one that may be null."""
     if "$ref" in schema or "patternProperties" in schema:
         return schema
+    if "$ref" in schema.get("items", ()):  # a list of sections
+        return dict(schema["items"])
     return next((each for each in schema.get("anyOf", ()) if "$ref" in each), None)
 
 

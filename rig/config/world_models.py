@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
+from rig.config.stage_section import StageMountSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
@@ -407,3 +408,8 @@ class WorldSection(Section):
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})
+    mounts: tuple[StageMountSection, ...] = Field(
+        default=(),
+        max_length=12,
+        description="how the simulated operator truly mounts the item for each of `procedure.stages`",
+    )

@@ -99,9 +99,14 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     _ = sensor.sample_dtype
     if sensor.measures(RATE) and (sensor.channel(RATE).range is None or not sensor.measures(TEMPERATURE)):
         raise ValueError(f"the gyroscope {sensor.part} states no range or no temperature")
-    mounting = np.array(sensor.mounting)
-    # No element of a rotation exceeds one; the squares of much larger ones would overflow.
-    small = np.abs(mounting).max() < 2
-    if not (small and np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
-        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quote(sensor.mounting)}")
+    check_rotation(sensor.mounting, f"the mounting of {sensor.part}")
     return sensor
+
+
+def check_rotation(mounting: Mounting, what: str) -> None:
+    """Raise ValueError where the rows of a mounting are not of length one and at right angles."""
+    rows = np.array(mounting)
+    # No element of a rotation exceeds one; the squares of much larger ones would overflow.
+    small = np.abs(rows).max() < 2
+    if not (small and np.allclose(rows @ rows.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
+        raise ValueError(f"{what} is no rotation: {quote(mounting)}")

@@ -386,6 +386,17 @@ class VerificationEntry(Entry):
     after: ComparisonEntry
 
 
+class MountEntry(Entry):
+    """How the item sat in a stage, counted from 1, beside how it was to be mounted, against the first stage.
+
+    `turn_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
+    """
+
+    stage: int
+    turn_rad: Vector3
+    std_rad: Vector3
+
+
 class ResultDocument(Entry):
     """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified.
 
@@ -394,6 +405,7 @@ class ResultDocument(Entry):
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
     `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
     `others` are results of kinds that packages add, by the kind's key: what stands there only the package knows.
+    `mounts` are there of a run of several stages, for each but the first.
     A sensor's name becomes that of files: what a configuration does not take for one is none here either.
     """
 
@@ -409,6 +421,7 @@ class ResultDocument(Entry):
     bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
     unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
     others: dict[str, dict[SensorName, JsonValue]] = Field(default_factory=dict)
+    mounts: tuple[MountEntry, ...] = ()
 
     def text(self) -> str:
         """The result as JSON; what was left out stays out."""

@@ -17,6 +17,7 @@ from pydantic import Field
 from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, Positive, checked
+from rig.data.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
@@ -118,6 +119,7 @@ class Uncertainty:
     g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
     decision_rule: DecisionRule
     repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
+    mount_deg: Annotated[float, Field(ge=0)] = 0.0  # … which know no stages
     acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
     angle_std_deg: Annotated[float, Field(ge=0)] | None = None
     nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
@@ -198,6 +200,9 @@ class RunSettings:
     checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, what
     docs/uncertainty.md says of today. `home_q_rad` are the angles of the turner's joints, of which there may be none.
     Readings from `elsewhere` have no home and no limits.
+
+    `mounts` are the nominal rotations from the flange's frame to the item's in the stages of the procedure, of which
+    this recording is of number `stage`, from 0; none where the item stays mounted as it is.
     """
 
     procedure: str
@@ -217,6 +222,13 @@ class RunSettings:
     extension_m: Vector3 = (0.0, 0.0, 0.0)
     reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
     elsewhere: Elsewhere | None = None
+    mounts: tuple[Mounting, ...] = ()
+    stage: Annotated[int, Field(ge=0)] = 0
+
+    @property
+    def mount(self) -> Mounting:
+        """The nominal rotation from the flange's frame to the item's, in which the sensors' mountings stand."""
+        return self.mounts[self.stage] if self.mounts else AS_THE_FLANGE
 
     @property
     def checked_by_model(self) -> bool:
@@ -263,7 +275,8 @@ class RunSettings:
     @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
-        return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
+        steps = self.planned_sweeps, self.planned_dwells
+        return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts
 
     @property
     def holds_all_kinds(self) -> bool:
@@ -295,6 +308,8 @@ class RunSettings:
         document = {**asdict(self), "limits": None if self.limits is None else self.limits.model_dump()}
         if self.elsewhere is None:
             del document["elsewhere"]
+        if not self.mounts:
+            del document["mounts"], document["stage"]
         return document
 
     def to_json(self) -> str:
@@ -311,6 +326,10 @@ def settings_from_json(text: str) -> RunSettings:
     settings = checked(RunSettings, document, "settings")
     if settings.elsewhere is None and settings.limits is None:
         raise ValueError("its settings have no limits, which those of a run have")
+    if settings.mounts and settings.stage >= len(settings.mounts):
+        raise ValueError(f"its settings are of stage {settings.stage}, and there are {len(settings.mounts)} mounts")
+    for mount in settings.mounts:
+        check_rotation(mount, "the mount of a stage")
     return settings
 
 
@@ -345,6 +364,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         finds_earth_rate=config.procedure.finds_earth_rate,
         extension_m=config.turner.extension_m,
         reckoning=RECKONING,
+        mounts=tuple(stage.mount for stage in plan.stages),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
         raise _angle_std_not_stated()

@@ -105,6 +105,7 @@ class Unknown:
     These are standard uncertainties. `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width`
     is there where it is that of any such clock; `axis_rad` is the direction of each swept axis, `repeatability_rad` an
     angle that is come back to, `angle_std_rad` that of a joint about what its encoder tells, at the ends of arcs,
+    `mount_rad` (half of a width) how far an item sits off a stage's mount about each axis,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
     how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
     `counts_freedom` says whether they make the coverage factor.
@@ -125,6 +126,7 @@ class Unknown:
     counts_freedom: bool = True
     repeatability_rad: float = 0.0
     angle_std_rad: float = 0.0
+    mount_rad: float = 0.0
 
 
 def uncounted(unknown: Unknown) -> Unknown:
@@ -178,6 +180,9 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         spread = of(seen.encoder_errors_rad_s @ matrix.T)
         stated = 2 * float(np.degrees(unknown.angle_std_rad))
         yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
+    if seen.mount_errors_rad_s is not None:
+        off, half_width = np.sqrt(3) * seen.mount_errors_rad_s @ matrix.T, float(np.degrees(unknown.mount_rad))
+        yield assumed("mounting anew", half_width, "°", "uncertainty.mount_deg", off)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off

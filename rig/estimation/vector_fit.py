@@ -8,7 +8,8 @@ assumed: what sweeps and rests do not tell apart stays out of the model and belo
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -34,10 +35,11 @@ class Seen:
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
     own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
     for each time they do, None in recordings of before; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
-    at the ends of arcs, None where all sweeps are whole turns; `arms_m` (N, 3) a way from the axis that turns to where
-    the sensor is taken to sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3):
-    with how many degrees of freedom the variances are known. `sensor` is what is known of the sensor beforehand, None
-    in recordings of before.
+    at the ends of arcs, None where all sweeps are whole turns; `mount_errors_rad_s` (3 S, N, 3) the same of an item
+    that was mounted anew for S stages, None where it stayed: of the stages but the first, then of the first; `arms_m`
+    (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
+    motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
+    what is known of the sensor beforehand, None in recordings of before.
     """
 
     means_rad_s: Array
@@ -51,6 +53,7 @@ class Seen:
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
     return_errors_rad_s: Array | None = None
+    mount_errors_rad_s: Array | None = None
     arms_m: Array | None = None
     noise_freedom: Array | float = np.inf
     sensor: KnownSensor | None = None
@@ -86,9 +89,9 @@ class Seen:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """(P, N, 3) what all kinds of errors of the arm's angles add."""
+        """(P, N, 3) what all kinds of errors of the arm's angles add, and those of mounts last."""
         none = np.zeros((0, *self.means_rad_s.shape))
-        kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s)
+        kinds = (self.axis_errors_rad_s, self.return_errors_rad_s, self.encoder_errors_rad_s, self.mount_errors_rad_s)
         return np.concatenate([none, *(each for each in kinds if each is not None)])
 
     def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
@@ -111,13 +114,17 @@ class Seen:
 class Explained:
     """The vector model's solution, how the bias wandered, and what both were found from.
 
-    `nonlinearity` is None where all sweeps were made at one speed, for which the solution holds then.
+    `nonlinearity` is None where all sweeps were made at one speed, for which the solution holds then. `mounts` (3 S,)
+    are the errors of the mounts as in `Seen`, in standard deviations of what was known of them before, and
+    `mounts_covariance` (3 S, 3 S) what is known of them now; S is 0 where the item stayed mounted as it was.
     """
 
     solution: VectorSolution
     bias: BiasProcess
     seen: Seen
     nonlinearity: Nonlinearity | None
+    mounts: Array = field(default_factory=partial(np.zeros, 0))
+    mounts_covariance: Array = field(default_factory=partial(np.zeros, (0, 0)))
 
 
 def centripetal_m_s2(turns_rad_s: Array, way_m: Array) -> Array:
@@ -197,4 +204,6 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
     solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
     curved = slice(len(arm_errors), len(known))
     found = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
-    return Explained(solution, bias, seen, found)
+    mounts = slice(len(arm_errors) - (0 if seen.mount_errors_rad_s is None else len(seen.mount_errors_rad_s)),
+                   len(arm_errors))  # fmt: skip
+    return Explained(solution, bias, seen, found, errors.sizes[mounts], errors.covariance[mounts, mounts])

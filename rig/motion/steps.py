@@ -73,7 +73,11 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """A movement between sweeps or attitudes; nothing is measured during it."""
+    """A movement between sweeps or attitudes; nothing is measured during it.
+
+    One that `tries` the mounting is a small turn of one joint that the sensors must feel about the axis and with the
+    sign that the stage's mounting says, or the run ends.
+    """
 
     name: str
     start_q_rad: Joints
@@ -81,6 +85,7 @@ class Transfer:
     speed_rad_s: float
     acceleration_rad_s2: float
     duration_s: float
+    tries: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +119,30 @@ Step = Sweep | Transfer | Rest | Dwell
 
 
 @dataclass(frozen=True, slots=True)
+class Stage:
+    """A part of a plan before which the operator mounts the item as the `instruction` says; it has its own recording.
+
+    `mount` (3 rows of 3) is the nominal rotation from the flange's frame to the item's, in which the sensors'
+    mountings stand. `indices` are those of its sweeps in the whole procedure; `begins` counts the plan's steps before.
+    """
+
+    mount: tuple[Vector3, Vector3, Vector3]
+    instruction: str
+    indices: frozenset[int]
+    begins: int
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
-    """Every step in order. `home_q_rad` is where the plan ends, `start_q_rad` where it expects the arm to begin."""
+    """Every step in order. `home_q_rad` is where the plan ends, `start_q_rad` where it expects the arm to begin.
+
+    The item stays mounted as it is where there are no `stages`; else it is mounted for each, with the arm at home.
+    """
 
     steps: tuple[Step, ...]
     start_q_rad: Joints
     home_q_rad: Joints
+    stages: tuple[Stage, ...] = ()
 
     @property
     def duration_s(self) -> float:

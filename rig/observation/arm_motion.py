@@ -10,7 +10,15 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.motion.geometry import NOMINAL, DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_rate
+from rig.motion.geometry import (
+    NOMINAL,
+    DenavitHartenberg,
+    axis_errors,
+    flange_arm,
+    flange_attitude,
+    flange_axes,
+    flange_rate,
+)
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
 from rig.observation.known_motion import check_span, closely_followed, not_finite
@@ -27,16 +35,22 @@ class ArmMotion:
 
     Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
     counts is when the joint was where. `states` (m,) are rows as `state_dtype` has them, of joints of that `kinematics`
-    and of those `names`.
+    and of those `names`. All that stands in the flange's frame is given in the item's, to which `mount` (3, 3) takes
+    it: they are one where the item is not mounted anew.
     Raises Fault `no_motion`, `not_finite`, `impossible_times`.
     """
 
     def __init__(
-        self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL, names: Sequence[str] = JOINT_NAMES
+        self,
+        states: NDArray[Any],
+        kinematics: DenavitHartenberg = NOMINAL,
+        names: Sequence[str] = JOINT_NAMES,
+        mount: Array | None = None,
     ) -> None:
         from scipy.interpolate import CubicSpline
 
         self.kinematics, self._names = kinematics, names
+        self.mount: Array = np.eye(3) if mount is None else mount
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
         if len(self.time_s) < 4 or not names:
@@ -51,7 +65,7 @@ class ArmMotion:
         rates = flange_rate(angles, CubicSpline(times_s, angles)(times_s, 1), kinematics)
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
-        self.rate = CubicSpline(times_s, rates)
+        self.rate = CubicSpline(times_s, rates @ self.mount.T)
         close = np.diff(self.time_s) <= MAX_STATE_STEP_S
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
@@ -64,8 +78,18 @@ class ArmMotion:
     def attitude(self, start_s: float, end_s: float) -> Array:
         """The mean rotation (3, 3) from the base frame into the flange's between two controller times."""
         times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
-        mean: Array = flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
+        mean: Array = self.mount @ flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
         return mean
+
+    def axes(self, q_rad: Array) -> Array:
+        """(…, 3, 6) the joints' axes of growing angles at joint angles (…, 6)."""
+        axes: Array = self.mount @ flange_axes(q_rad, self.kinematics)
+        return axes
+
+    def axis_errors(self, q_rad: Array, joint: int) -> Array:
+        """(13, 3) how the arm's own errors turn the axis of a joint, per radian (`rig.motion.geometry.AXIS_ERRORS`)."""
+        errors: Array = axis_errors(q_rad, joint, self.kinematics) @ self.mount.T
+        return errors
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
@@ -102,9 +126,9 @@ class ArmMotion:
             found.end_s,
             found.duration_std_s,
             axis_flange=rate / np.linalg.norm(rate),
-            attitude=flange_attitude(began, self.kinematics),
-            axis_errors=growing * axis_errors(began, sweep.joint, self.kinematics),
-            arm_m=flange_arm(began, sweep.joint, self.kinematics),
+            attitude=self.mount @ flange_attitude(began, self.kinematics),
+            axis_errors=growing * self.axis_errors(began, sweep.joint),
+            arm_m=self.mount @ flange_arm(began, sweep.joint, self.kinematics),
             station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
             angle_rad=sweep.angle_rad,
         )
@@ -120,12 +144,16 @@ class ArmMotion:
         return q_rad
 
 
-def motion_of(run: RunData) -> ArmMotion:
-    """What turned in a recording. Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`."""
+def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:
+    """What turned in a recording, as it moves the item; `turned` (3, 3) is by how that sits off its nominal mount.
+
+    Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`.
+    """
     refuse_elsewhere(run)
     turner = run.turner
     assert turner is not None, "of what was not recorded elsewhere"
-    return ArmMotion(run.states, turner.geometry, turner.joints)
+    mount = np.array(run.settings.mount)
+    return ArmMotion(run.states, turner.geometry, turner.joints, mount if turned is None else turned @ mount)
 
 
 def refuse_elsewhere(run: RunData) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_dwells, finished_sweeps
+
+AS_STATED: Mapping[int, Array] = MappingProxyType({})  # no stage's mount is known to be off
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,22 +85,28 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], beside: st
     return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
 
 
-def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:
-    """Observe every gyroscope of a recording; raises Fault as `motion_of` and `observe_sensor` do."""
-    motion = motion_of(run)
+def observe_run(
+    run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = (), turned: Array | None = None
+) -> ObservedRun:
+    """Observe every gyroscope of a recording; raises Fault as `motion_of` and `observe_sensor` do.
+
+    `turned` (3, 3) is by how the item sits off its nominal mount, where that is known.
+    """
+    motion = motion_of(run, turned)
     sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.measuring(RATE)}
     return ObservedRun(run, motion, sensors)
 
 
-def observe_runs(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
+def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
     """Every recording of one run that adds a finished sweep or dwell; one that several hold counts in the last one.
 
-    The thresholds are those of the first recording. Raises as `refuse_elsewhere`; Fault as `observe_run` does.
+    The thresholds are those of the first recording; `turned` is as of `observe_run`, by the stage of the procedure.
+    Raises as `refuse_elsewhere`; Fault as `observe_run` does.
     """
     for run in runs:
         refuse_elsewhere(run)
     return tuple(
-        observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]))
+        observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]), turned.get(run.settings.stage))
         for place, run in enumerate(runs)
         if _finished(run) - _repeated(runs[place + 1 :])
     )

@@ -2,22 +2,24 @@
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import permutations, product
 
 import numpy as np
 
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixSweepsSection, Wrist
+from rig.config.procedure_sections import SixSweepsSection
 from rig.config.section import Direction
+from rig.config.stage_section import Wrist, mount_matrix
 from rig.errors import Refused
+from rig.estimation.arrays import Array
 from rig.motion.carried import carried_by
 from rig.motion.geometry import flange_axes
 from rig.motion.keep_out import keeps_clear
 from rig.motion.model import home_of, model_of
 from rig.motion.state import JOINT_NAMES, Joints
-from rig.motion.steps import Plan, Rest, Step, Sweep, trapezoid_duration
+from rig.motion.steps import Plan, Rest, Stage, Step, Sweep, Transfer, trapezoid_duration
 from rig.plans.drift import drift_effect
 from rig.plans.ways import approach, transfer
 
@@ -26,6 +28,8 @@ AXES_SPAN = 0.5
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
 BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")
 WORTHWHILE = 2 / 3  # an order that is not better by a third is not worth leaving the paper's
+# Of a stage's mounting: far enough to stand out from any gyroscope's noise, and a hand gets out of the way.
+TRIAL_RAD, TRIAL_SPEED_RAD_S, TRIAL_RAD_S2 = math.radians(10), math.radians(15), math.radians(60)
 DIGITS = 9  # equally good but for rounding: the first of them is chosen, on every machine
 WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wrist_2", "wrist_3"))
 
@@ -61,26 +65,69 @@ def plan_six_observation(
     The whole series repeats `procedure.repeats` times.
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly, and it ends
     at home.
-    `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
+    `done` holds the indices of sweeps to leave out: those an interrupted run has finished. Where the item is mounted in
+    several stages, all of it is done in each, of the wrists that are swept there.
     Limits are not judged here: see `rig.motion.preflight`.
     Raises Refused `axes_do_not_span`.
     """
     home = home_of(arm)
-    _check_span(home)
     start = home if start_q_rad is None else start_q_rad
-    sweeps = [sweep for sweep in _ordered_sweeps(arm, procedure) if sweep.index not in done]
+    swept = _ordered_sweeps(arm, procedure)
+    if procedure.mountings:
+        return _in_stages(swept, start, arm, procedure, done)
+    _check_span(flange_axes(home)[:, [WRIST_1, WRIST_2, WRIST_3]])
+    sweeps = [sweep for sweep in swept if sweep.index not in done]
     steps = tuple(_connected(sweeps, start, home, arm, procedure))
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
-def _check_span(home: Joints) -> None:
-    """Six parameters can be told only from turns about three independent axes."""
-    if np.linalg.svd(flange_axes(home)[:, [WRIST_1, WRIST_2, WRIST_3]], compute_uv=False)[2] < AXES_SPAN:
+def _check_span(axes: Array) -> None:
+    """Six parameters can be told only from turns about three independent axes (3, n)."""
+    if axes.shape[1] < 3 or np.linalg.svd(axes, compute_uv=False)[2] < AXES_SPAN:
         raise Refused(
             "axes_do_not_span",
-            "the swept wrists do not turn the flange about three independent axes",
-            "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
+            "the swept wrists do not turn the sensors about three independent axes",
+            "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists or mount the item in more ways",
         )
+
+
+def _in_stages(
+    swept: Sequence[Sweep], start: Joints, arm: ArmSection, procedure: SixSweepsSection, done: Collection[int]
+) -> Plan:
+    """The sweeps of every stage after a trial of its mounting; each stage begins and ends at home.
+
+    A stage of which nothing is left to do has no steps. Raises Refused `axes_do_not_span`.
+    """
+    home = home_of(arm)
+    steps: list[Step] = list(_connected((), start, home, arm, procedure))
+    stages: list[Stage] = []
+    axes: list[Array] = []
+    index = 0
+    for section in procedure.mountings:
+        mount = mount_matrix(section.mount)
+        wrists = section.sweeps or USUAL_ORDER
+        own = [
+            replace(sweep, index=index + place)
+            for place, sweep in enumerate(each for each in swept if each.joint_name in wrists)
+        ]
+        index += len(own)
+        axes += [mount @ axis for axis in dict.fromkeys(sweep.axis_flange for sweep in own if sweep.direction == "ccw")]
+        first, second, third = ((x, y, z) for x, y, z in mount.tolist())
+        indices = frozenset(sweep.index for sweep in own)
+        stages.append(Stage((first, second, third), section.instruction, indices, begins=len(steps)))
+        if left := [sweep for sweep in own if sweep.index not in done]:
+            steps += [*_trials(left, home), *_connected(left, home, home, arm, procedure)]
+    _check_span(np.array(axes).T)
+    return Plan(tuple(steps), start_q_rad=start, home_q_rad=home, stages=tuple(stages))
+
+
+def _trials(sweeps: Sequence[Sweep], home: Joints) -> Iterator[Transfer]:
+    """A small turn of each joint that is to be swept, and back: it shows how the item is mounted."""
+    for joint in dict.fromkeys(sweep.joint for sweep in sweeps):
+        there = _with_joint(home, joint, home[joint] + TRIAL_RAD)
+        for name, here, target in (("trial", home, there), ("back from the trial", there, home)):
+            for way in transfer(f"{name} of {JOINT_NAMES[joint]}", here, target, TRIAL_SPEED_RAD_S, TRIAL_RAD_S2):
+                yield replace(way, tries=target is there)
 
 
 @lru_cache(maxsize=16)

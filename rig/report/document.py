@@ -4,8 +4,9 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
+from rig.analysis.mounts import FoundMount
 from rig.analysis.outcome import Origin, Outcome
-from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
 from rig.report.budget_entry import clock_entry
 from rig.report.elsewhere_entries import unsolved
 from rig.report.entry import entry
@@ -31,7 +32,14 @@ def document_of(outcome: Outcome) -> ResultDocument:
             **found,
             **({"unsolved": faults} if (faults := unsolved(outcome)) else {}),
             **({"others": others} if others else {}),
+            **({"mounts": tuple(map(_mount, outcome.mounts))} if outcome.mounts else {}),
         }
+    )
+
+
+def _mount(found: FoundMount) -> MountEntry:
+    return MountEntry.model_validate(
+        {"stage": found.stage + 1, "turn_rad": tuple(found.turn_rad), "std_rad": tuple(found.std_rad)}
     )
 
 

@@ -63,7 +63,7 @@ def errors(recording: ObservedRun, sensor: str, explained: Explained, earth: Ear
         values[:count].reshape(-1, many, 3).mean(axis=1)[known]
         for values in (motion.rate(stream.time_s), stream.readings_rad_s)
     )
-    felt = flange_attitude(motion.angles(time_s[known]), motion.kinematics) @ earth.rate_rad_s
+    felt = flange_attitude(motion.angles(time_s[known]), motion.kinematics) @ earth.rate_rad_s @ motion.mount.T
     found = (readings + solution.bias_rad_s) @ np.linalg.inv(solution.matrix).T
     return time_s[known] - time_s[known][0], turned, found - turned - felt
 

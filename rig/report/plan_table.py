@@ -14,7 +14,7 @@ from rich.table import Table
 from rig.config.models import RigConfig
 from rig.motion.doubts import doubts
 from rig.motion.state import JOINT_NAMES, Joints
-from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, closes, turn_words
+from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
@@ -82,6 +82,8 @@ def plan_document(planned: Planned) -> dict[str, Any]:
         "doubts": doubts(plan),
         "steps": steps,
     }
+    if plan.stages:
+        document["stages"] = [{**asdict(stage), "indices": sorted(stage.indices)} for stage in plan.stages]
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
     for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
@@ -112,8 +114,12 @@ def _print_steps(planned: Planned, console: Console) -> None:
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
         table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
     at_s = 0.0
-    for step in plan.steps:
-        name = step.name if isinstance(step, (Sweep, Dwell)) else type(step).__name__.lower()
+    begins = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}
+    for place, step in enumerate(plan.steps):
+        if place in begins:
+            number, stage = begins[place]
+            table.add_row("", f"stage {number}", "", plain(stage.instruction), "", "")
+        name = step.name if isinstance(step, (Sweep, Dwell)) else _name(step)
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
@@ -165,6 +171,10 @@ def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Tab
     for row in zip(*map(told_from_entries, by_sensor.values()), strict=True):
         table.add_row(row[0].what, *(size_words(each.size, each.unit) for each in row))
     return table
+
+
+def _name(step: Transfer | Rest) -> str:
+    return "trial" if isinstance(step, Transfer) and step.tries else type(step).__name__.lower()
 
 
 def _motion(step: Step) -> tuple[str, str, str]:

@@ -152,6 +152,12 @@ class Acquisition:
         recent = samples["board_time_us"] + np.uint64(span_us) >= samples["board_time_us"][-1]
         return samples[recent], [state for state in states if state.time_s >= from_s], new
 
+    def newest(self, sensor: str) -> np.ndarray:
+        """Samples (n,) of one sensor that came since the latest `keep`."""
+        with self._lock:
+            batches = list(self._kept[-1].batches[sensor]) if self._kept else []
+        return np.concatenate(batches or [np.empty(0, self.counts[sensor].sensor.sample_dtype)])
+
     def samples(self) -> tuple[SensorSamples, ...]:
         """What every sensor has delivered so far."""
         with self._lock:

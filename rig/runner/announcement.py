@@ -1,15 +1,29 @@
 """What an operator must know before agreeing to a movement. Pure."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import degrees
 
 from rig.motion.doubts import doubts
 from rig.motion.preflight import way_to_home
 from rig.motion.state import Report
-from rig.motion.steps import Plan, turn_words
+from rig.motion.steps import Plan, Stage, turn_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 from rig.turners.kind import Words
+
+
+def mounting(stages: Sequence[Stage], number: int) -> Prompt:
+    """The question before a stage, with its `number` from 0: whether the item is mounted for it."""
+    stage = stages[number]
+    lines = (
+        f"Stage {number + 1} of {len(stages)}: {stage.instruction}.",
+        "The arm stands still and its program has ended: it does not move until you answer.",
+        "Then small turns try the mounting, before "
+        f"{len(stage.indices)} sweeps turn the wrists by more than a whole turn each.",
+        "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
+    )
+    ticked = "The item is mounted so, and nobody and nothing is within the arm's reach"
+    return Prompt(lines, to_tick=ticked, for_a_person=True, mounts=number)
 
 
 def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:

@@ -53,6 +53,13 @@ class Connector:
     found: Mapping[str, Solved] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
 
+    @property
+    def _left_out(self) -> frozenset[int]:
+        """The sweeps that are not made now: those that are done, and those of other stages."""
+        stages = self.phase.plan().stages
+        others = (each.indices for place, each in enumerate(stages) if place != self.settings.stage)
+        return self.resumed.done.union(*others)
+
     @contextmanager
     def open(self) -> Iterator[Rig]:
         """Everything connected and recording, nothing moved yet; on the way out the turner stops, the file is closed.
@@ -64,7 +71,7 @@ class Connector:
         # The board's own calibration needs it of the host after each sweep: to import it takes longer than to use it.
         import scipy.interpolate  # noqa: F401
 
-        if self.resumed.earlier:
+        if self.resumed.earlier and not self.phase.agreed:  # a stage that follows resumes nothing
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps) + len(whole_plan.dwells)))
         acquisition = Acquisition()
         with ExitStack() as stack:
@@ -83,11 +90,14 @@ class Connector:
             carried = mounted(described, on_board, self.memory, simulated=simulated)
             yield Rig(
                 devices=Devices(turner, report, kind, self.loaded.config.turner, sources, acquisition, carried),
-                plan=self.phase.plan(report.state.q_rad, self.resumed.done),
+                plan=self.phase.plan(report.state.q_rad, self._left_out),
                 whole_plan=whole_plan,
                 recording=recording,
                 along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
                 phase=self.phase,
+                stage=self.settings.stage,
+                last=not any(each.indices - self.resumed.done for each in whole_plan.stages[self.settings.stage + 1 :]),
+                up=self.loaded.config.site.up,
             )
 
     def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> BoardSource:
@@ -174,7 +184,7 @@ class Connector:
                 turner=turner,
                 sensors=described,
             )
-        return Recording(stack.enter_context(recorder), described, self.station)
+        return Recording(stack.enter_context(recorder), described, self.station, turner.geometry)
 
     def _calibrating_along(
         self, source: BoardSource, acquisition: Acquisition, recording: Recording, turner: RecordedTurner

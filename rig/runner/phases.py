@@ -5,7 +5,7 @@ were kept, the command to go on with.
 """
 
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,10 +19,12 @@ from rig.data.run_file import RunData, make_plain, read_run
 from rig.data.run_folder import next_recording, recordings, resuming
 from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, ProblemError, Refused
+from rig.motion.steps import Stage
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
+from rig.runner.announcement import mounting
 from rig.runner.connect import Connector
 from rig.runner.mounted import Memory
 from rig.runner.resumption import Resumption, resumption
@@ -81,18 +83,24 @@ class Run:
     def _recorded(
         self, phase: Phase, resumed: Resumption, *, moved: bool, found: Mapping[str, SensorResult] | None = None
     ) -> tuple[RunData, ...]:
-        """Carry out the phase's script, with the calibrations `found` before; all recordings of the phase."""
+        """Carry out the phase's script, with the calibrations `found` before; all recordings of the phase.
+
+        The item is mounted anew before each stage with nothing connected: what is in the way may be unplugged.
+        """
         readings = phase.procedure.readings
-        path = next_recording(self.folder, readings)
-        own = phase.procedure is self.script.procedure
-        script = self.script if own else installed_script(phase.procedure.name)
-        settings = self._settings(phase)
-        told = self.station, resumed, found or {}, self.memory
-        connector = Connector(phase, self.loaded, settings, script, path, *told)
-        with self.reported(self._mended, moved=moved), connector.open() as rig:
-            self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
-            phase.procedure.script(rig)
-            self.station.event(rig.recorded())
+        with self.reported(self._mended, moved=moved):
+            stages = phase.plan().stages
+        left = [number for number, each in enumerate(stages) if each.indices - resumed.done]
+        for number in left or [max(len(stages) - 1, 0)]:
+            if stages:
+                with self.reported(self._mended, moved=moved):
+                    self._mounted(stages, number)
+            path = self._record(phase, number, resumed, moved=moved, found=found)
+            if stages:
+                with self.reported(self._repeating, moved=True):
+                    earlier = [read_run(file) for file in recordings(self.folder, readings)]
+                resumed = Resumption(earlier, resumed.done | stages[number].indices)
+                phase, moved = replace(phase, agreed=True), True
         with self.reported(self._repeating, moved=True):
             files = recordings(self.folder, readings)
             if path not in files:
@@ -106,6 +114,37 @@ class Run:
             for file in files[:-1]:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
             return tuple(read_run(file) for file in files)
+
+    def _record(
+        self,
+        phase: Phase,
+        stage: int,
+        resumed: Resumption,
+        *,
+        moved: bool,
+        found: Mapping[str, SensorResult] | None,
+    ) -> Path:
+        """Carry out the phase's script for one stage, which is the whole of it where there are none; the recording."""
+        path = next_recording(self.folder, phase.procedure.readings)
+        own = phase.procedure is self.script.procedure
+        script = self.script if own else installed_script(phase.procedure.name)
+        settings = replace(self._settings(phase), stage=stage)
+        told = self.station, resumed, found or {}, self.memory
+        connector = Connector(phase, self.loaded, settings, script, path, *told)
+        with self.reported(self._mended, moved=moved), connector.open() as rig:
+            self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
+            phase.procedure.script(rig)
+            self.station.event(rig.recorded())
+        return path
+
+    def _mounted(self, stages: Sequence[Stage], number: int) -> None:
+        """Let the operator mount the item for a stage. Raises Refused `not_mounted`."""
+        if not self.station.ask(mounting(stages, number)):
+            raise Refused(
+                "not_mounted",
+                f"nobody has said that the item is mounted for stage {number + 1}",
+                "Go on when somebody stands there to mount it; --yes cannot say so, for hands are at the item then",
+            )
 
     def _settings(self, phase: Phase) -> RunSettings:
         """What the phase is judged by, recorded beside it."""

@@ -7,10 +7,13 @@ early (an error, Ctrl-C, a lost link) stops the arm first and is reported then.
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import degrees, radians
 
+import numpy as np
+
 from rig.config.models import TurnerSection
+from rig.config.section import Vector3
 from rig.data.events import (
     DwellFinished,
     DwellStarted,
@@ -20,16 +23,26 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
+from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.errors import Fault, Refused, refuse
+from rig.estimation.arrays import Array
+from rig.motion.geometry import DenavitHartenberg, flange_attitude, flange_axes
 from rig.motion.preflight import way_to_home
 from rig.motion.state import Report
-from rig.motion.steps import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
+from rig.motion.steps import Dwell, Motion, Plan, Rest, Stage, Step, Sweep, Transfer, travel
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
 from rig.runner.mounted import Mounted, ask_of_other_boards
+from rig.runner.mounting import (
+    REST_S,
+    Felt,
+    refuse_hanging_otherwise,
+    refuse_turning_otherwise,
+    refuse_unsteady,
+)
 from rig.runner.onboard import BoardCalibration
 from rig.sensors.source import SampleSource
 from rig.station.confirm import NOT_AGREED
@@ -50,6 +63,7 @@ from rig.turners.turner import Turner
 FIRST_SAMPLE_TIMEOUT_S = 2.0
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
 AT_REST_TIMEOUT_S = 10.0  # for the readings that tell how they scatter before anything has moved
+TRIAL_REST_S = 0.3  # of readings after a trial of the mounting, by which it has ended for the sensors too
 SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 
 
@@ -72,11 +86,15 @@ class Devices:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where everything goes, and what of (`sensors` by name); what happens is told at the `station` as well."""
+    """Where everything goes, and what of: `sensors` by name, and how what turns them is built.
+
+    What happens is told at the `station` as well.
+    """
 
     recorder: RunRecorder
     sensors: Mapping[str, RecordedSensor]
     station: Station
+    geometry: DenavitHartenberg
 
     def note(self, event: Event) -> None:
         """Record what happens, and tell it."""
@@ -98,8 +116,9 @@ class Recording:
 class Rig:
     """The verbs of one phase.
 
-    `whole_plan` is the same as `plan`, or more when an interrupted run goes on; `along` is there when the board
-    calibrates along.
+    `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
+    one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board
+    calibrates along, and `up` is that direction in the frame of the arm's base.
     """
 
     devices: Devices
@@ -108,6 +127,10 @@ class Rig:
     recording: Recording
     along: BoardCalibration | None
     phase: Phase
+    stage: int = 0
+    last: bool = True
+    up: Vector3 = (0.0, 0.0, 1.0)
+    _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # of each gyroscope, before anything moved
     _motions: Iterator[Motion] | None = None  # the plan's, those to come; None before pre-flight
     _number: int = 0  # of the step that goes on, or the last one
     _done_s: float = 0.0  # planned duration of the steps behind us
@@ -169,13 +192,52 @@ class Rig:
             time.sleep(0.005)
         if self.whole_plan.dwells:
             self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S, self._check)
+        if self.whole_plan.stages:
+            self._look_at_the_mounting(self.whole_plan.stages[self.stage])
         self.recording.station.event(SamplingStarted())
+
+    def _look_at_the_mounting(self, stage: Stage) -> None:
+        """Refuse an item that is not at rest, or that hangs otherwise than the stage says."""
+        self.devices.acquisition.keep()
+        state = self.devices.turner.latest
+        up = flange_attitude(np.array(state.q_rad), self.recording.geometry) @ np.array(self.up)
+        for felt in self._felt(REST_S, self._check):
+            refuse_unsteady(felt)
+            refuse_hanging_otherwise(felt, stage, up)
+            self._resting_rad_s[felt.name] = felt.rates_rad_s.mean(axis=0)
+
+    def _felt(self, lasting_s: float, watch: Callable[[], None]) -> list[Felt]:
+        """What all gyroscopes have read since the latest `keep`, once that is so long by the clock of each."""
+        acquisition = self.devices.acquisition
+        sensors = {name: each for name, each in self.recording.sensors.items() if each.measures(RATE)}
+
+        def long_enough() -> bool:
+            return all(_span_s(acquisition.newest(name)) >= lasting_s for name in sensors)
+
+        if not self._wait(long_enough, lasting_s + AT_REST_TIMEOUT_S, watch):
+            raise Fault(
+                "no_samples", f"in {lasting_s:g} s too few samples came", "Check the cables, then run `rig check`"
+            )
+        return [Felt(name, sensor, acquisition.newest(name)) for name, sensor in sensors.items()]
+
+    def _try_the_mounting(self, trial: Transfer, took_s: float) -> None:
+        """End the run where the sensors do not feel a trial's turn as the stage says."""
+        turned = np.array(travel(trial.start_q_rad, trial.target_q_rad))
+        axes = flange_axes(np.array(trial.start_q_rad), self.recording.geometry)
+        for felt in self._felt(took_s + TRIAL_REST_S, lambda: self._watch(trial)):
+            stage, resting_rad_s = self.whole_plan.stages[self.stage], self._resting_rad_s[felt.name]
+            refuse_turning_otherwise(felt, resting_rad_s, stage, axes @ turned, trial.name)
 
     def move(self, transfer: Transfer) -> None:
         """Bring the arm to where the next sweep starts, or home. Raises `unplanned_motion`."""
         self._refuse_unplanned(transfer)
+        if transfer.tries:
+            self.devices.acquisition.keep()
         with self._step(transfer):
+            began_s = self.devices.turner.latest.time_s
             self.devices.turner.move(transfer, lambda: self._watch(transfer))
+            if transfer.tries:
+                self._try_the_mounting(transfer, self.devices.turner.latest.time_s - began_s)
 
     def sweep(self, sweep: Sweep) -> None:
         """Turn one wrist through a whole revolution, or an arc, at constant speed and note when it began and ended.
@@ -236,8 +298,11 @@ class Rig:
         return True
 
     def solve_on_board(self) -> None:
-        """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""
-        if self.along is not None:
+        """Let the board compute its own calibration from what it has averaged; it stands beside the host's.
+
+        From the sweeps of all stages, after the last one: it knows speeds alone, whatever the item turns about.
+        """
+        if self.along is not None and self.last:
             self.along.solve()
 
     def readings(self) -> dict[str, str]:
@@ -288,6 +353,11 @@ class Rig:
                 arm_speed_rad_s=max(map(abs, state.qd_rad_s), default=0.0),
             )
         )
+
+
+def _span_s(samples: np.ndarray) -> float:
+    """How long samples (n,) last by the clock that stamped them."""
+    return float(np.ptp(samples["board_time_us"])) * 1e-6 if len(samples) else 0.0
 
 
 def _not_settled(dwell: Dwell, unsettled: Mapping[str, float | None]) -> Fault:

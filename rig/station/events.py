@@ -76,13 +76,15 @@ class PreflightPassed:
 class Prompt:
     """The operator is told `announcement` and asked to agree `to_do` it, which a page has them tick first.
 
-    What is `for_a_person` is not agreed to beforehand: nobody but somebody who is asked can say yes to it.
+    What is `for_a_person` is not agreed to beforehand: nobody but somebody who is asked can say yes to it. Before a
+    stage for which the item is mounted, `mounts` is its number, from 0.
     """
 
     announcement: tuple[str, ...]
     to_do: str = "start"
     to_tick: str = "I have looked: nobody and nothing is within the arm's reach"
     for_a_person: bool = False
+    mounts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,15 @@ class Station(Protocol):
 
 @dataclass(slots=True)
 class Stations:
-    """Several listeners, and one who answers; not `attended`, everything was agreed to beforehand."""
+    """Several listeners, and one who answers; not `attended`, everything was agreed to beforehand.
+
+    Who can `mount` the item for a stage does so when that is agreed to: the operator of a simulated laboratory.
+    """
 
     listeners: Sequence[Listener]
     answer: Callable[[Sequence[str], str], bool]
     attended: bool = True
+    mount: Callable[[int], None] | None = None
 
     def event(self, event: RunEvent) -> None:
         """Tell everyone, in order. Who raises is dropped, and the others are told of that."""
@@ -45,8 +49,11 @@ class Stations:
     def ask(self, prompt: Prompt) -> bool:
         """Whether the operator agrees; everyone hears the question and the answer."""
         self.event(prompt)
-        can_be_answered = self.attended or not prompt.for_a_person
+        mounts = self.mount is not None and prompt.mounts is not None
+        can_be_answered = self.attended or mounts or not prompt.for_a_person
         agreed = can_be_answered and self.answer(prompt.announcement, prompt.to_do)
+        if agreed and self.mount is not None and prompt.mounts is not None:
+            self.mount(prompt.mounts)
         self.event(Answered(agreed))
         return agreed
 

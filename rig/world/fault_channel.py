@@ -15,6 +15,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
+    mount stage                                 the item, as `world.mounts` says of that stage, from 0
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
@@ -84,6 +85,7 @@ class ControlSession:
             "silence_arm": self._silence_arm,
             "kvh_fault": self._kvh_fault,
             "kvh_power": self._kvh_power,
+            "mount": lambda stage: world.laboratory.mount(int(stage)),
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,

@@ -5,9 +5,12 @@ from functools import partial
 from math import pi, radians
 from random import Random
 
+import numpy as np
+
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
+from rig.config.stage_section import mount_matrix
 from rig.config.world_models import SimulatedArmSection, WorldSection
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -68,6 +71,8 @@ class Laboratory:
         self._elements: dict[str, SensingElement] = {}  # of the board's sensors that turn with the flange
         self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
+        self._mount = np.eye(3)  # from the flange's frame to the item's
+        self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
         self.plug_in()
         for name in self.kvhs:
@@ -114,6 +119,17 @@ class Laboratory:
         if name in self._elements:
             self._elements[name].set_fault(inside)
 
+    def mount(self, stage: int) -> None:
+        """Mount the item as the simulated operator does for that stage, from 0, or leave it where nothing is said."""
+        if stage < len(self._world.mounts):
+            self._mount = mount_matrix(self._world.mounts[stage])
+            for each in self._mounted:
+                each.mount_anew(self._mount)
+
+    def _on_the_item(self, sensor: SensorTruth | MountedMagnetometer) -> None:
+        sensor.mount_anew(self._mount)
+        self._mounted.append(sensor)
+
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
         self.turn()
@@ -144,22 +160,25 @@ class Laboratory:
 
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the flange feels at a virtual time inside the last tick."""
+        self._on_the_item(sensor)
         if self.arm.ideal and not sensor.feels_force:
             return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
         last: Felt | None = None
+        rows = sensor.rows
         motion: Sequence[float] = ()
 
         def motion_at(time_s: float) -> Sequence[float]:
-            nonlocal last, motion
+            nonlocal last, rows, motion
             felt = self.arm.felt_at(time_s)
-            if felt is not last:  # an arm that stands gives the same again
-                last, motion = felt, sensor.motion(felt)
+            if felt is not last or rows is not sensor.rows:  # an arm that stands gives the same again
+                last, rows, motion = felt, sensor.rows, sensor.motion(felt)
             return motion
 
         return motion_at
 
     def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
         """What a magnetometer on the flange feels at such a time."""
+        self._on_the_item(sensor)
         return lambda time_s: sensor.feels(self._field, self.arm.frames_at(time_s), time_s)
 
 

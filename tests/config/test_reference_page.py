@@ -22,7 +22,7 @@ def keys() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
         schema = model.model_json_schema()
         for section in (schema, *schema.get("$defs", {}).values()):
             for key, value in section["properties"].items():
-                parts = (value, *value.get("anyOf", ()))
+                parts = (value, value.get("items", {}), *value.get("anyOf", ()))  # a list of sections is none either
                 inner = any({"$ref", "patternProperties"} & set(part) for part in parts)
                 if section["title"] != "ProcedureSection" and not inner:
                     yield section["title"], key, value

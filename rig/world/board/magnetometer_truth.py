@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from math import radians
 
+import numpy as np
+
 from firmware_host.emulator.magnetometer import MagnetometerTruth
 from rig.config.sensor_sections import MountingSection
 from rig.config.world_magnetism import SimulatedFieldSection
@@ -30,8 +32,14 @@ class MountedMagnetometer:
             noise_t=MICROTESLA_T * simulated.noise_ut,
             non_orthogonality_rad=[radians(angle) for angle in simulated.non_orthogonality_deg],
         )
-        self._rows = mounted_rows(mounting, mounting_error_deg)
-        self._offset_m = [1e-3 * offset for offset in offset_mm]
+        self._sits = np.array(mounted_rows(mounting, mounting_error_deg))
+        self._place_m = 1e-3 * np.array(offset_mm)
+        self.mount_anew(np.eye(3))
+
+    def mount_anew(self, mount: np.ndarray) -> None:
+        """Mount the item it sits on: `mount` (3, 3) takes the flange's frame into the item's."""
+        self._rows: list[list[float]] = (self._sits @ mount).tolist()
+        self._offset_m: list[float] = (mount.T @ self._place_m).tolist()
 
     def feels(self, field: MagneticField, frames: Frames, time_s: float) -> Vector:
         """The field in its own axes, T, with the arm as its `frames` say, the flange's last."""

@@ -31,8 +31,19 @@ class SensorTruth:
             self.temperature_c = Warming(
                 simulated.start_temperature_c, simulated.temperature_c, simulated.warm_up_s, powered_s
             )
-        self._rows = mounted_rows(sensor.mounting, simulated.mounting_error_deg)
-        self._offset_m = [1e-3 * offset for offset in simulated.offset_mm]
+        self._sits = np.array(mounted_rows(sensor.mounting, simulated.mounting_error_deg))
+        self._place_m = 1e-3 * np.array(simulated.offset_mm)
+        self.mount_anew(np.eye(3))
+
+    def mount_anew(self, mount: np.ndarray) -> None:
+        """Mount the item the sensor sits on: `mount` (3, 3) takes the flange's frame into the item's."""
+        self._rows: list[list[float]] = (self._sits @ mount).tolist()
+        self._offset_m: list[float] = (mount.T @ self._place_m).tolist()
+
+    @property
+    def rows(self) -> list[list[float]]:
+        """The rotation from the flange's axes to the sensor's: another list once the item is mounted anew."""
+        return self._rows
 
     @property
     def feels_force(self) -> bool:
