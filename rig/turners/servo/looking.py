@@ -123,6 +123,6 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
         shutdown=bus.look_up(SHUTDOWN)[0],
         torque_on=bool(bus.look_up(TORQUE)[0]),
         watchdog=bus.look_up(WATCHDOG)[0] if firmware >= WATCHDOG_FIRMWARE else None,
-        round_trip_s=sorted(round_trips)[ROUND_TRIPS // 4],  # the line's: this computer may be busy
+        round_trip_s=sorted(round_trips)[1],  # the line's: this computer may be busy in the others
         state=states[-1],
     )

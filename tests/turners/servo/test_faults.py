@@ -17,6 +17,8 @@ from support.driven_servo import STANDS_RAD_S, at_speed, held, turn, turn_on_and
 from support.servo_on_a_wire import SET_UP, ServoOnAWire, servo_on_a_wire
 from support.waiting import wait_for
 
+pytestmark = pytest.mark.slow  # each fault takes its time to be known
+
 WATCHDOG_S = 0.3  # the driver's own
 MANY = 10**6
 
