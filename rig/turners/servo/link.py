@@ -165,7 +165,7 @@ class Link:
         counted_s = 1e-3 * ((state.tick - before.tick) % TICKS)
         wrap_s = 1e-3 * TICKS
         unlike_s = abs((counted_s - since_s + wrap_s / 2) % wrap_s - wrap_s / 2)
-        if unlike_s < TICK_S + TICK_SHARE * since_s + state.took_s:
+        if unlike_s < TICK_S + TICK_SHARE * since_s + state.took_s + before.took_s:
             self._unlike = 0
             return True
         self._unlike += 1
