@@ -22,6 +22,7 @@ from rig.station.events import (
     PhaseSkipped,
     Plotted,
     PreflightPassed,
+    Prompt,
     Remembered,
     RunEvent,
     RunFolderWritten,
@@ -36,6 +37,8 @@ def line(event: RunEvent) -> str | None:
     """What to say of it in one line; None for what only an instrument shows, or what others say."""
     text: str | None
     match event:
+        case Prompt(mounts=int(), announcement=(stage, *_)):
+            text = f"to be mounted: {stage}"
         case RunResumed(done, planned):
             text = f"resuming: {done} of {planned} sweeps and dwells are recorded and sound"
         case BoardConnected(port, identity):
