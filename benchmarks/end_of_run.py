@@ -34,7 +34,7 @@ def end(runs, repeated, folder):
 """
 NEW = """
 import rig.cli
-from rig.analysis.outcome import calibrated, verified
+from rig.analysis.analyses import calibrated, verified
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
 

@@ -8,7 +8,8 @@ These names are the public ones; where they are made may change. docs/how-to/own
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
-from rig.analysis.outcome import Outcome, calibrated, drifted, verified, verified_alone
+from rig.analysis.analyses import calibrated, drifted, verified, verified_alone
+from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, TurnerSection
 from rig.config.procedure_sections import (
     AttitudesSection,

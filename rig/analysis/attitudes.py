@@ -7,7 +7,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rig.analysis.calibration import estimator_among, or_fault
+from rig.analysis.calibration import or_fault
+from rig.analysis.estimators import estimator_among
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.of_kinds import OfKind
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom

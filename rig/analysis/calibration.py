@@ -3,12 +3,12 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Literal, TypeVar, get_args
+from typing import TypeVar
 
 import numpy as np
 
 from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import known_of, see, unknown_of
 from rig.data.motion_file import Item
@@ -31,11 +31,7 @@ from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_sweeps
 
-Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
-ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
-
 Result = TypeVar("Result")
-Choice = TypeVar("Choice", bound=str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,19 +93,6 @@ class SensorResult:
         if not averages or np.isnan([average.temperature_c for average in averages]).any():
             return None
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
-
-
-def known_estimator(name: str) -> Estimator:
-    """The estimator of that name. Raises Refused `unknown_estimator`."""
-    return estimator_among(ESTIMATORS, name)
-
-
-def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
-    """The one of that name. Raises Refused `unknown_estimator`."""
-    for known in choices:
-        if known == name:
-            return known
-    raise Refused("unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}")
 
 
 def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:

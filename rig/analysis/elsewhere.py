@@ -7,18 +7,10 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
-from rig.analysis.calibration import (
-    ESTIMATORS,
-    Estimator,
-    SensorResult,
-    estimator_among,
-    or_fault,
-    solve_observations,
-    solve_six_observation,
-    solve_vector,
-)
+from rig.analysis.calibration import SensorResult, or_fault, solve_observations, solve_six_observation, solve_vector
 from rig.analysis.check import Check
 from rig.analysis.correction import diagonal_correction, matrix_correction
+from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
 from rig.analysis.verdict import fitness

@@ -1,4 +1,4 @@
-"""What recordings amount to: they are solved, verified and judged here for `rig.analysis.outcome`."""
+"""What recordings amount to: they are solved, verified and judged here for `rig.analysis.analyses`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,16 +9,17 @@ import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.bias_drift import bias_drifts
-from rig.analysis.calibration import SensorResult, known_estimator, solve_observed
+from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, known_estimator
 from rig.analysis.magnetic_field import calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.of_kinds import kinds_on_arm
 from rig.analysis.onboard_check import agreement
-from rig.analysis.outcome import DEFAULT_ESTIMATOR, Origin, Outcome
+from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.vector_inputs import arms_of
 from rig.analysis.verdict import (
@@ -41,7 +42,7 @@ from rig.observation.observed_run import ObservedRun, observe_runs
 
 
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
-    """Solve and judge the recordings of a calibration, as `rig.analysis.outcome.calibrated` says."""
+    """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrated` says."""
     settings = runs[0].settings
     if (read := runs[0].elsewhere) is not None:
         return _elsewhere(runs, read, estimator)
@@ -110,7 +111,7 @@ def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> 
 
 
 def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
-    """Solve and judge attitudes gone through again and again, as `rig.analysis.outcome.drifted` says."""
+    """Solve and judge attitudes gone through again and again, as `rig.analysis.analyses.drifted` says."""
     outcome = calibrated(runs, estimator, drifting=True)
     settings = outcome.settings
     found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
@@ -151,7 +152,7 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """Verify a calibration by `repeated`, as `rig.analysis.outcome.verified` says."""
+    """Verify a calibration by `repeated`, as `rig.analysis.analyses.verified` says."""
     settings = outcome.settings
     known = settings.reference
     found: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
@@ -210,7 +211,7 @@ def _gravity_left(
 
 
 def verified_alone(repeated: Sequence[RunData]) -> Outcome:
-    """Verify the calibrations that the board had stored before, as `rig.analysis.outcome.verified_alone` says."""
+    """Verify the calibrations that the board had stored before, as `rig.analysis.analyses.verified_alone` says."""
     nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=_origin(repeated[:1]))
     return verified(nothing_calibrated, repeated)
 

@@ -1,12 +1,9 @@
-"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s.
+"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
 
-Procedures name what is here, and whoever plans one reads it: so what solves is loaded when there is something to solve.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from rig.analysis.acceleration import AccelerometerResult
@@ -23,12 +20,9 @@ if TYPE_CHECKING:
     from rig.analysis.verification import Verification
     from rig.data.provenance import Provenance
     from rig.data.result_file import StoredCalibrationEntry
-    from rig.data.run_file import RunData
     from rig.data.settings import RunSettings
     from rig.errors import Fault
     from rig.observation.observed_run import ObservedRun
-
-DEFAULT_ESTIMATOR: Final = "vector"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,44 +79,3 @@ class Outcome:
     def passed(self) -> bool:
         """Whether the verdict is a pass."""
         return self.verdict == "pass"
-
-
-def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
-    """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
-
-    Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
-    recordings do not hold what they should.
-    """
-    from rig.analysis import judging
-
-    return judging.calibrated(runs, estimator, drifting=drifting)
-
-
-def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
-
-    Raises Fault as `calibrated` and `bias_drifts` do.
-    """
-    from rig.analysis import judging
-
-    return judging.drifted(runs, estimator)
-
-
-def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
-    """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
-
-    Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
-    """
-    from rig.analysis import judging
-
-    return judging.verified(outcome, repeated)
-
-
-def verified_alone(repeated: "Sequence[RunData]") -> Outcome:
-    """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
-
-    Raises Fault as `verified` does.
-    """
-    from rig.analysis import judging
-
-    return judging.verified_alone(repeated)

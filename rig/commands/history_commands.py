@@ -47,6 +47,8 @@ def listed(options: Namespace) -> int:
     elif options.json:
         document = history_document(pasts, found if selection.serial_number is not None else None)
         print(json.dumps(document, indent=2, allow_nan=False))
+    elif not pasts:
+        say("No calibration is in this history yet; `rig run` enters each one.")
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
@@ -230,7 +232,7 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
                 f"{folder} has a {RESULT} and no recording that gives it",
                 "Import the folder with its recordings",
             )
-    from rig.analysis.outcome import DEFAULT_ESTIMATOR
+    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.history.integrity import MOST_TOLD
     from rig.history.recomputed import not_given
     from rig.plans.recorded import judged, open_run

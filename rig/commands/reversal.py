@@ -20,7 +20,7 @@ def run(options: Namespace) -> int:
     Raises Refused `report_folder`, and Refused and Fault as `open_run`, `refuse_elsewhere`, `judged` and
     `reversals` do.
     """
-    from rig.analysis.outcome import DEFAULT_ESTIMATOR
+    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.analysis.reversal import reversals
     from rig.config.written_file import write_new
     from rig.observation.arm_motion import refuse_elsewhere

@@ -56,7 +56,7 @@ def _recording(options: Namespace) -> int:
     `--set` changes what it is judged by, see `RunSettings.with_overrides`. `--script` is the one it was recorded by,
     where that is another's.
     """
-    from rig.analysis.outcome import DEFAULT_ESTIMATOR
+    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.plans.recorded import judged, left_out, open_run
     from rig.report.document import document_of
     from rig.report.table import print_outcome

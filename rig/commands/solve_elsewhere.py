@@ -72,7 +72,7 @@ def run(options: Namespace) -> int:
     Returns 0, or 1 where a check of the solves failed. Raises Refused `bad_option`, `run_folder`, as
     `recorded_in_files`, and whatever the solve finds wrong.
     """
-    from rig.analysis.outcome import calibrated
+    from rig.analysis.analyses import calibrated
     from rig.commands.remember import since_lines
     from rig.report.document import document_of
     from rig.report.table import print_kept, print_outcome

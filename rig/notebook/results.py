@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, rows

@@ -6,7 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR, Outcome
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.outcome import Outcome
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings
 from rig.notebook.html import table

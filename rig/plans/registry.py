@@ -10,7 +10,8 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
-from rig.analysis.outcome import Outcome, calibrated
+from rig.analysis.analyses import calibrated
+from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.data.run_file import RunData
 from rig.errors import Refused

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rig.analysis.calibration import SensorResult
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.analysis.onboard_check import check_observed
-from rig.analysis.outcome import DEFAULT_ESTIMATOR, Outcome
+from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.run_file import RunData, make_plain, read_run

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.check import Check
 from rig.analysis.clock import NOMINAL_DRIFT, check_clock, state_jitter
-from rig.analysis.outcome import calibrated
 from rig.analysis.verdict import clock_checks
 from rig.data.run_file import RunData
 from rig.data.settings import Uncertainty

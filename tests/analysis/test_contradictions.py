@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.contradictions import DISTURBED as NAMED
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
-from rig.analysis.outcome import calibrated
 from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
 from rig.analysis.surroundings import surroundings_of

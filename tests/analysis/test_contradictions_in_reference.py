@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from rig.analysis.acceleration import calibrate_accelerometers
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
-from rig.analysis.outcome import calibrated
 from rig.errors import Fault
 from support.damaged_accelerations import (
     Damage,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import SensorResult
-from rig.analysis.outcome import calibrated
 from rig.config.load import ConfigurationRefused, load
 from rig.data.settings import settings_from_json
 from rig.errors import Fault

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.outcome import calibrated, verified, verified_alone
+from rig.analysis.analyses import calibrated, verified, verified_alone
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault, Refused
 from rig.estimation.vector_model import solve_vector_model

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import SensorResult
-from rig.analysis.outcome import calibrated
 from rig.config.sensor_catalogue import PARTS
 from rig.data.quantity import RATE, TEMPERATURE
 from rig.data.run_file import RunData

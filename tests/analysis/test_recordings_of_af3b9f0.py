@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.data.run_file import RunData, read_run
 from support.paths import FIXTURES
 

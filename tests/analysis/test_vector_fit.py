@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import SensorResult
-from rig.analysis.outcome import calibrated
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.motion.geometry import NOMINAL, DenavitHartenberg

@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from support.synthetic_run import Setup, synthetic_run, truth
 
 SETUP = Setup(noise_rad_s=0.005)

@@ -6,9 +6,9 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
 from rig.analysis.loads import loads_rad_s
-from rig.analysis.outcome import calibrated
 from rig.analysis.when import of_gyroscope
 from rig.data.run_file import RunData
 from rig.plans.recorded import open_run

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.data.result_file import ResultDocument, read_result
 from rig.history.recomputed import not_given
 from rig.history.store import open_history

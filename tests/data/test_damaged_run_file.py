@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.data.run_file import read_run
 from rig.data.silence import crowding
 from rig.errors import Fault, Refused

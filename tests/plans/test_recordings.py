@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.layout import TEXTS
 from rig.data.quantity import ACCELERATION, FIELD

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from lxml import html
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.cli import main
 from rig.config.judging_sections import SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry

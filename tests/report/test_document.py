@@ -8,8 +8,9 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from rig.analysis.analyses import calibrated
 from rig.analysis.check import Check
-from rig.analysis.outcome import Outcome, calibrated
+from rig.analysis.outcome import Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import CheckEntry
 from rig.data.run_file import read_run

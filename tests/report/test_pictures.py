@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result

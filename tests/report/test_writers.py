@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.outcome import Outcome, calibrated
+from rig.analysis.analyses import calibrated
+from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
 from rig.report import writers
@@ -52,7 +53,7 @@ def write_toy(outcome, document, folder):
 RUN = """
 import sys
 from pathlib import Path
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
 print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))]))))

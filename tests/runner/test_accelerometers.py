@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.analysis.partial_results import so_far
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.cli import main
 from rig.data.quantity import FIELD, RATE
 from rig.data.run_file import RunData, read_run

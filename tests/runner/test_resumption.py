@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from firmware_host.answers import BoardObservation
+from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
-from rig.analysis.outcome import calibrated
 from rig.data.events import BoardObserved, Recorded
 from rig.data.run_file import RunData, read_run
 from rig.observation.windows import swept

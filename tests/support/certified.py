@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.outcome import calibrated
+from rig.analysis.analyses import calibrated
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry

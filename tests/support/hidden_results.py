@@ -10,7 +10,8 @@ import yaml
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.check import Check
-from rig.analysis.outcome import DEFAULT_ESTIMATOR, Outcome
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.outcome import Outcome
 from rig.errors import RigError
 from rig.estimation.budget import Budget
 from rig.observation.observed_run import ObservedRun

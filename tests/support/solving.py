@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from rig.analysis.calibration import SensorResult, known_estimator, observe_recordings, solve_observed
-from rig.analysis.outcome import DEFAULT_ESTIMATOR
+from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, known_estimator
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
 

@@ -1,0 +1,54 @@
+"""The analyses that procedures name: from recordings to the outcome of a run.
+
+Whoever plans a procedure reads this: so what solves is loaded when there is something to solve.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.outcome import Outcome
+
+if TYPE_CHECKING:
+    from rig.data.run_file import RunData
+
+
+def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
+    """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
+
+    Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
+    recordings do not hold what they should.
+    """
+    from rig.analysis import judging
+
+    return judging.calibrated(runs, estimator, drifting=drifting)
+
+
+def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+    """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
+
+    Raises Fault as `calibrated` and `bias_drifts` do.
+    """
+    from rig.analysis import judging
+
+    return judging.drifted(runs, estimator)
+
+
+def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
+    """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
+
+    Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
+    """
+    from rig.analysis import judging
+
+    return judging.verified(outcome, repeated)
+
+
+def verified_alone(repeated: "Sequence[RunData]") -> Outcome:
+    """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
+
+    Raises Fault as `verified` does.
+    """
+    from rig.analysis import judging
+
+    return judging.verified_alone(repeated)

@@ -1,0 +1,25 @@
+"""The estimators that a recording may be solved by, by their names."""
+
+from collections.abc import Sequence
+from typing import Final, Literal, TypeVar, get_args
+
+from rig.errors import Refused
+
+Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
+ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
+DEFAULT_ESTIMATOR: Final = "vector"
+
+Choice = TypeVar("Choice", bound=str)
+
+
+def known_estimator(name: str) -> Estimator:
+    """The estimator of that name. Raises Refused `unknown_estimator`."""
+    return estimator_among(ESTIMATORS, name)
+
+
+def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
+    """The one of that name. Raises Refused `unknown_estimator`."""
+    for known in choices:
+        if known == name:
+            return known
+    raise Refused("unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}")
