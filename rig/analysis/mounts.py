@@ -75,7 +75,7 @@ def _found(recordings: Sequence[ObservedRun]) -> tuple[FoundMount, ...]:
 
 
 def _of_stage(explained: Explained, place: int) -> tuple[Array, Array]:
-    """(3,) by what the item is turned in a stage, against the first, and its standard deviations, in those of before.
+    """The item's turn (3,) in a stage against the first, and its standard deviations, in those of before.
 
     Where the item is turned one way, all turns that it feels are turned the other way.
     """

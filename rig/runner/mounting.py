@@ -36,12 +36,12 @@ class Felt:
 
     @property
     def rates_rad_s(self) -> Array:
-        """(n, 3) in the sensor's axes."""
+        """The rates (n, 3) in the sensor's axes."""
         return self.sensor.channel(RATE).values(self.samples)
 
     @property
     def mounting(self) -> Array:
-        """(3, 3) from the item's frame to the sensor's."""
+        """The rotation (3, 3) from the item's frame to the sensor's."""
         return np.array(self.sensor.mounting)
 
 
