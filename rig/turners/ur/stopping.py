@@ -32,7 +32,8 @@ class Way(Protocol):
     def close(self) -> None: ...
 
 
-Ways = tuple[type[Dashboard] | type[PrimaryStop], ...]
+Port = type[Dashboard] | type[PrimaryStop]
+Ways = tuple[Port, ...]
 
 
 def independent_ways(version: tuple[int, ...]) -> Ways:
@@ -50,17 +51,25 @@ class Order:
         self._host = host
         self._deadline_s = time.monotonic() + timeout_s
         self._changed = threading.Condition()  # notified when anything below changes
-        self._under_way = len(ways)
+        self._to_give, self._under_way = set[Port](ways), set[Port](ways)
         self._ended = False
         self._heard = False  # it was taken by the controller, or at least by its port
         self._failures: list[str] = []
         for way in ways:
             threading.Thread(target=self._give, args=(way,), name=f"arm stop by {way.name}", daemon=True).start()
 
+    def given(self) -> bool:
+        """Whether it is given on every way, or has failed there; waits for that as long as it may yet come.
+
+        One that came later would end a program that somebody starts meanwhile.
+        """
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._to_give, max(0.0, self._left_s))
+
     def program_ended(self) -> bool:
         """Whether the controller says so on any way; waits for it as long as it may yet come."""
         with self._changed:
-            self._changed.wait_for(lambda: self._ended or self._under_way == 0, max(0.0, self._left_s))
+            self._changed.wait_for(lambda: self._ended or not self._under_way, max(0.0, self._left_s))
             return self._ended
 
     @property
@@ -74,18 +83,23 @@ class Order:
     def _left_s(self) -> float:
         return self._deadline_s - time.monotonic()
 
-    def _give(self, way: type[Dashboard] | type[PrimaryStop]) -> None:
+    def _give(self, way: Port) -> None:
         try:
             with closing(way(self._host, min(WAY_S, self._left_s))) as connection:
                 connection.stop_program()
                 self._heard = True
+                self._no_longer(way, self._to_give)
                 self._ask(connection)
         except OSError as error:
             self._failures.append(f"{way.name}: {error}")
         finally:
-            with self._changed:
-                self._under_way -= 1
-                self._changed.notify_all()
+            self._no_longer(way, self._to_give, self._under_way)
+
+    def _no_longer(self, way: Port, *among: set[Port]) -> None:
+        with self._changed:
+            for ways in among:
+                ways.discard(way)
+            self._changed.notify_all()
 
     def _ask(self, connection: Way) -> None:
         while not self._ended and self._left_s > 0.0:
@@ -170,6 +184,7 @@ class Stopper:
         self.descriptors.release()
         order = Order(self._host, self._ways(), STOP_S)
         if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
+            order.given()
             return StopOutcome(True, "the arm is stopped and at rest")
         if order.program_ended():
             return StopOutcome(
