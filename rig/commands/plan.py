@@ -4,6 +4,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
+from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.report.plan_table import Planned
@@ -13,14 +14,24 @@ def add(parser: ArgumentParser) -> None:
     """The arguments of `rig plan`."""
     add_config(parser)
     add_script(parser)
-    add_json(parser)
+    form = parser.add_mutually_exclusive_group()
+    add_json(form)
+    form.add_argument(
+        "--table", action="store_true", help="the sweeps as CSV, a profile for each axis: time, angle, rate"
+    )
 
 
 def run(options: Namespace) -> int:
     """Print the plan as `planned` has it; returns 0."""
+    from rig.report.plan_profile import profile_csv
     from rig.report.plan_table import print_plan
 
-    print_plan(planned(options), as_json=options.json)
+    found = planned(options)
+    if options.table:
+        for line in profile_csv(found.plan):
+            say(line)
+    else:
+        print_plan(found, as_json=options.json)
     return 0
 
 
