@@ -21,7 +21,8 @@ from rig.turners.servo.moves import move_of, move_problems
 from rig.turners.servo.preflight import servo_problems
 from rig.turners.servo.registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, WATCHDOG_S
 from rig.turners.servo.state import ServoReport, ServoState, stands
-from rig.turners.servo.stopping import SURE, StopOutcome, Stopper
+from rig.turners.servo.stopping import SURE, Stop
+from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: where a servo without an integral gain comes to rest beside its goal
@@ -32,6 +33,7 @@ UNWATCHED_S = 2.0  # a move that nobody looks at for so long is stopped
 HUNG_S = 1.0  # the thread that has the line comes round at least this often
 KEPT_S = 1.0  # of states, to tell rest from motion
 NOT_HELD = StopOutcome(True, "the servo was not under control")
+NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 BEFORE_THE_FIRST_MOVE = f"The servo has no brake and no emergency stop: {SURE}. Have it within reach."
 
 
@@ -71,7 +73,7 @@ class Servo:
         self.missed_states = 0  # polls without a state
         self._bus: Bus
         self._link: Link | None = None
-        self._stopper: Stopper
+        self._stopper: StopOnce
         self._report: ServoReport
 
     # Looking ----------------------------------------------------------------------------------------------------
@@ -85,7 +87,8 @@ class Servo:
             self._bus.close()
             raise
         self._link = Link(self._bus, self._report.model, self._period_s, self._take_state, self._fail)
-        self._stopper = Stopper(self._link, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
+        stop = Stop(self._link, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
+        self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()
         ends_s = time.monotonic() + FIRST_STATE_S
         self._wait(lambda: bool(self._states) or time.monotonic() > ends_s)
@@ -223,11 +226,7 @@ class Servo:
     ) -> None:
         told = self._problem is not None and isinstance(error, RigError)  # the servo's own problems tell of the stop
         if error is not None and not told:
-            try:
-                outcome = self.stop()
-            except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now
-                outcome = self.stop()
-            error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))
+            tell_of_stop(error, self.stop)
         self.close()
 
     # Inside -----------------------------------------------------------------------------------------------------

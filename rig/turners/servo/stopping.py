@@ -1,4 +1,4 @@
-"""Stopping the shaft for good, in a thread of its own.
+"""Stopping the shaft for good.
 
 1. Goal Position becomes Present Position, with a short profile: the shaft brakes and is held. Torque stays on: without
    it an unbalanced board would fall, and no gear of these servos locks.
@@ -11,32 +11,23 @@ None of this is a safety function. Only the switch of the servo's supply is sure
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rig.turners.servo.bus import Bus, BusError
 from rig.turners.servo.instructions import brake
 from rig.turners.servo.link import Link
 from rig.turners.servo.registers import TRIPPED, WATCHDOG
+from rig.turners.stop_once import StopOutcome
 
 STOP_S = 0.95  # a stop is confirmed within this, or not at all
 TOLD_S = 0.25  # the servo has so long to acknowledge
 SURE = "only the switch of its supply is sure"
 
 
-@dataclass(frozen=True, slots=True)
-class StopOutcome:
-    """Whether the shaft was seen at rest, in words; `remedy` is empty where nothing is left to do."""
-
-    at_rest: bool
-    what: str
-    remedy: str = ""
-
-
-class Stopper:
-    """Stops the shaft when `begin` is first called; later calls change nothing.
+class Stop:
+    """How the shaft is stopped.
 
     `seen_at_rest(since_s, timeout_s)` waits for states newer than `since_s` (monotonic time) that show the shaft at
-    rest; `lets_go()` tells whether the servo has switched its motor off. No interrupt of the caller breaks a stop off.
+    rest; `lets_go()` tells whether the servo has switched its motor off.
     """
 
     def __init__(
@@ -44,45 +35,9 @@ class Stopper:
     ) -> None:
         self._link, self._watchdog_s = link, watchdog_s
         self._seen_at_rest, self._lets_go = seen_at_rest, lets_go
-        self._starting = threading.Lock()
-        self._thread = threading.Thread(target=self._stop, name="servo stop")
-        self._ended = threading.Event()
-        self._outcome = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
-    @property
-    def begun(self) -> bool:
-        """Whether a stop has been asked for."""
-        return self._thread.ident is not None
-
-    def begin(self) -> None:
-        """Begin to stop, and return at once."""
-        with self._starting:
-            if not self.begun:
-                self._thread.start()
-
-    def outcome(self) -> StopOutcome:
-        """Stop the shaft if that has not begun, and wait for the result; less than 1 s.
-
-        An interrupt meanwhile is raised when the result is there.
-        """
-        self.begin()
-        interrupt = None
-        while not self._ended.is_set():
-            try:
-                self._ended.wait()
-            except KeyboardInterrupt as impatient:
-                interrupt = impatient
-        if interrupt is not None:
-            raise interrupt
-        return self._outcome
-
-    def _stop(self) -> None:
-        try:
-            self._outcome = self._stopped()
-        finally:
-            self._ended.set()
-
-    def _stopped(self) -> StopOutcome:
+    def carry_out(self) -> StopOutcome:
+        """Stop the shaft, and say what is known of it; less than 1 s."""
         began_s = time.monotonic()
         told = threading.Event()
 

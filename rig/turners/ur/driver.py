@@ -12,6 +12,7 @@ from rig.errors import Fault, Problem, Refused, RigError
 from rig.motion.carried import Carried
 from rig.motion.state import ArmReport, ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
+from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
 from rig.turners.ur.asking import ANSWER_S, reported, stop_problem
 from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
@@ -20,7 +21,7 @@ from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move,
 from rig.turners.ur.robot_api import PORT as ROBOT_API_PORT
 from rig.turners.ur.robot_api import RobotApi
 from rig.turners.ur.stop_trial import stop_trial
-from rig.turners.ur.stopping import Order, StopOutcome, Stopper, Ways, independent_ways
+from rig.turners.ur.stopping import Order, Stop, Ways, independent_ways
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
@@ -33,6 +34,7 @@ INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits tha
 SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client, whatever it does afterwards
 REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
 NOT_HELD = StopOutcome(True, "the arm was not under control")
+NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
 
 def _nothing() -> None:
@@ -62,7 +64,8 @@ class Arm:
         self._on_state = on_state
         self._period_s = 1 / state_rate_hz
         self._link = ChildLink(host, state_rate_hz, client_log, self._take, self._fail)
-        self._stopper = Stopper(host, self._ways, self._link.send, self._seen_at_rest)
+        self._way_to_stop = Stop(host, self._ways, self._link.send, self._seen_at_rest)
+        self._stopper = StopOnce("arm stop", self._way_to_stop.carry_out, NOT_ENDED)
         self._changed = threading.Condition()  # notified when anything below changes
         self._latest: ArmState | None = None
         self._connected: Connected | None = None
@@ -123,7 +126,7 @@ class Arm:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
         if problem is not None:
             raise Refused.of(problem)
-        self._stopper.descriptors.keep()
+        self._way_to_stop.descriptors.keep()
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
             if is_polyscope_x(self._controller.version):
@@ -196,7 +199,7 @@ class Arm:
             outcome = self.stop()
         finally:
             self._link.close()
-            self._stopper.descriptors.release()
+            self._way_to_stop.descriptors.release()
         if self._holds_arm and (self._problem is not None or not outcome.at_rest):
             # A client that had lost the arm and found it again may have started its program anew, behind that stop.
             Order(self._host, self._ways(), LAST_STOP_S).program_ended()
@@ -214,11 +217,7 @@ class Arm:
     ) -> None:
         told = self._problem is not None and isinstance(error, RigError)  # the arm's own problems tell of the stop
         if error is not None and not told:
-            try:
-                outcome = self.stop()
-            except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now
-                outcome = self.stop()
-            error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))
+            tell_of_stop(error, self.stop)
         self.close()
 
     # Inside -------------------------------------------------------------------------------------------------------

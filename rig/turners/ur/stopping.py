@@ -4,12 +4,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
 from typing import Protocol
 
+from rig.turners.stop_once import StopOutcome
 from rig.turners.ur.dashboard import Dashboard
 from rig.turners.ur.identity import is_polyscope_x
-from rig.turners.ur.messages import Stop
+from rig.turners.ur.messages import Stop as Brake
 from rig.turners.ur.primary_stop import PrimaryStop
 from rig.turners.ur.spare import SpareDescriptors
 
@@ -109,78 +109,32 @@ class Order:
                 time.sleep(ASK_S)
 
 
-@dataclass(frozen=True, slots=True)
-class StopOutcome:
-    """Whether the arm was seen at rest with its program ended, in words; `remedy` is empty when it was."""
-
-    at_rest: bool
-    what: str
-    remedy: str = ""
-
-
-class Stopper:
-    """Stops the arm at `host` when `begin` is first called; later calls change nothing.
+class Stop:
+    """How the arm at `host` is stopped: by its controller's ports and by the client, at the same time.
 
     `ways` tells the controller's independent ways, `send` hands the child its request; `seen_at_rest(since_s,
     timeout_s)` waits for a state newer than `since_s` (monotonic time) that shows the arm at rest and its program
-    ended. No interrupt of the caller breaks a stop off: it runs in its own thread.
+    ended.
     """
 
     def __init__(
         self,
         host: str,
         ways: Callable[[], Ways],
-        send: Callable[[Stop], None],
+        send: Callable[[Brake], None],
         seen_at_rest: Callable[[float, float], bool],
     ) -> None:
         self._host = host
         self._ways = ways
         self._send = send
         self._seen_at_rest = seen_at_rest
-        self._starting = threading.Lock()
-        self._thread = threading.Thread(target=self._stop, name="arm stop")
-        self._ended = threading.Event()
-        self._outcome = StopOutcome(False, "the stop has not ended", "Look at the arm")
         self.descriptors = SpareDescriptors()  # to be kept before the arm is under control
 
-    @property
-    def begun(self) -> bool:
-        """Whether a stop has been asked for."""
-        return self._thread.ident is not None
-
-    def begin(self) -> None:
-        """Stop the arm; returns at once."""
-        with self._starting:
-            if not self.begun:
-                self._thread.start()
-
-    def outcome(self) -> StopOutcome:
-        """Stop the arm if that has not begun, and wait for the result; less than 1 s.
-
-        An interrupt meanwhile is raised when the result is there. (An event, because `join`, once interrupted, takes
-        the thread for ended in Python 3.11.)
-        """
-        self.begin()
-        interrupt = None
-        while not self._ended.is_set():
-            try:
-                self._ended.wait()
-            except KeyboardInterrupt as impatient:
-                interrupt = impatient
-        if interrupt is not None:
-            raise interrupt
-        return self._outcome
-
-    def _stop(self) -> None:
-        try:
-            self._outcome = self._stopped()
-        finally:
-            self._ended.set()
-
-    def _stopped(self) -> StopOutcome:
+    def carry_out(self) -> StopOutcome:
+        """Stop the arm, and say what is known of it; less than 1 s."""
         began_s = time.monotonic()
         # In a thread of its own: a child that does not listen must not keep the stop from the controller.
-        threading.Thread(target=self._send, args=(Stop(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
+        threading.Thread(target=self._send, args=(Brake(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
         self.descriptors.release()
         order = Order(self._host, self._ways(), STOP_S)
         if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
