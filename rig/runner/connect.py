@@ -18,6 +18,7 @@ from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.motion.state import Made, Report
+from rig.motion.steps import Plan
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
@@ -53,11 +54,9 @@ class Connector:
     found: Mapping[str, Solved] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
 
-    @property
-    def _left_out(self) -> frozenset[int]:
-        """The sweeps that are not made now: those that are done, and those of other stages."""
-        stages = self.phase.plan().stages
-        others = (each.indices for place, each in enumerate(stages) if place != self.settings.stage)
+    def _left_out(self, whole_plan: Plan) -> frozenset[int]:
+        """The sweeps of the plan that are not made now: those that are done, and those of other stages."""
+        others = (each.indices for place, each in enumerate(whole_plan.stages) if place != self.settings.stage)
         return self.resumed.done.union(*others)
 
     @contextmanager
@@ -90,7 +89,7 @@ class Connector:
             carried = mounted(described, on_board, self.memory, simulated=simulated)
             yield Rig(
                 devices=Devices(turner, report, kind, self.loaded.config.turner, sources, acquisition, carried),
-                plan=self.phase.plan(report.state.q_rad, self._left_out),
+                plan=self.phase.plan(report.state.q_rad, self._left_out(whole_plan)),
                 whole_plan=whole_plan,
                 recording=recording,
                 along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
