@@ -1,25 +1,26 @@
 """What an operator must know before agreeing to a movement. Pure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from math import degrees
 
 from rig.motion.doubts import doubts
 from rig.motion.preflight import way_to_home
 from rig.motion.state import Report
-from rig.motion.steps import Plan, Stage, turn_words
+from rig.motion.steps import Plan, turn_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 from rig.turners.kind import Words
 
 
-def mounting(stages: Sequence[Stage], number: int) -> Prompt:
-    """The question before a stage, with its `number` from 0: whether the item is mounted for it."""
-    stage = stages[number]
+def mounting(plan: Plan, number: int) -> Prompt:
+    """The question before a stage of a plan, with its `number` from 0: whether the item is mounted for it."""
+    stages, stage = plan.stages, plan.stages[number]
+    far = _farthest(plan)
     lines = (
         f"Stage {number + 1} of {len(stages)}: {stage.instruction}.",
         "The arm stands still and its program has ended: it does not move until you answer.",
         "Then small turns try the mounting, before "
-        f"{len(stage.indices)} sweeps turn the wrists by more than a whole turn each.",
+        f"{len(stage.indices)} sweeps turn the wrists by more than {far} each.",
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
     )
     ticked = "The item is mounted so, and nobody and nothing is within the arm's reach"
@@ -42,8 +43,7 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
         f"First it goes home: {turns or 'it is there already'}.",
     ]
     if plan.sweeps:
-        far = turn_words(max(sweep.angle_rad for sweep in plan.sweeps))
-        lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than {far} each.")
+        lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than {_farthest(plan)} each.")
     if plan.dwells:
         lines.append(f"Then it stands still in {len(plan.dwells)} attitudes; settling may add {plan.settling_s:.0f} s.")
     if repeated is not None:
@@ -56,3 +56,8 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
     )
     return Prompt(tuple(lines))
+
+
+def _farthest(plan: Plan) -> str:
+    """How far the sweeps of a plan turn, the farthest of them, in words."""
+    return turn_words(max(sweep.angle_rad for sweep in plan.sweeps))

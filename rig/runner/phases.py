@@ -5,7 +5,7 @@ were kept, the command to go on with.
 """
 
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from rig.data.run_file import RunData, make_plain, read_run
 from rig.data.run_folder import next_recording, recordings, resuming
 from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, ProblemError, Refused
-from rig.motion.steps import Stage
+from rig.motion.steps import Plan
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
@@ -90,12 +90,13 @@ class Run:
         """
         readings = phase.procedure.readings
         with self.reported(self._mended, moved=moved):
-            stages = phase.plan().stages
+            plan = phase.plan()
+        stages = plan.stages
         left = [number for number, each in enumerate(stages) if each.indices - resumed.done]
         for number in left or [max(len(stages) - 1, 0)]:
             if stages:
                 with self.reported(self._mended, moved=moved):
-                    self._mounted(stages, number)
+                    self._mounted(plan, number)
             path = self._record(phase, number, resumed, moved=moved, found=found)
             if stages:
                 with self.reported(self._repeating, moved=True):
@@ -138,9 +139,9 @@ class Run:
             self.station.event(rig.recorded())
         return path
 
-    def _mounted(self, stages: Sequence[Stage], number: int) -> None:
+    def _mounted(self, plan: Plan, number: int) -> None:
         """Let the operator mount the item for a stage. Raises Refused `not_mounted`."""
-        if not self.station.ask(mounting(stages, number)):
+        if not self.station.ask(mounting(plan, number)):
             raise Refused(
                 "not_mounted",
                 f"nobody has said that the item is mounted for stage {number + 1}",
