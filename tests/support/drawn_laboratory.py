@@ -10,6 +10,7 @@ import yaml
 from firmware_host.emulator.accelerometer import accelerations
 from firmware_host.emulator.gyroscope import readings
 from rig.config.load import parse
+from rig.config.sensor_catalogue import PARTS
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.section import world_section
 from support.ideal import ideal_document
@@ -20,6 +21,7 @@ SPEED_RAD_S = np.pi / 3
 JOINTS = 6
 AXIS_RAD = np.radians(0.06)  # half-width, as `uncertainty.axis_deg` has it by default
 WAVE_RAD = 0.3 * AXIS_RAD / np.sqrt(3)  # of the encoders' waves, cosine and sine each
+SQUARE_DEG = {"adis16465": 0.05, "kvh1775": 0.03}  # how far axes are from right angles, one standard deviation
 PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
     "lsm9ds1": {
         "g_rad_s": 1.7e-3, "bias_per_k": 5e-4, "scale_per_k": 3e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5,
@@ -106,7 +108,7 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
         "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
         "noise_rad_s": errors["noise_rad_s"],
         "mounting_error_deg": rng.normal(0, 2, 3).tolist(),
-        "non_orthogonality_deg": rng.normal(0, 0.2, 3).tolist(),
+        "non_orthogonality_deg": leaning(rng, part),
         "offset_mm": rng.uniform(-20, 20, 3).tolist(),
         "start_temperature_c": 22 - float(rng.uniform(0, 0.3)),
         "bias_rad_s_per_k": rng.normal(0, errors["bias_per_k"], 3).tolist(),
@@ -117,6 +119,13 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
         "nonlinearity_odd_per_rad_s": float(rng.normal(0, errors["odd"])),
         "nonlinearity_even_per_rad_s": float(rng.normal(0, errors["even"])),
     }
+
+
+def leaning(rng: np.random.Generator, part: str) -> list[float]:
+    """No farther than the data sheet lets axes lean."""
+    most_deg = PARTS[part].non_orthogonality_deg
+    leaning: list[float] = np.clip(rng.normal(0, SQUARE_DEG.get(part, 0.2), 3), -most_deg, most_deg).tolist()
+    return leaning
 
 
 def truth(

@@ -20,7 +20,7 @@ from rig.config.judging_sections import UncertaintySection
 from rig.config.load import load
 from rig.config.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from support.drawn_laboratory import PART_ERRORS, WAVE_RAD, seen_vibration
+from support.drawn_laboratory import PART_ERRORS, SQUARE_DEG, WAVE_RAD, leaning, seen_vibration
 from support.paths import CONFIGS
 from support.worlds import merge
 
@@ -28,7 +28,6 @@ JOINTS = 6
 WRISTS = np.array([0, 0, 0, 1, 1, 1])
 QUIET_RAD_S, NOISY_RAD_S = 0.002, 0.035
 STATED = UncertaintySection()
-SQUARE_DEG = {"adis16465": 0.05, "kvh1775": 0.03}  # how far axes are from right angles, one standard deviation
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
 PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"]}
@@ -85,7 +84,7 @@ def kvh(seed: int) -> dict[str, Any]:
         "scale": rng.uniform(0.998, 1.002, 3).tolist(),
         "bias_rad_s": rng.uniform(-1e-5, 1e-5, 3).tolist(),
         "mounting_error_deg": _askew(rng, 0.5),
-        "non_orthogonality_deg": _leaning(rng, "kvh1775"),
+        "non_orthogonality_deg": leaning(rng, "kvh1775"),
         "offset_mm": _offset(rng),
         "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
@@ -188,7 +187,7 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
         "noise_rad_s": noise_rad_s,
         "mounting_error_deg": _askew(rng, ASKEW_DEG),
-        "non_orthogonality_deg": _leaning(rng, part),
+        "non_orthogonality_deg": leaning(rng, part),
         "offset_mm": _offset(rng),
         "start_temperature_c": 22 - float(rng.uniform(0, WARMER_K)),
         "warm_up_s": 300,
@@ -201,13 +200,6 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "nonlinearity_even_per_rad_s": _even(rng, part, section),
         **of_force,
     }
-
-
-def _leaning(rng: np.random.Generator, part: str) -> list[float]:
-    """No farther than the data sheet lets axes lean."""
-    most_deg = PARTS[part].non_orthogonality_deg
-    leaning: list[float] = np.clip(rng.normal(0, SQUARE_DEG.get(part, 0.2), 3), -most_deg, most_deg).tolist()
-    return leaning
 
 
 def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from rig.estimation.bias_process import walk_covariance
+from rig.config.sensor_catalogue import PARTS
+from rig.estimation.bias_process import flicker_covariance, walk_covariance
 from rig.observation.observed_run import ObservedRun
 from support.ideal import ideal_document
 from support.paths import CONFIGS
 from support.worlds import merge
 
 NOISE_RAD_S = 0.002
+FLICKER_RAD_S = float(np.radians(PARTS["lsm9ds1"].bias_instability_deg_h) / 3600)  # stated of its kind
 WALK_RAD_S_SQRT_S = 3e-5
 
 
@@ -27,13 +29,14 @@ class Effect(Enum):
 
 
 def with_effect(effect: Effect, seed: int) -> dict[str, Any]:
-    """A configuration: a LSM9DS1, mounted 5° askew, in a laboratory in which nothing else is wrong or may be."""
+    """A configuration: a LSM9DS1 that flickers as its kind does, mounted 5° askew; nothing else is wrong or may be."""
     rng = np.random.default_rng(seed)
     document = ideal_document(CONFIGS / "demo.yaml")
     sensor: dict[str, Any] = {
         "scale": rng.uniform(0.9, 1.1, 3).tolist(),
         "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
         "noise_rad_s": NOISE_RAD_S,
+        "bias_instability_rad_s": FLICKER_RAD_S,
         "mounting_error_deg": (5 * _direction(rng)).tolist(),
     }
     clock_ppm = {"controller_clock_ppm": 1e-3, "crystal_ppm": 1e-3}
@@ -70,7 +73,7 @@ def with_effect(effect: Effect, seed: int) -> dict[str, Any]:
 
 
 def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.ndarray:
-    """(6,) standard deviations of scale and bias that the best estimator leaves which knows how large the effect is.
+    """(6,) standard deviations of scale and bias that an estimator leaves which knows how large effect and flicker are.
 
     Generalised least squares for each axis, of a row of the matrix, the bias and gravity's share; with an effect's own
     columns or covariance.
@@ -80,7 +83,9 @@ def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.n
     turned = [turn.speed_rad_s * turn.axis_flange for turn in seen.revolutions]
     rates = np.array([*turned, *np.zeros((len(seen.rests), 3))])
     upwards = np.array([average.attitude for average in averages]) @ (0.0, 0.0, 1.0)
-    walk = WALK_RAD_S_SQRT_S**2 * walk_covariance([(a.start_s, a.end_s) for a in averages])
+    windows_s = [(average.start_s, average.end_s) for average in averages]
+    flicker = FLICKER_RAD_S**2 * flicker_covariance(windows_s)
+    walk = WALK_RAD_S_SQRT_S**2 * walk_covariance(windows_s)
     noise = np.array([average.noise_rad_s**2 / average.samples for average in averages])
     means = np.array([average.mean_rad_s for average in averages])
     stds = np.empty((2, 3))
@@ -91,7 +96,7 @@ def bound(effect: Effect, run: ObservedRun, document: Mapping[str, Any]) -> np.n
         if effect is Effect.NONLINEARITY:
             felt = rates @ along
             design = np.column_stack([design, np.abs(felt) * felt, felt**2])
-        spread = np.diag(noise[:, axis]) + (walk if effect is Effect.WALK else 0.0)
+        spread = np.diag(noise[:, axis]) + flicker + (walk if effect is Effect.WALK else 0.0)
         left = np.linalg.inv(design.T @ np.linalg.solve(spread, design))
         stds[:, axis] = scale**2 * np.sqrt(along @ left[:3, :3] @ along), np.sqrt(left[3, 3])
         if effect is Effect.CLOCK:
