@@ -145,11 +145,11 @@ def _recording(options: Namespace) -> "RunData":
 
 
 def _columns(path: Path | None) -> "ColumnMap":
-    """The map of columns, an empty one where none is given. Raises Refused as `load_column_map`."""
+    """The map of columns, an empty one where none is given. Raises Refused as `load_as`."""
     from rig.config.column_map import ColumnMap
-    from rig.config.load import load_column_map
+    from rig.config.load import load_as
 
-    return ColumnMap() if path is None else load_column_map(path)
+    return ColumnMap() if path is None else load_as(ColumnMap, path)
 
 
 def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[Beside, ...]":

@@ -14,7 +14,6 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from rig.config.as_written import take_text_as_written
-from rig.config.column_map import ColumnMap
 from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
@@ -111,10 +110,10 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
     return config
 
 
-def load_column_map(path: str | Path) -> ColumnMap:
-    """Which columns of other files hold what. Raises `ConfigurationRefused` as `load`."""
+def load_as(model: type[Model], path: str | Path) -> Model:
+    """A file that holds one section alone, of this `model`. Raises `ConfigurationRefused` as `load`."""
     layered = _layered(path, ())
-    found, problems = _validate(ColumnMap, layered.document, (), layered)
+    found, problems = _validate(model, layered.document, (), layered)
     if layered.problems or found is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *problems])
     return found
