@@ -6,10 +6,10 @@ import numpy as np
 
 from rig.config.column_map import AxisSection, TableSection
 from rig.data.motion_file import TIME, Columns, Header
+from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.attitude_import import ATTITUDES_MB, RATE_COLUMNS, STD_COLUMN
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import check_times
 
 
 def read_table_log(path: Path, table: TableSection, skip_lines: int = 0) -> dict[str, Array]:
@@ -23,7 +23,12 @@ def read_table_log(path: Path, table: TableSection, skip_lines: int = 0) -> dict
         if axis.rate is not None:
             columns[f"rate_{place}"] = axis.rate.column, axis.rate.factor
     log = read_columns(path, Header(tuple(columns)), ATTITUDES_MB, Mapped(columns, skip_lines))
-    check_times(log[TIME])
+    if len(log[TIME]) < 2 or not (np.diff(log[TIME]) > 0).all():
+        raise Refused(
+            "time_not_increasing",
+            f"{path} has fewer than two looks at the table, or their time does not increase from row to row",
+            "Give every look once, in the order of time",
+        )
     return _attitudes(log, table)
 
 
