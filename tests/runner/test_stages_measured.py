@@ -18,7 +18,7 @@ SEEDS, FEW = range(20), range(1)
 FIRST_SEED = 70_000  # beyond those of the families
 AS_DRAWN: dict[str, str] = {}
 QUARTER, TIPPED = {"x": "+y", "y": "-x", "z": "+z"}, {"x": "+x", "y": "+z", "z": "-y"}
-THREE = [
+THREE: list[dict[str, Any]] = [
     {"instruction": "fix the board as it is drawn"},
     {"instruction": "turn the board by 90° about wrist 3", "mount": QUARTER},
     {"instruction": "tip the board by 90° about its x axis", "mount": TIPPED},
@@ -27,7 +27,9 @@ WRONGLY = [(axis, sign * 90.0) for axis, sign in product(range(3), (1, -1))]
 
 
 def laboratory(seed: int, stages: list[dict[str, Any]], mounts: list[dict[str, Any]]) -> dict[str, Any]:
-    return merge(quiet(FIRST_SEED + seed), {"procedure": {"stages": stages}, "world": {"mounts": mounts}})
+    changes = {"procedure": {"stages": stages}, "world": {"mounts": mounts}}
+    document: dict[str, Any] = merge(quiet(FIRST_SEED + seed), changes)
+    return document
 
 
 def a_little_off(rng: np.random.Generator, mount: dict[str, str]) -> dict[str, Any]:
