@@ -34,7 +34,7 @@ table:
 
 def columns(path: Path) -> dict[str, np.ndarray]:
     table = np.genfromtxt(path, delimiter=",", names=True)
-    return {name: table[name] for name in table.dtype.names}
+    return {name: table[name] for name in table.dtype.names or ()}
 
 
 def written(path: Path, heading: str, rows: list[list[str]], divided: str = ",", before: str = "") -> Path:
