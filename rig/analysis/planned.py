@@ -20,7 +20,7 @@ from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
-from rig.motion.model import model_of
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan
 
 
@@ -32,32 +32,32 @@ class Told:
     accelerations: Mapping[str, tuple[ToldFrom, ...]]
 
 
-def planned_told_from(config: RigConfig, plan: Plan) -> Told:
-    """What the plan of an arm will tell of all that is to be calibrated but magnetometers; of other turners nothing.
+def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> Told:
+    """What the plan will tell of all that is to be calibrated but magnetometers; of accelerometers on an arm alone.
 
-    For an arm as its model is drawn, and for a sensor as its data sheet has it, which nothing but its noise and its
-    flicker makes wander.
+    For a `turner` made so, an arm as its model is drawn, and for a sensor as its data sheet has it, which nothing but
+    its noise and its flicker makes wander.
     """
     settings = settings_of(config, plan)
     site, known = settings.site, settings.uncertainty
-    if site is None or known is None or not isinstance(config.turner, ArmSection):  # None in settings of before
+    if site is None or known is None or turner.joints == 0:  # None in settings of before
         return Told({}, {})
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
     rates: dict[str, tuple[ToldFrom, ...]] = {}
     if plan.sweeps and not plan.stages:  # what several mountings tell together is not foretold
-        turned = planned_pieces(plan, site, np.array(settings.extension_m), model_of(config.arm).drawing)
+        turned = planned_pieces(plan, site, np.array(settings.extension_m), turner)
         rates = {
             name: _told_from(name, each, turned, settings, rate, site=site, known=known)
             for name, each in config.to_calibrate.items()
         }
-    arm = model_of(config.arm).drawing
+    attitudes = plan.dwells if isinstance(config.turner, ArmSection) else ()
     read = {
         name: planned_read(
-            name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g, arm=arm
+            name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g, arm=turner
         )
         for name, each in config.to_calibrate.items()
-        if plan.dwells and each.acceleration is not None and each.acceleration.range_g is not None
+        if attitudes and each.acceleration is not None and each.acceleration.range_g is not None
     }
     found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})

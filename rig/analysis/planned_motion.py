@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.state import state_dtype
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
 from rig.observation.arm_motion import ArmMotion
 
@@ -43,9 +43,12 @@ def timed(plan: Plan) -> Iterator[Timed[Step]]:
 
 
 def planned_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
-    """The motion of an arm made so, without vibration. Raises Fault `no_motion` where nothing moves."""
+    """The motion of an arm, or of another chain of joints, made so, without vibration.
+
+    Raises Fault `no_motion` where nothing moves.
+    """
     time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
-    states = np.zeros(len(time_s), ARM_STATE_DTYPE)
+    states = np.zeros(len(time_s), state_dtype(arm.joints))
     states["time_s"] = time_s
     q_rad = np.tile(np.array(plan.start_q_rad), (len(time_s), 1))
     for each in timed(plan):

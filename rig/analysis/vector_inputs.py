@@ -61,7 +61,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         if run.settings.knows_returns
         else None,
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
-        mount_errors_rad_s=_mount_errors(turned, mounted, len(rests), surroundings.uncertainty.mount_deg),
+        mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
         sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
@@ -145,20 +145,14 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, known: Uncertainty
     return off
 
 
-def _mount_errors(turned: Array, stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """(3 S, N, 3) errors as in `Seen`, of an item that may sit off its mount by `mount_deg` about each axis; or None.
-
-    The frame of the item is that of the first of S stages: three patterns each are of the others' own mounts, and the
-    last three of the first one's, which all others differ from alike.
-    """
+def mount_turns(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
+    """(3 S, N, 3) turns as in `Seen`, of an item that may sit off its mount by `mount_deg` about each axis; or None."""
     first, *others = dict.fromkeys(stages)
     if not others:
         return None
-    std = np.radians(mount_deg) / np.sqrt(3)
-    by_axis = std * np.cross(np.eye(3)[:, None, :], turned)
-    own = [np.where(np.equal(stages, stage)[:, None], by_axis, 0.0) for stage in others]
-    of_first = np.where(np.equal(stages, first)[:, None], 0.0, -by_axis)
-    found = np.concatenate([*own, of_first])
+    by_axis = np.radians(mount_deg) / np.sqrt(3) * np.eye(3)[:, None, :]
+    own = [np.where(np.equal(stages, stage)[:, None], by_axis, 0.0) for stage in (*others, first)]
+    found = np.concatenate(own)
     return np.concatenate([found, np.zeros((len(found), rests, 3))], axis=1)
 
 

@@ -17,7 +17,7 @@ from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
-from rig.motion.geometry import WRIST_1, flange_pose
+from rig.motion.geometry import flange_pose
 from rig.observation.arm_beside_lines import turned
 from rig.observation.arm_motion import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.average import Stream, between
@@ -33,6 +33,7 @@ CORNERS = (2 / 180) ** 0.5 / 2
 LOST = 0.01  # of the samples, at most
 STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 STEPS = 48
+WRISTS = 3  # whose ways count, the last joints
 
 
 def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
@@ -121,8 +122,10 @@ def moved(motion: ArmMotion, start_s: float, end_s: float) -> Stretch | None:
 
 def by_the_wrists(way: Stretch) -> bool:
     """Whether it is one that counts: neither too short nor too long, and no other joint turns."""
-    others = way.motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :WRIST_1]
-    return SHORTEST_S < way.end_s - way.start_s < LONGEST_S and np.ptp(others, axis=0).max() < STANDS_RAD
+    before = max(way.motion.kinematics.joints - WRISTS, 0)  # of any chain the last three joints are its wrists
+    others = way.motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :before]
+    turned_rad = np.ptp(others, axis=0).max(initial=0.0)
+    return bool(SHORTEST_S < way.end_s - way.start_s < LONGEST_S and turned_rad < STANDS_RAD)
 
 
 def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:

@@ -44,6 +44,8 @@ def run(options: Namespace) -> int:
     if options.sweeps is None and options.attitudes is None:
         if options.out is not None:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
+        if options.columns is not None:
+            raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps beside them")
         return _recording(options)
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")

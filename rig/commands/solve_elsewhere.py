@@ -14,6 +14,7 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.commands.remember import Beside
+    from rig.config.column_map import ColumnMap
     from rig.data.run_file import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -22,6 +23,12 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 def add(solve: ArgumentParser) -> None:
     """The arguments of readings that were made elsewhere."""
     group = solve.add_argument_group("with --sweeps or --attitudes")
+    group.add_argument(
+        "--columns",
+        type=Path,
+        metavar="YAML",
+        help="what stands where in the two files, where their columns have names and units of their own",
+    )
     group.add_argument("--out", type=Path, metavar="DIR", help="a new run folder for result, certificate, pictures")
     add_history(group)
     group.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
@@ -118,7 +125,7 @@ def _recording(options: Namespace) -> "RunData":
     by_sweeps = options.sweeps is not None
     motion: Path = options.sweeps if by_sweeps else options.attitudes
     return recorded_in_files(
-        Files(options.run, motion, "sweeps" if by_sweeps else "attitudes", told, recorded),
+        Files(options.run, motion, "sweeps" if by_sweeps else "attitudes", told, recorded, _columns(options.columns)),
         Site(
             up=(x, y, z),
             gravity_m_s2=options.gravity_m_s2,
@@ -135,6 +142,14 @@ def _recording(options: Namespace) -> "RunData":
         ),
         second_order=options.second_order,
     )
+
+
+def _columns(path: Path | None) -> "ColumnMap":
+    """The map of columns, an empty one where none is given. Raises Refused as `load_as`."""
+    from rig.config.column_map import ColumnMap
+    from rig.config.load import load_as
+
+    return ColumnMap() if path is None else load_as(ColumnMap, path)
 
 
 def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[Beside, ...]":

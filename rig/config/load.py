@@ -110,6 +110,15 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
     return config
 
 
+def load_as(model: type[Model], path: str | Path) -> Model:
+    """A file that holds one section alone, of this `model`. Raises `ConfigurationRefused` as `load`."""
+    layered = _layered(path, ())
+    found, problems = _validate(model, layered.document, (), layered)
+    if layered.problems or found is None:
+        raise ConfigurationRefused(str(path), [*layered.problems, *problems])
+    return found
+
+
 def _layered(path: str | Path, overrides: Sequence[str]) -> Layered:
     try:
         return read_layers(Path(path), overrides)

@@ -7,7 +7,7 @@ says what it means: docs/configuration.md is made of these descriptions.
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.judging_sections import (
     CertificateSection,
@@ -142,6 +142,18 @@ class ProcedureSection(Section):
     """What every procedure's section has: its name. A procedure adds its own keys and says what else it needs."""
 
     name: str = Field(description="which procedure is run")
+
+    @model_validator(mode="before")
+    @classmethod
+    def stages_only_where_they_mean_something(cls, data: Any) -> Any:
+        """Attitudes and verifications have one mounting: say so, and not that a key is unknown."""
+        if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
+            raise ValueError(
+                "stages are of six_observation alone, which calibrates gyroscopes: accelerometers and magnetometers "
+                "are turned against gravity and field in one mounting, and a verification repeats one movement; "
+                "leave out stages, or use six_observation"
+            )
+        return data
 
     @property
     def then_verify(self) -> bool:

@@ -181,10 +181,23 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """The problems of the sweeps; a verification compares one whole movement, not several mountings."""
+        """The problems of the sweeps; a verification compares one whole movement, not several mountings.
+
+        A magnetometer would be recorded, and only at the end of the run nobody could calibrate it.
+        """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and self.verify:
-            yield "procedure.verify repeats one movement with one mounting: leave out procedure.stages, or verify"
+            yield (
+                "procedure.verify repeats one movement with one mounting, and stages have several: leave out "
+                "procedure.stages, or calibrate in stages first and run procedure.name: verify afterwards"
+            )
+        beyond = "procedure.stages" if self.stages else f"procedure.arc_deg {self.arc_deg:g}" if self.arcs else None
+        if beyond is not None and config.magnetometers:
+            yield (
+                f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated with {beyond}: that takes "
+                "attitudes, in one mounting and with whole turns (imu, static_attitudes); leave it out, or "
+                f"{beyond.partition(' ')[0]}"
+            )
 
 
 class VerifySection(SixSweepsSection):

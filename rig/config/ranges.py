@@ -1,6 +1,6 @@
 """How far values of a configuration may range: as far as any arm's may.
 
-What the arm that is configured can do is judged where a plan is made (`rig.motion.limits`, `rig.motion.model`).
+What the arm that is configured can do is judged where a plan is made (`rig.turners.ur.limits`, `rig.motion.model`).
 """
 
 JOINT_RANGE_DEG = 360.0

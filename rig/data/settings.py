@@ -296,6 +296,8 @@ class RunSettings:
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.
 
+        Or with encoders of arcs that are better or worse than was stated: `uncertainty.angle_std_deg=0.02`.
+
         Raises Refused `unknown_setting` or `wrong_setting`, which say what can be set.
         """
         changed = self
@@ -443,6 +445,8 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
     if settings.elsewhere is not None and key:
         raise Refused("unknown_setting", "no threshold and no limit judges readings of files", f"Leave out {section}")
     document = settings.document()
+    if key and document[section] is None:  # in recordings of before
+        raise Refused("unknown_setting", f"this recording states no {section}", f"Leave out {path.strip()}")
     (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")
@@ -459,4 +463,4 @@ def setting(key: str) -> str:
 
 def _settable() -> tuple[str, ...]:
     thresholds = (f"observation.{field.name}" for field in fields(ObservationThresholds))
-    return (*thresholds, *(f"limits.{key}" for key in LIMITS), "reckoning")
+    return (*thresholds, *(f"limits.{key}" for key in LIMITS), "uncertainty.angle_std_deg", "reckoning")

@@ -5,7 +5,7 @@ changes of scale and bias (JCGM 100, 5.1). Half-widths stand for equally likely 
 uncertainty is the half-width over √3.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,10 +15,12 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from rig.estimation.mount_squares import of_mount_squares
 from rig.estimation.vector_fit import Explained, Seen
 
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
+MOUNTS = "mounting anew"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -176,13 +178,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
             float(np.degrees(unknown.repeatability_rad)),
         )
         yield assumed("arm's repeatability", half_width, "°", "uncertainty.repeatability_deg", again)
-    if seen.encoder_errors_rad_s is not None:
-        spread = of(seen.encoder_errors_rad_s @ matrix.T)
-        stated = 2 * float(np.degrees(unknown.angle_std_rad))
-        yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
-    if seen.mount_errors_rad_s is not None:
-        off, half_width = np.sqrt(3) * seen.mount_errors_rad_s @ matrix.T, float(np.degrees(unknown.mount_rad))
-        yield assumed("mounting anew", half_width, "°", "uncertainty.mount_deg", off)
+    yield from _of_marks_and_mounts(explained, unknown, of)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
@@ -213,6 +209,19 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         "uncertainty.sensor_offset_mm",
         np.concatenate([outwards @ each.T for each in felt]),
     )
+
+
+def _of_marks_and_mounts(explained: Explained, unknown: Unknown, of: Callable[[Array], Array]) -> Iterator[Contributor]:
+    """Where arcs begin and end, and how an item sits that was mounted anew; `of` as in `_contributors`."""
+    seen, matrix = explained.seen, explained.solution.matrix
+    if seen.encoder_errors_rad_s is not None:
+        spread = of(seen.encoder_errors_rad_s @ matrix.T)
+        stated = 2 * float(np.degrees(unknown.angle_std_rad))
+        yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
+    if seen.mount_errors_rad_s is not None:
+        spread = of(seen.mount_errors_rad_s @ matrix.T) + of_mount_squares(explained)
+        half_width = float(np.degrees(unknown.mount_rad))
+        yield Contributor(MOUNTS, "B", "rectangular", half_width, "°", "uncertainty.mount_deg", np.inf, spread)
 
 
 def _noise_freedom(explained: Explained) -> float:

@@ -35,8 +35,9 @@ class Seen:
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
     own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
     for each time they do, None in recordings of before; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
-    at the ends of arcs, None where all sweeps are whole turns; `mount_errors_rad_s` (3 S, N, 3) the same of an item
-    that was mounted anew for S stages, None where it stayed: of the stages but the first, then of the first; `arms_m`
+    at the ends of arcs, None where all sweeps are whole turns; `mount_turns_rad` (3 S, N, 3) by which rotation vectors
+    an item that was mounted anew for S stages would sit off for one standard uncertainty of each of their mounts, None
+    where it stayed: of the stages but the first, which the first sweep is of, then of the first; `arms_m`
     (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
     motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
     what is known of the sensor beforehand, None in recordings of before.
@@ -53,7 +54,7 @@ class Seen:
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
     return_errors_rad_s: Array | None = None
-    mount_errors_rad_s: Array | None = None
+    mount_turns_rad: Array | None = None
     arms_m: Array | None = None
     noise_freedom: Array | float = np.inf
     sensor: KnownSensor | None = None
@@ -86,6 +87,18 @@ class Seen:
     def instability_rad_s(self) -> float:
         """The sensor's bias instability, zero where nothing is known of it."""
         return 0.0 if self.sensor is None else self.sensor.instability_rad_s
+
+    @property
+    def mount_errors_rad_s(self) -> Array | None:
+        """(3 S, N, 3) how far the turns would be off for one standard uncertainty of each of the mounts.
+
+        The frame of the item is that of the first stage: by what that is off all others differ from it.
+        """
+        if self.mount_turns_rad is None:
+            return None
+        against_first = self.mount_turns_rad.copy()
+        against_first[-3:] -= against_first[-3:, :1]
+        return np.cross(against_first, self.turns_rad_s)
 
     @property
     def arm_errors_rad_s(self) -> Array:
@@ -204,6 +217,6 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
     solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
     curved = slice(len(arm_errors), len(known))
     found = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
-    mounts = slice(len(arm_errors) - (0 if seen.mount_errors_rad_s is None else len(seen.mount_errors_rad_s)),
-                   len(arm_errors))  # fmt: skip
+    count = 0 if seen.mount_turns_rad is None else len(seen.mount_turns_rad)
+    mounts = slice(len(arm_errors) - count, len(arm_errors))
     return Explained(solution, bias, seen, found, errors.sizes[mounts], errors.covariance[mounts, mounts])

@@ -3,42 +3,8 @@
 import math
 
 from rig.errors import Problem
-from rig.motion.carried import Carried
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.keep_out import clearance_problems
-from rig.motion.limits import motion_problems
-from rig.motion.model import TurnerModel
-from rig.motion.state import JointLimits, Joints
+from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
-
-
-def plan_problems(
-    plan: Plan,
-    carried: Carried,
-    model: TurnerModel,
-    *,
-    arm: DenavitHartenberg | None = None,
-    told: JointLimits | None = None,
-) -> list[Problem]:
-    """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
-
-    And what brings the flange or what it carries too near the arm. All as the `model` can do it. `told` are the
-    controller's own limits, which count where they are narrower; the lengths are those of `arm`, or else the drawing's.
-    """
-    problems = step_problems(plan)
-    travels = [motion for motion in plan.motions if _travels(motion)]
-    problems += [problem for motion in travels for problem in motion_problems(motion, model.limits, told)]
-    problems += clearance_problems(plan, carried, model, arm)
-    if not 0 <= carried.payload_kg <= model.payload_kg:
-        problems.append(
-            Problem(
-                "payload_too_heavy",
-                f"the payload of {carried.payload_kg:g} kg is outside 0 to {model.payload_kg:g} kg, which a "
-                f"{model.name} carries",
-                "Weigh the fixture and correct arm.payload_kg",
-            )
-        )
-    return list(dict.fromkeys(problems))
 
 
 def step_problems(plan: Plan) -> list[Problem]:
@@ -55,7 +21,7 @@ def step_problems(plan: Plan) -> list[Problem]:
     problems += [
         Problem("no_travel", f"{motion.name} leads nowhere", "Leave it out of the plan, or let it move a joint")
         for motion in plan.motions
-        if not _travels(motion)
+        if not travels(motion)
     ]
     problems += [
         Problem(
@@ -74,6 +40,7 @@ def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
     return travel(q_rad, plan.home_q_rad)
 
 
-def _travels(motion: Motion) -> bool:
+def travels(motion: Motion) -> bool:
+    """Whether a motion leads somewhere."""
     way = travel(motion.start_q_rad, motion.target_q_rad)
     return all(map(math.isfinite, way)) and max(map(abs, way)) > SAME_PLACE_RAD

@@ -1,6 +1,7 @@
 """What a turner says about itself: its states, of any number of joints, and the report a look at it gives.
 
-A robot arm's states say more than joints: those of Universal Robots stand here too.
+A robot arm's states say more than joints: those of Universal Robots stand here too, for recordings of before are read
+as them, and the page shows their modes.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +15,6 @@ import numpy as np
 from rig.motion.geometry import DenavitHartenberg, Pose
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")  # of an arm of Universal Robots
-MAKER = "Universal Robots"
 
 Joints = tuple[float, ...]  # a value for each joint, the one that stands on the ground first
 Row = tuple[float | int | Joints, ...]
@@ -193,15 +193,6 @@ class JointLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class ArmSetup:
-    """Which arm the controller is set up for: the maker's number of its type, its lengths, its joints' limits."""
-
-    robot_type: int
-    drawing: DenavitHartenberg
-    limits: JointLimits
-
-
-@dataclass(frozen=True, slots=True)
 class Made:
     """Who made what turns, which model it is (None where it does not tell), and the geometry reckoned with.
 
@@ -238,46 +229,3 @@ class Report(Protocol):
     def joints(self) -> tuple[str, ...]: ...
     @property
     def words(self) -> str: ...
-
-
-@dataclass(frozen=True, slots=True)
-class ArmReport:
-    """What a look at the arm shows; None where the controller does not tell.
-
-    `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `payload_kg` and
-    `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's geometry as the
-    factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame, `setup` the arm it
-    is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all of that means, in the
-    maker's names. It is a `Report`.
-    """
-
-    host: str
-    version: tuple[int, ...]
-    polyscope: str
-    serial_number: str
-    remote_control: bool | None
-    program_running: bool
-    payload_kg: float | None
-    payload_centre_m: tuple[float, float, float] | None
-    state: ArmState
-    kinematics: DenavitHartenberg | None = None
-    tcp_offset: Pose | None = None
-    setup: ArmSetup | None = None
-    called: str | None = None
-    model: str | None = None
-
-    @property
-    def software(self) -> str:
-        """The controller's software in its own words."""
-        return self.polyscope
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """The names of its joints."""
-        return JOINT_NAMES
-
-    @property
-    def words(self) -> str:
-        """The arm as a line of text names it: model, serial number, software."""
-        named = "model not told" if self.model is None else f"{MAKER} {self.model}"
-        return f"{named}, serial number {self.serial_number}, PolyScope {self.polyscope}"

@@ -27,7 +27,7 @@ from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_samples import Samples
-from rig.observation.csv_table import read_columns
+from rig.observation.csv_table import Mapped, read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
 from rig.observation.placements import Placements, find_placements
@@ -73,12 +73,12 @@ class PlacedReadings:
     clock: TimeBase | None = None
 
 
-def read_attitudes(path: Path) -> dict[str, Array]:
+def read_attitudes(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
     """The columns (N,) of a file of attitudes.
 
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
-    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB)
+    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped)
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:

@@ -27,7 +27,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_samples import Samples
-from rig.observation.csv_table import read_columns
+from rig.observation.csv_table import Mapped, read_columns
 from rig.observation.csv_windows import average_of, check_complete, check_times, inside, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.turns import Known, TurnedData, turned
@@ -49,9 +49,9 @@ class ExternalData:
     turned: TurnedData | None = None
 
 
-def read_sweeps(path: Path) -> dict[str, Array]:
+def read_sweeps(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
     """The columns (k,) of a file of sweeps. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`."""
-    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB)
+    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB, mapped)
 
 
 def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:

@@ -17,7 +17,7 @@ from rig.data.motion_file import TIME, Columns, samples_header
 from rig.data.quantity import Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.observation.csv_table import read_columns
+from rig.observation.csv_table import Mapped, read_columns
 from rig.observation.csv_windows import check_times
 
 SAMPLES_MB = 256  # an hour at 1 kHz
@@ -31,12 +31,12 @@ class Samples:
     readings: Mapping[Quantity, Array]
 
 
-def read_samples(path: Path, needed: Sequence[Quantity] = ()) -> Samples:
-    """The readings of a file, those `needed` and whatever others it holds.
+def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
+    """The readings of a file, those `needed` and whatever others it holds; `mapped` where its columns are others'.
 
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
-    table = read_columns(path, samples_header(needed), SAMPLES_MB)
+    table = read_columns(path, samples_header(needed), SAMPLES_MB, mapped)
     return samples_in(table, str(path))
 
 

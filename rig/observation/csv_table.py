@@ -2,9 +2,10 @@
 
 import csv
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from io import TextIOWrapper
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -18,40 +19,75 @@ from rig.estimation.arrays import Array
 LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
 
 
-def read_columns(path: Path, header: Header, largest_mb: int) -> dict[str, Array]:
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """Where a file of somebody else's has what: by the name of a column here, its name there and the factor to SI.
+
+    `skip_lines` stand before the heading.
+    """
+
+    columns: Mapping[str, tuple[str, float]]
+    skip_lines: int = 0
+
+
+def read_columns(path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None) -> dict[str, Array]:
     """The columns of a file by name, those of its header; of each group of optional ones all, or none.
 
-    The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, all
-    rows do. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, or
+    by tabs, all rows do. Of a `mapped` file the columns that are named so or as here, whatever others it has.
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
-    rows = _rows(path, largest_mb)
-    names = [name.strip() for name in next(rows, [])]
+    skipped = 0 if mapped is None else mapped.skip_lines
+    rows = _rows(path, largest_mb, skipped)
+    headings = [name.strip() for name in next(rows, [])]
+    named = dict(enumerate(headings)) if mapped is None else _picked(path, headings, header, mapped)
+    names, places = [*named.values()], [*named]
     _check_columns(path, names, header.needed, header.one_of, header.optional)
     values = array("d")
-    for line, row in enumerate(rows, start=2):
-        numbers = _numbers(row)
+    for line, row in enumerate(rows, start=skipped + 2):
+        cells = row if mapped is None else [row[place] for place in places if place < len(row)]
+        numbers = _numbers(cells)
         if len(numbers) != len(names):
             raise Refused(
                 "not_a_number",
-                f"{path}, line {line}: {quote(','.join(row))} is not {len(names)} numbers below {LARGEST_NUMBER:g}",
+                f"{path}, line {line}: {quote(','.join(cells))} is not {len(names)} numbers below {LARGEST_NUMBER:g}",
                 "Write plain decimal numbers with a point, no NaN, one for each column",
             )
         values.extend(numbers)
     table = np.array(values, dtype=np.float64).reshape(-1, len(names))
-    return {name: table[:, i] for i, name in enumerate(names)}
+    factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
+    return {name: factors.get(name, 1.0) * table[:, i] for i, name in enumerate(names)}
 
 
-def _rows(path: Path, largest_mb: int) -> Iterator[list[str]]:
-    """The rows of a regular file that is not too large."""
+def _picked(path: Path, headings: Sequence[str], header: Header, mapped: Mapped) -> dict[int, str]:
+    """Which columns are read, by their places, and their names here. Raises Refused `wrong_columns`."""
+    found: dict[int, str] = {}
+    for name, (there, _) in mapped.columns.items():
+        if headings.count(there) != 1:
+            how = "twice" if there in headings else "nowhere"
+            raise Refused(
+                "wrong_columns",
+                f"{path} has the column {quote(there)} {how}, which is to be {name}",
+                f"Name one of its columns: {shorten(', '.join(headings))}; or say how many lines stand before them",
+            )
+        found[headings.index(there)] = name
+    known = (*header.needed, *header.one_of, *(name for group in header.optional for name in group))
+    as_here = {place: name for place, name in enumerate(headings) if name in known and name not in mapped.columns}
+    return {**as_here, **found}
+
+
+def _rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
+    """The rows of a regular file that is not too large, after so many lines of it."""
     try:
         with (
             open_regular_file(path, largest_mb * 1_000_000) as file,
             TextIOWrapper(file, encoding="utf-8-sig", newline="") as text,
         ):
             lines = _lines(text)
-            first = next(lines, "")
-            if ";" in first and "," not in first:
-                for row in csv.reader(chain([first], lines), delimiter=";"):
+            first = next(islice(lines, skipped, None), "")
+            delimiter = next((mark for mark in ";\t" if mark in first and "," not in first), None)
+            if delimiter is not None:
+                for row in csv.reader(chain([first], lines), delimiter=delimiter):
                     yield [cell.replace(",", ".") for cell in row]
             else:
                 yield from csv.reader(chain([first], lines))

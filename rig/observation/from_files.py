@@ -1,49 +1,59 @@
 """A recording of readings that were made elsewhere, from a file of them and one that tells their motion."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+from rig.config.column_map import ColumnMap, ColumnSection
 from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
 from rig.data.quantity import RATE
 from rig.data.result_file import FileEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
+from rig.errors import Refused
 from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_import import read_sweeps
 from rig.observation.csv_samples import read_samples
+from rig.observation.csv_table import Mapped
+from rig.observation.table_log import read_table_log
 
+AS_NAMED_HERE = ColumnMap()
 NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The two files, and whose readings they hold; `recorded` None is when the readings' file was last written."""
+    """The two files, and whose readings they hold; `recorded` None is when the readings' file was last written.
+
+    `columns` say what stands where, of files that do not name their columns as the rig does.
+    """
 
     readings: Path
     motion: Path
     tells: Told
     item: Item
     recorded: datetime | None = None
+    columns: ColumnMap = AS_NAMED_HERE
 
 
 def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False) -> RunData:
     """The recording. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`."""
-    read: Callable[[Path], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
-    samples = read_samples(files.readings, [RATE] if files.tells == "sweeps" else ())
+    told = files.columns
+    needed = [RATE] if files.tells == "sweeps" else ()
+    samples = read_samples(files.readings, needed, _mapped(told.samples, told.samples_skip_lines))
     columns = {"time_s": samples.time_s} | {
         name: readings[:, i]
         for quantity, readings in samples.readings.items()
         for i, name in enumerate(quantity.columns)
     }
     began = files.recorded or datetime.fromtimestamp(files.readings.stat().st_mtime, UTC)
-    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, read(files.motion))
+    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, _motion(files))
     return RunData(
         config="",
         settings=RunSettings(
@@ -68,6 +78,24 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         events=(),
         elsewhere=read_elsewhere,
     )
+
+
+def _motion(files: Files) -> Columns:
+    """The columns of sweeps or attitudes. Raises Refused as they do, and `bad_option` for a table's log of sweeps."""
+    told = files.columns
+    if told.table is not None:
+        if files.tells == "sweeps":
+            raise Refused("bad_option", "the columns are those of a table's log", "Give that log with --attitudes")
+        return read_table_log(files.motion, told.table, told.motion_skip_lines)
+    read: Callable[[Path, Mapped | None], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
+    return read(files.motion, _mapped(told.motion, told.motion_skip_lines))
+
+
+def _mapped(columns: Mapping[str, ColumnSection], skip_lines: int) -> Mapped | None:
+    """None where nothing is said: then a column that nobody knows is a mistake."""
+    if not columns and not skip_lines:
+        return None
+    return Mapped({name: (each.column, each.factor) for name, each in columns.items()}, skip_lines)
 
 
 def _named(path: Path) -> FileEntry:

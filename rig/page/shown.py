@@ -17,6 +17,7 @@ from rig.page.history import History, rounded
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.rows import Look, along, dwell_row, observation_row, parameter_rows
 from rig.report.certificate.writer import PAGE as CERTIFICATE
+from rig.report.mounts import mount_lines
 from rig.station.events import (
     Advice,
     Answered,
@@ -66,6 +67,7 @@ class Shown:
             "lines": [],
             "certificate": False,
             "outcome": [],
+            "mounts": [],
             "since": None,
             "next": None,
             "ended": None,
@@ -180,6 +182,7 @@ class Shown:
                 result = read_result(path)
                 self.put("parameters", parameter_rows(result))
                 self.put("outcome", outcome_rows(result, self._parts))
+                self.put("mounts", list(mount_lines(result)))
                 self._solved = True
             case Failed(error):
                 self._state("refused" if error.exit_status == 2 else "fault", str(error))

@@ -67,7 +67,7 @@ def plan_six_observation(
     at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished. Where the item is mounted in
     several stages, all of it is done in each, of the wrists that are swept there.
-    Limits are not judged here: see `rig.motion.preflight`.
+    Limits are not judged here: see the turner's `problems`.
     Raises Refused `axes_do_not_span`.
     """
     home = home_of(arm)

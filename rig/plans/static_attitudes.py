@@ -25,7 +25,7 @@ def plan_static_attitudes(
 
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly.
     `done` holds the indices of dwells to leave out: those an interrupted run has finished.
-    Limits and clearances are not judged here: see `rig.motion.preflight`; nor what the attitudes tell: see
+    Limits and clearances are not judged here: see the turner's `problems`; nor what the attitudes tell: see
     `rig.analysis.attitude_account`.
     """
     home = home_of(arm)

@@ -11,6 +11,7 @@ from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.check_words import what_failed, words_of
 from rig.report.kinds.kind import Shown, Three, Without
 from rig.report.kinds.registry import kinds
+from rig.report.mounts import farthest_off
 from rig.report.rounding import in_print, plus_minus
 
 NEAR = 0.9  # of its limit, from where on a check that passed is named
@@ -48,7 +49,7 @@ def ending(
     values = [*(_one(items[0], width) if len(items) == 1 else _several(items, width))]
     unsolved = [line for kind in kinds() for line in kind.unsolved(result)]
     in_short = [line for kind in kinds() for found in kind.found(result) for line in kind.in_short(found)]
-    said = [*in_short, *unsolved, *_near(result), *since]
+    said = [*in_short, *farthest_off(result), *unsolved, *_near(result), *since]
     summary = _wrapped("; ".join([*_what_the_values_are(items), _passed(result)]), width)
     below = [*summary, *(line for each in said for line in _wrapped(each, width))]
     if certificate is not None:

@@ -46,8 +46,10 @@ class Planned:
     def told(self) -> "Told":
         """From what sizes on the checks tell that something happened."""
         from rig.analysis.planned import planned_told_from
+        from rig.turners.registry import kind_of
 
-        return planned_told_from(self.config, self.plan)
+        turner = self.config.turner
+        return planned_told_from(self.config, self.plan, kind_of(turner).meant(turner).kinematics)
 
     @property
     def steps(self) -> Sequence[Step]:

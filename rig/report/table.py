@@ -13,6 +13,7 @@ from rig.report.certificate.writer import PAGE
 from rig.report.ending import ending
 from rig.report.kinds.kind import said
 from rig.report.kinds.registry import kinds
+from rig.report.mounts import mount_lines
 from rig.station.plain_text import plain, say
 
 ROUNDING = 1e-12
@@ -74,6 +75,8 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
                 console.print(plain(each) if isinstance(each, str) else each)
         for line in kind.unsolved(result):
             console.print(plain(line))
+    for line in mount_lines(result):
+        console.print(plain(line))
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:

@@ -20,7 +20,7 @@ from rig.observation.observe import nearest_axis
 
 REST_S = 1.0  # of readings that show whether it is at rest
 PARTS = 5
-STEADY_RAD_S = 0.02  # what a hand at the item exceeds, and no arm that stands; on top of the noise
+STEADY_RAD_S = 0.02  # what a hand at the item exceeds, and nothing that stands; on top of the noise
 NOISES = 6
 ASKEW_RAD = np.radians(20)  # as far as a sensor may sit off its mounting and the item off the stage's
 SHARES = 0.5, 2.0  # of the turn, that a sensor with a scale error reads
@@ -45,8 +45,11 @@ class Felt:
         return np.array(self.sensor.mounting)
 
 
-def refuse_unsteady(felt: Felt) -> None:
-    """Raise Refused `item_not_at_rest` where a gyroscope's readings change more than noise does."""
+def refuse_unsteady(felt: Felt, turner: str) -> None:
+    """Raise Refused `item_not_at_rest` where a gyroscope's readings change more than noise does.
+
+    `turner` is what an operator calls what turns the item.
+    """
     rates = felt.rates_rad_s
     means = np.array([part.mean(axis=0) for part in np.array_split(rates, PARTS)])
     noise = np.diff(rates, axis=0).std(axis=0) / np.sqrt(2 * len(rates) / PARTS)
@@ -54,7 +57,7 @@ def refuse_unsteady(felt: Felt) -> None:
     if np.any(moved > STEADY_RAD_S + NOISES * noise):
         raise Refused(
             "item_not_at_rest",
-            f"{felt.name} reads rates that change by {degrees(moved.max()):.1f} °/s while the arm stands still",
+            f"{felt.name} reads rates that change by {degrees(moved.max()):.1f} °/s while the {turner} stands still",
             "Take your hands off the item and its cable, wait until nothing swings, then go on",
         )
 

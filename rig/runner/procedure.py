@@ -202,7 +202,7 @@ class Rig:
         state = self.devices.turner.latest
         up = flange_attitude(np.array(state.q_rad), self.recording.geometry) @ np.array(self.up)
         for felt in self._felt(REST_S, self._check):
-            refuse_unsteady(felt)
+            refuse_unsteady(felt, self.devices.kind.words.short)
             refuse_hanging_otherwise(felt, stage, up)
             self._resting_rad_s[felt.name] = felt.rates_rad_s.mean(axis=0)
 

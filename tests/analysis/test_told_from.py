@@ -14,6 +14,7 @@ from rig.analysis.told_from import ToldFrom
 from rig.config.load import parse
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept
 from support.drawn_recording import KINDS, Drawn, damaged, drawn
 from support.synthetic_run import Motion, Setup
@@ -96,7 +97,7 @@ def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever(
 def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
     seen = drawn(3, KINDS["quiet LSM9DS1"])
     motion = Motion(Setup(), np.random.default_rng(0))
-    will = planned_told_from(parse(motion.config).config, motion.plan).rates["gyro"]
+    will = planned_told_from(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]
     recorded = {each.what: each for each in held(seen.run).told_from["gyro"]}
     assert set(PLANTED) == set(recorded) == {each.what for each in will}
     for each in will:

@@ -85,6 +85,13 @@ def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
     assert limits.bias_rad_s == before.bias_rad_s
 
 
+def test_how_well_the_encoders_tell_arcs_can_be_stated_anew() -> None:
+    changed = settings().with_overrides(["uncertainty.angle_std_deg=0.02"]).uncertainty
+    assert changed is not None and changed.angle_std_deg == 0.02
+    with pytest.raises(Refused, match=r"unknown_setting.*states no uncertainty"):
+        replace(settings(), uncertainty=None).with_overrides(["uncertainty.angle_std_deg=0.02"])
+
+
 def test_a_recording_of_before_can_be_reckoned_as_of_today() -> None:
     text = json.dumps({**json.loads(settings().to_json()), "schema": "rig.settings/6"})
     before = settings_from_json(text.replace('"reckoning": 2', '"reckoning": 1'))
@@ -100,6 +107,8 @@ def test_a_recording_of_before_can_be_reckoned_as_of_today() -> None:
         ),
         ("procedure.speed_deg_s=10", "unknown_setting"),
         ("limits", "unknown_setting"),
+        ("uncertainty.axis_deg=1", "unknown_setting"),
+        ("uncertainty.angle_std_deg=-0.1", r"wrong_setting.*greater than or equal to 0"),
         ("limits.scale_std=small", r"wrong_setting.*limits\.scale_std is 'small'"),
         ("limits.scale_std=-1", "wrong_setting.*greater than 0"),
         ("limits.scale_std=nan", "wrong_setting"),

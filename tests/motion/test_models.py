@@ -15,11 +15,11 @@ from rig.motion.carried import carried_by
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
 from rig.motion.keep_out import clearance_problems
 from rig.motion.model import CLIENT_SPEED_RAD_S, home_of, model_of, turner_model
-from rig.motion.preflight import plan_problems
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan, Transfer
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import plan_static_attitudes
+from rig.turners.ur.plan_problems import plan_problems
 from rig.world.ur10e.models import MODELS
 
 NAMES: tuple[ModelName, ...] = get_args(ModelName)

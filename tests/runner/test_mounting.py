@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.config.stage_section import StageMountSection, mount_matrix
 from rig.data.channel import of_three_axes
 from rig.data.quantity import ACCELERATION
@@ -10,7 +12,10 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.motion.steps import Stage
+from rig.plans.six_sweeps import plan_six_observation
+from rig.runner.announcement import mounting
 from rig.runner.mounting import Felt, refuse_hanging_otherwise, refuse_turning_otherwise, refuse_unsteady
+from rig.turners.registry import words_of
 from support.synthetic_run import SENSITIVITY, SENSOR
 
 COUNT = 476  # two seconds
@@ -35,13 +40,14 @@ def reading(rates_rad_s: Array, seed: int = 1) -> Felt:
 
 def test_noise_and_bias_are_rest() -> None:
     for seed in range(20):
-        refuse_unsteady(reading(np.array([0.1, -0.05, 0.02]), seed))
+        refuse_unsteady(reading(np.array([0.1, -0.05, 0.02]), seed), "arm")
 
 
 def test_a_hand_at_the_board_is_none() -> None:
     swinging = 0.15 * np.sin(np.linspace(0, 6, COUNT))[:, None] * [1.0, 0.3, 0.0]
-    with pytest.raises(Refused, match="item_not_at_rest"):
-        refuse_unsteady(reading(swinging))
+    with pytest.raises(Refused, match="while the servomotor stands still") as refused:
+        refuse_unsteady(reading(swinging), "servomotor")
+    assert refused.value.name == "item_not_at_rest"
 
 
 def turning(about: int, angle_deg: float) -> Array:
@@ -90,3 +96,14 @@ def test_gravity_is_where_the_mounting_says_or_the_axis_is_named() -> None:
 
 def test_what_feels_no_gravity_says_nothing_of_it() -> None:
     refuse_hanging_otherwise(reading(np.zeros(3)), NOMINAL, np.array([0.0, 0.0, 1.0]))
+
+
+def test_the_question_before_a_stage_speaks_of_what_turns_the_item() -> None:
+    stages = SixObservationSection.model_validate({"stages": [{"instruction": "as it is"}]})
+    plan = plan_six_observation(ArmSection(host="127.0.0.2", payload_kg=0.35), stages)
+    of_an_arm, of_another = (mounting(plan, 0, words_of(kind)) for kind in ("ur", "one nobody knows"))
+    assert "sweeps turn the wrists by" in " ".join(of_an_arm.announcement)
+    assert "within the arm's reach" in of_an_arm.to_tick
+    said = " ".join([*of_another.announcement, of_another.to_tick])
+    assert "The turner stands still" in said and "within the turner's reach" in said
+    assert "arm" not in said and "wrist" not in said

@@ -102,6 +102,7 @@ def on_another_arm(model: str, seed: int) -> dict[str, Any]:
 
 
 OTHER_ARMS = ("ur3e", "ur5e", "ur20", "ur10_cb3")
+MORE_ARMS = ("ur7e", "ur12e", "ur16e", "ur30")  # of which one world each is enough: they differ from these in lengths
 FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
     {
         "quiet": quiet,
@@ -109,7 +110,7 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         "pair": pair,
         "imu": imu,
         "kvh": kvh,
-        **{model: partial(on_another_arm, model) for model in OTHER_ARMS},
+        **{model: partial(on_another_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
     }
 )
 WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys(OTHER_ARMS, 6)})

@@ -10,7 +10,7 @@ from rig.analysis.verdict import fitness
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.meaning import Meaning
-from rig.motion.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
+from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.motion.steps import Plan, Sweep, Transfer, travel
 from rig.page.about import About
 from rig.page.rows import Look
@@ -30,6 +30,7 @@ from rig.station.events import (
     StepStarted,
     VerdictReached,
 )
+from rig.turners.ur.report import ArmReport
 from support.paths import DEMO
 
 STEP_S = 0.1

@@ -72,6 +72,7 @@ const SHOW = {
   prompt: (asked) => prompt(asked, shown.about.may_answer),
   certificate: light,
   outcome: found,
+  mounts: (lines) => $("mounts").replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text }))),
   since: found,
   next(step) {
     $("next").hidden = !step?.command;

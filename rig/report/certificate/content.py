@@ -20,6 +20,7 @@ from rig.motion.steps import closes, turn_words
 from rig.report.certificate.stated import Stated
 from rig.report.kinds.kind import Found, Without
 from rig.report.kinds.registry import kinds, shown
+from rig.report.mounts import mount_lines
 from rig.turners.kind import Words
 from rig.turners.registry import words_of
 
@@ -95,6 +96,11 @@ class Certificate:
     def arcs(self) -> tuple[str, ...]:
         """How far sweeps went that were no whole turns."""
         return tuple(sorted({turn_words(angle) for angle in _angles_rad(self.result) if not closes(angle)}))
+
+    @property
+    def mounted(self) -> tuple[str, ...]:
+        """How the item sat in the stages for which it was mounted anew, in a line each."""
+        return tuple(mount_lines(self.result))
 
     @property
     def arm(self) -> str:

@@ -214,7 +214,7 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
         "measurementResult",
         text("name", found.name),
         dcc("usedMethods", dcc("usedMethod", text("name", _method(c)),
-                               text("description", f"{DESCRIBED}; {c.procedure}"),
+                               text("description", "; ".join([DESCRIBED, c.procedure, *c.mounted])),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),

@@ -8,12 +8,13 @@ from contextlib import closing
 from dataclasses import replace
 
 from rig.errors import Problem, Refused
-from rig.motion.state import ArmReport, ArmState, RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.turners.ur.dashboard import Dashboard
 from rig.turners.ur.identity import is_polyscope_x, model_found, series_problem
 from rig.turners.ur.messages import Connected
 from rig.turners.ur.primary import Account, read_account
 from rig.turners.ur.primary_stop import PrimaryStop
+from rig.turners.ur.report import ArmReport
 from rig.turners.ur.robot_api import RobotApi
 from rig.turners.ur.stopping import independent_ways
 

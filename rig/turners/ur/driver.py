@@ -10,7 +10,7 @@ from typing import Self
 
 from rig.errors import Fault, Problem, Refused, RigError
 from rig.motion.carried import Carried
-from rig.motion.state import ArmReport, ArmState, RuntimeState
+from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
 from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
 from rig.turners.ur.asking import ANSWER_S, reported, stop_problem
@@ -18,6 +18,7 @@ from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
+from rig.turners.ur.report import ArmReport
 from rig.turners.ur.robot_api import PORT as ROBOT_API_PORT
 from rig.turners.ur.robot_api import RobotApi
 from rig.turners.ur.stop_trial import stop_trial

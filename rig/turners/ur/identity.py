@@ -15,7 +15,7 @@ from rig.config.section import ModelName
 from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
 from rig.motion.model import TurnerModel, model_of, turner_model
-from rig.motion.state import ArmReport
+from rig.turners.ur.report import ArmReport
 
 E_SERIES, POLYSCOPE_X = 5, 10  # the first major versions of their software; the CB3 series has 3
 POLYSCOPE_X_SINCE = (10, 10)  # older ones are not known to take programs and stops at their primary interface

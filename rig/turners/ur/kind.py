@@ -9,13 +9,14 @@ from rig.config.models import ArmSection
 from rig.errors import Problem, refuse
 from rig.motion.carried import carried_by
 from rig.motion.model import model_of
-from rig.motion.preflight import plan_problems
-from rig.motion.state import ARM_FIELDS, ArmReport, Made
+from rig.motion.state import ARM_FIELDS, Made
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Words
 from rig.turners.turner import Turner
 from rig.turners.ur import driver, preflight
 from rig.turners.ur.identity import identity_problems
+from rig.turners.ur.plan_problems import plan_problems
+from rig.turners.ur.report import ArmReport
 
 
 def _connect(section: ArmSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:

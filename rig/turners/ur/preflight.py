@@ -10,11 +10,13 @@ from rig.errors import Problem, refuse
 from rig.motion.carried import carried_by
 from rig.motion.geometry import DenavitHartenberg, flange_axes
 from rig.motion.model import home_of, model_of
-from rig.motion.preflight import plan_problems, way_to_home
-from rig.motion.state import JOINT_NAMES, MAKER, ArmReport, Made
+from rig.motion.preflight import way_to_home
+from rig.motion.state import JOINT_NAMES, Made
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import local_control, readiness
 from rig.turners.ur.identity import identity_problems, model_found
+from rig.turners.ur.plan_problems import plan_problems
+from rig.turners.ur.report import MAKER, ArmReport
 
 # How far the first motion may swing the large joints through the room, and the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))

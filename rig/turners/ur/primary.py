@@ -17,7 +17,8 @@ from math import isnan
 
 from rig.errors.quoting import printable
 from rig.motion.geometry import DenavitHartenberg, Pose
-from rig.motion.state import ArmSetup, JointLimits
+from rig.motion.state import JointLimits
+from rig.turners.ur.report import ArmSetup
 
 PORT = 30001
 HEADER = struct.Struct(">iB")

@@ -15,10 +15,11 @@ from rig.config.models import ArmSection
 from rig.config.section import ModelName
 from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
-from rig.motion.state import ArmReport, ArmSetup, JointLimits
+from rig.motion.state import JointLimits
 from rig.turners.ur.driver import look
 from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.preflight import preflight_problems
+from rig.turners.ur.report import ArmReport, ArmSetup
 from rig.world.ur10e.models import MODELS
 from support.commands import rig
 from support.told_runs import report

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from rig.motion.geometry import DenavitHartenberg, flange_axes
-from rig.motion.state import ArmSetup, JointLimits
+from rig.motion.state import JointLimits
 from rig.turners.ur.driver import look
 from rig.turners.ur.primary import PORT, Account, read_account
+from rig.turners.ur.report import ArmSetup
 from support.worlds import World
 
 HOST = "127.0.3.252"

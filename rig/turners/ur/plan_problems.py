@@ -1,0 +1,40 @@
+"""What is wrong with a plan by itself for an arm of Universal Robots: by its model, by its controller's limits."""
+
+from rig.errors import Problem
+from rig.motion.carried import Carried
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.keep_out import clearance_problems
+from rig.motion.model import TurnerModel
+from rig.motion.preflight import step_problems, travels
+from rig.motion.state import JointLimits
+from rig.motion.steps import Plan
+from rig.turners.ur.limits import motion_problems
+
+
+def plan_problems(
+    plan: Plan,
+    carried: Carried,
+    model: TurnerModel,
+    *,
+    arm: DenavitHartenberg | None = None,
+    told: JointLimits | None = None,
+) -> list[Problem]:
+    """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
+
+    And what brings the flange or what it carries too near the arm. All as the `model` can do it. `told` are the
+    controller's own limits, which count where they are narrower; the lengths are those of `arm`, or else the drawing's.
+    """
+    problems = step_problems(plan)
+    moving = [motion for motion in plan.motions if travels(motion)]
+    problems += [problem for motion in moving for problem in motion_problems(motion, model.limits, told)]
+    problems += clearance_problems(plan, carried, model, arm)
+    if not 0 <= carried.payload_kg <= model.payload_kg:
+        problems.append(
+            Problem(
+                "payload_too_heavy",
+                f"the payload of {carried.payload_kg:g} kg is outside 0 to {model.payload_kg:g} kg, which a "
+                f"{model.name} carries",
+                "Weigh the fixture and correct arm.payload_kg",
+            )
+        )
+    return list(dict.fromkeys(problems))
