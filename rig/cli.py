@@ -112,7 +112,7 @@ def guarded(command: Callable[[], int]) -> int:
         return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
     except SystemExit as ended:  # what a script's own code raised: its status would be taken for a verdict
         ended_by = f"a script ended the program (SystemExit: {ended})"
-        return _ended(str(Fault("script_failed", ended_by, "Let the script end nothing by itself")), FAULT)
+        return _ended(str(Fault("script_failed", ended_by, "Remove from the script what ends the program")), FAULT)
     except BaseException:
         import traceback
 

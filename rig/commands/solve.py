@@ -46,7 +46,7 @@ def run(options: Namespace) -> int:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
         return _recording(options)
     if options.overrides:
-        raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
+        raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
     return solve_elsewhere.run(options)
 
 

@@ -33,8 +33,8 @@ def plan_problems(
         problems.append(
             Problem(
                 "payload_too_heavy",
-                f"the payload of {carried.payload_kg:g} kg is outside 0 to {model.payload_kg:g} kg, which a "
-                f"{model.name} carries",
+                f"the payload of {carried.payload_kg:g} kg is outside 0 to {model.payload_kg:g} kg, what a "
+                f"{model.name} can carry",
                 "Weigh the fixture and correct arm.payload_kg",
             )
         )
@@ -53,7 +53,9 @@ def step_problems(plan: Plan) -> list[Problem]:
         if not 0 < step.duration_s < math.inf
     ]
     problems += [
-        Problem("no_travel", f"{motion.name} leads nowhere", "Leave it out of the plan, or let it move a joint")
+        Problem(
+            "no_travel", f"{motion.name} does not move anything", "Leave it out of the plan, or let it move a joint"
+        )
         for motion in plan.motions
         if not _travels(motion)
     ]

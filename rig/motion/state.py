@@ -279,5 +279,5 @@ class ArmReport:
     @property
     def words(self) -> str:
         """The arm as a line of text names it: model, serial number, software."""
-        named = "model not told" if self.model is None else f"{MAKER} {self.model}"
+        named = "model not known" if self.model is None else f"{MAKER} {self.model}"
         return f"{named}, serial number {self.serial_number}, PolyScope {self.polyscope}"

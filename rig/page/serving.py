@@ -136,7 +136,7 @@ def check(address: Address) -> None:
     if not address.loopback and address.token is None:
         raise Refused(
             "page_address",
-            f"others than this computer reach {address.host}, so the page there needs a token",
+            f"other computers can reach {address.host}, so the page there needs a token",
             "Give --page-token-file FILE as well, or leave the address out",
         )
 

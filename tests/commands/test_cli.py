@@ -157,7 +157,7 @@ def test_a_plan_says_what_its_checks_will_tell() -> None:
     told = {each["what"]: each for each in document["told_from"]["gyro"]}
     assert told["all scale factors change half-way"]["check"] == "scale_changed"
     said = " ".join(shell(PLAN).stdout.split())
-    assert "told in 95 of 100 runs" in said and "another reading in one sweep" in said
+    assert "notice in 95 of 100 runs" in said and "another reading in one sweep" in said
     twice = json.loads(shell(f"{PLAN} --json --set procedure.repeats=2").stdout)["told_from"]["gyro"]
     assert all(each["size"] < told[each["what"]]["size"] for each in twice if "half-way" in each["what"])
 
