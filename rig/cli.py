@@ -12,7 +12,7 @@ from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
-from rig.station.plain_text import say_on_terminal
+from rig.station.plain_text import for_file, say_on_terminal
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -121,7 +121,7 @@ def guarded(command: Callable[[], int]) -> int:
 
 
 def _ended(text: str, status: int) -> int:
-    print(f"rig: {printable_lines(text)}", file=sys.stderr)
+    print(for_file(f"rig: {printable_lines(text)}", sys.stderr), file=sys.stderr)
     return status
 
 

@@ -92,7 +92,7 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
 def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
     imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
     done = shell(f"{imu} --set 'procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]'")
-    assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes tell 9 of the 14" in done.stderr, done
+    assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes determine 9 of the 14" in done.stderr, done
 
 
 @pytest.mark.parametrize("procedure", ["six_observation", "verify", "static_attitudes", "imu"])

@@ -91,7 +91,7 @@ def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, instal
     config = str(recorded / "config.yaml")
     plan = ran(installed, "-m", "rig", "plan", config)
     assert "joint 1 +0.0 → " in plan and "2 sweeps" in plan
-    assert "are told" not in plan and "is told" not in plan  # what a plan's checks tell is reckoned for an arm
+    assert "disturbance that the checks notice" not in plan  # what a plan's checks tell is reckoned for an arm
     assert "joint_speed" in ran(installed, "-m", "rig", "plan", config, "--set", "procedure.speed_deg_s=400", status=2)
     checked = json.loads(ran(installed, "-m", "rig", "check", config, "--json", status=2).partition("\n}")[0] + "}")
     assert "table at /dev/ttyUSB7: Toys T1, serial number T-7" in checked["seen"]
