@@ -1,18 +1,20 @@
 """What the operator's page takes of a core: `python benchmarks/page.py [seconds]`.
 
-A run's events fifty times a second, two sensors' worth of them; five browsers read ten frames a second, five more never
-read. Printed beside it: what the same events take while nobody looks, the longest that the run's thread waited for the
-page, and the largest memory.
+A run's events fifty times a second, two sensors' worth of them. Told to nobody first, which is what this program takes
+of itself and is no part of the page; then to a page at which nobody looks; to one with five browsers that read ten
+frames a second; and with five more that never read. The browsers are processes of their own. Printed as well: the
+longest that the run's thread waited for the page, and the largest memory.
 """
 
+import multiprocessing
 import resource
 import socket
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import islice
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -39,54 +41,77 @@ def asking(url: str) -> socket.socket:
     return connection
 
 
-def reader(connection: socket.socket, taken: list[int]) -> Callable[[], None]:
-    """Takes whatever comes and counts it; its work is this process's and counts as the page's."""
-
-    def read() -> None:
-        while piece := connection.recv(1 << 16):
-            taken.append(len(piece))
-
-    return read
+def browser(url: str, frames: Synchronized) -> None:
+    """A browser that reads all that comes, and counts the frames."""
+    connection = asking(url)
+    while piece := connection.recv(1 << 16):
+        with frames.get_lock():
+            frames.value += piece.count(b"event: ")
 
 
-def told(feed: Feed, seconds: float) -> float:
+def told(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> float:
     """Tell a run for so long; the longest that one event took, s."""
-    events: list[RunEvent] = list(moving(planned(), 1e9, step_s=PERIOD_S))
     longest_s, end_s = 0.0, time.monotonic() + seconds
-    following = iter(events)
     while time.monotonic() < end_s:
-        for event in islice(following, EVENTS):
+        for event in islice(events, EVENTS):
             began_s = time.perf_counter()
-            feed.event(event)
+            listener(event)
             longest_s = max(longest_s, time.perf_counter() - began_s)
         time.sleep(PERIOD_S)
     return longest_s
 
 
+def run_of(seconds: float) -> Iterator[RunEvent]:
+    """The events of a run that lasts longer than `seconds`, made before they are told."""
+    return iter([*islice(moving(planned(), 1e9, step_s=PERIOD_S), int(2 * EVENTS * seconds / PERIOD_S))])
+
+
+def measured(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> tuple[float, float]:
+    """The share of a core, %, and the longest wait, s."""
+    used_s, began_s = time.process_time(), time.monotonic()
+    longest_s = told(events, listener, seconds)
+    return 100 * (time.process_time() - used_s) / (time.monotonic() - began_s), longest_s
+
+
+def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float, float]:
+    """The share of a core, %, the longest wait, s, and the frames a second that one browser has read."""
+    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(Shown(ABOUT)), run_of(seconds)
+    frames = spawning.Value("l", 0)
+    for event in before_it_moves(planned()):
+        feed.event(event)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
+    ):
+        browsers = [spawning.Process(target=browser, args=(url, frames), daemon=True) for _ in range(reading)]
+        for process in browsers:
+            process.start()
+        silent = [asking(url) for _ in range(stalled)]
+        while frames.value < reading:  # each has the page
+            time.sleep(PERIOD_S)
+        before = frames.value
+        share, longest_s = measured(events, feed.event, seconds)
+        read = (frames.value - before) / seconds / max(reading, 1)
+        for connection in silent:
+            connection.close()
+        for process in browsers:
+            process.terminate()
+    return share, longest_s, read
+
+
 def main() -> None:
     """Print what it takes, without and with the page."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
-    for browsers in (False, True):
-        feed = Feed(Shown(ABOUT))
-        for event in before_it_moves(planned()):
-            feed.event(event)
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
-        ):
-            taken: list[list[int]] = [[] for _ in range(BROWSERS)]
-            connections = [asking(url) for _ in range((BROWSERS + STALLED) * browsers)]
-            for connection, sizes in zip(connections, taken, strict=False):
-                threading.Thread(target=reader(connection, sizes), daemon=True).start()
-            used_s, began_s = time.process_time(), time.monotonic()
-            longest_s = told(feed, seconds)
-            used, passed_s = time.process_time() - used_s, time.monotonic() - began_s
-            frames = sum(map(len, taken)) / passed_s
-            for connection in connections:
-                connection.shutdown(socket.SHUT_RDWR)
-        what = f"{BROWSERS} browsers and {STALLED} stalled" if browsers else "nobody looks"
-        share, wait_ms = 100 * used / passed_s, 1e3 * longest_s
-        print(f"{what:28} {share:5.1f} % of a core, {frames:5.1f} reads/s, longest wait {wait_ms:.2f} ms")
+    alone, _ = measured(run_of(seconds), lambda event: None, seconds)
+    print(f"{'told to nobody':30} {alone:5.2f} % of a core")
+    for what, reading, stalled in (
+        ("a page, nobody looks", 0, 0),
+        (f"{BROWSERS} browsers", BROWSERS, 0),
+        (f"{BROWSERS} browsers and {STALLED} stalled", BROWSERS, STALLED),
+    ):
+        share, longest_s, read = with_page(seconds, reading, stalled)
+        page = f"the page {share - alone:5.2f} %, {read:4.1f} frames/s read"
+        print(f"{what:30} {share:5.2f} % of a core, {page}, longest wait {1e3 * longest_s:.2f} ms")
     print(f"largest memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 

@@ -159,7 +159,8 @@ MESSAGES = (
         0x02,
         "identity",
         "board",
-        "answers hello; also sent twice a second while idle, so that a wrong baud rate can be told from silence",
+        "answers hello; also sent twice a second while idle, so that a wrong baud rate can be distinguished "
+        "from silence",
         (
             REPLY_TO,  # these first two fields stay in every version of the protocol
             Field("protocol", "u8", "PROTOCOL_VERSION of the image"),
@@ -267,7 +268,8 @@ MESSAGES = (
         0x0E,
         "keep",
         "host",
-        "keep the readings from now on, so that observe finds them; what was kept before goes; answered by ack",
+        "keep the readings from now on, so that observe finds them; readings kept before are discarded; "
+        "answered by ack",
         (SENSORS, Field("duration_s", "f32", "for how long, at least")),
     ),
     Message(
@@ -407,11 +409,11 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     15: Problem("not_kept", "it has not kept the readings of that time", "Ask it to keep them before the sweep"),
     16: Problem("bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
     17: Problem(
-        "bad_calibration", "the calibration is no sensor's: not finite, or of no known model", "Calibrate again"
+        "bad_calibration", "the calibration cannot be right: not finite, or of an unknown model", "Calibrate again"
     ),
     18: Problem("flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
     19: Problem("sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
-    20: Problem("not_a_gyroscope", "this is asked of gyroscopes only", "Leave the magnetometer out of the request"),
+    20: Problem("not_a_gyroscope", "only a gyroscope can do this", "Leave the magnetometer out of the request"),
 }
 
 # A request is answered by `error` or by: these, every other one by `ack`.

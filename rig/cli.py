@@ -12,7 +12,7 @@ from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
-from rig.station.plain_text import say_on_terminal
+from rig.station.plain_text import for_file, say_on_terminal
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -112,7 +112,7 @@ def guarded(command: Callable[[], int]) -> int:
         return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
     except SystemExit as ended:  # what a script's own code raised: its status would be taken for a verdict
         ended_by = f"a script ended the program (SystemExit: {ended})"
-        return _ended(str(Fault("script_failed", ended_by, "Let the script end nothing by itself")), FAULT)
+        return _ended(str(Fault("script_failed", ended_by, "Remove from the script what ends the program")), FAULT)
     except BaseException:
         import traceback
 
@@ -121,7 +121,7 @@ def guarded(command: Callable[[], int]) -> int:
 
 
 def _ended(text: str, status: int) -> int:
-    print(f"rig: {printable_lines(text)}", file=sys.stderr)
+    print(for_file(f"rig: {printable_lines(text)}", sys.stderr), file=sys.stderr)
     return status
 
 

@@ -83,7 +83,8 @@ def relative_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -
     if not least > MIN_INDEPENDENCE * greatest:
         raise Fault(
             "rank_deficient",
-            "the revolutions turn about one axis only, so how the two sensors are mounted to each other cannot be told",
+            "the revolutions turn about one axis only, so the mounting of one sensor relative to the other "
+            "is not known",
             "Sweep about at least two different axes",
         )
     matrix = Rotation.align_vectors(sensor.rate_rad_s, v)[0].as_matrix()

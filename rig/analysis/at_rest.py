@@ -115,7 +115,8 @@ def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantit
         raise Fault(
             "stuck_sensor",
             f"an axis repeats one {quantity} through a whole rest",
-            "Check the sensor's supply and its wiring; a sensor whose noise is below its resolution has no such curve",
+            "Check the sensor's supply and its wiring; if the sensor's noise is below its resolution, it has "
+            "no such curve",
         )
     durations_s = [float(each[-1] - each[0]) for each in times_s]
     interval_s = float(np.sum(durations_s) / np.sum([len(each) - 1 for each in readings]))

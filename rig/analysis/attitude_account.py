@@ -96,14 +96,14 @@ def _refuse_undetermined(told: Telling, count: int) -> None:
     if told.undetermined:
         raise Refused(
             "rank_deficient",
-            f"{count} attitudes tell {told.rank} of the {told.needed} numbers of an accelerometer's calibration; "
+            f"{count} attitudes determine {told.rank} of the {told.needed} numbers of an accelerometer's calibration; "
             f"undetermined: {', '.join(told.undetermined)}",
             remedy,
         )
     if told.condition > MAX_CONDITION:
         raise Refused(
             "ill_conditioned",
-            f"{count} attitudes hardly tell an accelerometer's calibration (condition {told.condition:.3g}, "
+            f"{count} attitudes hardly determine an accelerometer's calibration (condition {told.condition:.3g}, "
             f"{MAX_CONDITION:g} is the most)",
             remedy,
         )

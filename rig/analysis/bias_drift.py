@@ -190,7 +190,7 @@ def rate_drift(repeats: Sequence[Sequence[Stand]], site: Site) -> BiasDrift:
         if site.earth_rate_rad_s is None:
             raise Fault(
                 "earth_rate_unknown",
-                "a gyroscope at rest shows the Earth's rate alone, and the site does not say it",
+                "a gyroscope at rest shows the Earth's rate, and the configuration does not state the site",
                 "Give site.latitude_deg and site.heading_deg",
             )
         known = KnownNorm(float(np.linalg.norm(earth)), earth)

@@ -40,7 +40,7 @@ BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_READINGS = "scatter of the readings"
 OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # of a bias: m = F ω + b there, g = K (m + b) of gyroscopes
-NO_SWEEPS = Fault("too_few_observations", "attitudes tell no sweeps", "Give sweeps in six directions")
+NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,9 @@ def _vector(data: ExternalData) -> VectorSolution:
 def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
     method, site, asked = known_method(name), settings.site, settings.elsewhere
     if site is None or asked is None:
-        raise Refused("no_site", "the recording does not say where it was made", "Make it anew from the two files")
+        raise Refused(
+            "no_site", "the recording does not say where it was made", "Make the recording again from the two files"
+        )
     placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
     found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
     rates = found.get(RATE)
@@ -245,5 +247,5 @@ def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
         return faults[0]
     reasons = "; ".join(f"{quantity}: {str(fault).rstrip('.')}" for quantity, fault in unsolved.items())
     return Refused(
-        "nothing_solved", f"no sensor has a solution: {reasons}", "Do what is said of the sensor that is wanted"
+        "nothing_solved", f"no sensor has a solution: {reasons}", "Do what the message says about your sensor"
     )

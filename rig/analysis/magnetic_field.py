@@ -175,7 +175,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
         change_t, std_t = np.linalg.norm(found.change_t), np.linalg.norm(found.std_t)
         raise Fault(
             "field_drifts",
-            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, of which noise explains "
+            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, and noise explains "
             f"{1e6 * std_t:.3f}: a field that drifts reads as bias and scale",
             "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
         )

@@ -42,19 +42,19 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     `runs_do_not_match` naming what differs, and as `separate` does.
     """
     if len(runs) < 2:
-        raise Refused("too_few_runs", "one run does not tell a bias from the arm's field", ALIKE)
+        raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", ALIKE)
     names = list(runs[0][1].magnetometers)
     if not names:
-        raise Refused("no_magnetometer", f"{runs[0][0]} has recorded no magnetometer", "Give runs with one")
+        raise Refused("no_magnetometer", f"{runs[0][0]} has no recording of a magnetometer", "Give runs with one")
     return {name: _reversal([_as_mounted(run, outcome, name) for run, outcome in runs]) for name in names}
 
 
 def _as_mounted(run: str, outcome: Outcome, name: str) -> AsMounted:
     result = outcome.magnetometers.get(name)
     if result is None:
-        raise Refused("no_magnetometer", f"{run} has recorded no magnetometer {name}", ALIKE)
+        raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", ALIKE)
     if isinstance(result, Fault):
-        raise Refused("no_magnetometer", f"in {run} {name} was not calibrated: {result}", "Mend that, and run again")
+        raise Refused("no_magnetometer", f"in {run} {name} was not calibrated: {result}", "Correct that, and run again")
     return AsMounted(run, outcome, result)
 
 

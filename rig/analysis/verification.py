@@ -118,7 +118,9 @@ def _against_the_arm(recordings: Sequence[ObservedRun], reference: Reference) ->
 
 def _check_recorded(run: RunData, sensor: str, mode: str) -> None:
     if sensor not in run.sensors:
-        raise Fault("sensor_missing", f"the recording holds nothing of {sensor}", "Name it under sensors and run again")
+        raise Fault(
+            "sensor_missing", f"the recording contains nothing of {sensor}", "Name it under sensors and run again"
+        )
     if run.sensors[sensor].mode != mode:
         raise Fault(
             "wrong_mode",

@@ -101,7 +101,7 @@ def stored_calibration(board: Board, name: str, section: SensorSection) -> Store
     if stored is None:
         raise Refused(
             "no_calibration",
-            f"sensors.{name}: the board has no calibration stored to correct its readings by",
+            f"sensors.{name}: the board has no calibration stored, so it cannot correct readings",
             "Calibrate it first, or store a calibration with `rig board calibration write`",
         )
     refuse_other_sensor(

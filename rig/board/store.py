@@ -53,8 +53,8 @@ def calibration_of(solved: Solved) -> Calibration:
     if solved.temperature_c is None:
         raise Refused(
             "not_in_result",
-            f"of the calibration of {solved.serial_number} it is not known how warm the sensor was",
-            "Calibrate it where its thermometer is read",
+            f"the temperature of {solved.serial_number} during its calibration is not known",
+            "Calibrate it again with its temperature recorded",
         )
     matrix = np.diag(solved.scale) if solved.correction_matrix is None else np.array(solved.correction_matrix)
     x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)

@@ -29,9 +29,9 @@ def refuse_foreign_addresses(folder: Path, loaded: Loaded, agreed: Sequence[str]
     named = " ".join(f"--connect {shlex.quote(where)}" for _, where in addresses)
     raise Refused(
         "foreign_folder",
-        f"the {CONFIG} in {folder} is none that you have run on this computer; it would connect to "
+        f"the {CONFIG} in {folder} was never run by you on this computer; it would connect to "
         + ", ".join(f"{what} {where}" for what, where in addresses),
-        f"If all of that is yours, say so: {resuming(folder)} {named}",
+        f"If all of this is yours, state it: {resuming(folder)} {named}",
     )
 
 

@@ -71,7 +71,7 @@ def run(
     if multiprocessing.current_process().name != "MainProcess":
         raise Refused(
             "no_main_guard",
-            "a process of this program has read the script that calls rig.run, and come to that call itself",
+            "the process that talks to the arm reads your script too, and has reached the call of rig.run itself",
             'Put the call below a line  if __name__ == "__main__":',
         )
     if threading.current_thread() is not threading.main_thread():

@@ -117,7 +117,7 @@ def rigs(options: Namespace) -> int:
     if found:
         console.print(effects_table(found))
     else:
-        console.print("no two rigs have calibrated the same sensors often enough to be told apart")
+        console.print("no two rigs have calibrated the same sensors often enough to be compared")
     return DISAGREE if alarmed else 0
 
 
@@ -202,7 +202,7 @@ def _selected(history: History, selection: Selection) -> list[Past]:
     if not pasts and selection.serial_number is not None:
         raise Refused(
             "not_in_history",
-            f"no calibration of {selection.serial_number} was entered that fits",
+            f"no calibration of {selection.serial_number} in the history fits",
             "Look with `rig history`, or enter runs with `rig history import`",
         )
     return pasts
@@ -229,7 +229,7 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
         if not claimed.recordings:
             raise Refused(
                 "no_recording",
-                f"{folder} has a {RESULT} and no recording that gives it",
+                f"{folder} has a {RESULT} but no recording from which it can be computed",
                 "Import the folder with its recordings",
             )
     from rig.analysis.estimators import DEFAULT_ESTIMATOR
@@ -246,7 +246,8 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
         more = f", and {len(differing) - MOST_TOLD} more" if len(differing) > MOST_TOLD else ""
         raise Refused(
             "result_not_of_recording",
-            f"the {RESULT} in {folder} is not what its recordings give: {'; '.join(differing[:MOST_TOLD])}{more}",
-            "Enter what they give by `rig history import --solve DIR`; a result of an older version may differ too",
+            f"the {RESULT} in {folder} does not agree with its recordings: {'; '.join(differing[:MOST_TOLD])}{more}",
+            "Enter the result of the recordings by `rig history import --solve DIR`; a result of an older "
+            "version may differ too",
         )
     return finished_run(folder, given)

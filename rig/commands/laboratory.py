@@ -41,7 +41,7 @@ def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator
                 raise Refused(
                     "world_not_ready",
                     f"the simulated laboratory ended with status {process.wait()} before it was ready",
-                    "What it said stands above; `rig world CONFIG` runs it alone",
+                    "Its own message is above; `rig world CONFIG` runs it alone",
                 )
             yield str(answer["control"])
         finally:

@@ -98,8 +98,8 @@ def token_said(options: argparse.Namespace) -> str | None:
     except (OSError, UnfitFile) as error:
         raise Refused(
             "page_address",
-            f"the page's token is not taken from {path}: {error}",
-            "Give a file that holds the token alone and that is yours alone: chmod 600 FILE",
+            f"the page's token cannot be taken from {path}: {error}",
+            "Give a file that contains only the token and that only you can read: chmod 600 FILE",
         ) from error
 
 
@@ -110,7 +110,9 @@ def wish(options: argparse.Namespace) -> PageWish | None:
     """
     if not options.page:
         if options.confirm_on_page or options.page_address or options.page_token or options.page_token_file:
-            raise Refused("page_address", "there is no page to say that of", "Give --page as well")
+            raise Refused(
+                "page_address", "this option is for the page, and no page was asked for", "Give --page as well"
+            )
         return None
     from rig.page.serving import check
 

@@ -48,7 +48,7 @@ def run(options: Namespace) -> int:
     if not (folder / SCRIPT).exists():
         raise Refused(
             "another_script",
-            f"{folder} keeps no {SCRIPT}, so the script it was begun with is not known",
+            f"{folder} contains no {SCRIPT}, so the script with which it was begun is not known",
             "Start a new run with `rig run`",
         )
     refuse_links(*folder.iterdir())

@@ -48,7 +48,7 @@ def run(options: Namespace) -> int:
             raise Refused("bad_option", "--columns is for samples as CSV", "Give --attitudes or --sweeps beside them")
         return _recording(options)
     if options.overrides:
-        raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
+        raise Refused("unknown_setting", "samples as CSV have no settings", "Leave out --set")
     return solve_elsewhere.run(options)
 
 

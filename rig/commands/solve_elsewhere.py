@@ -85,7 +85,7 @@ def run(options: Namespace) -> int:
     from rig.report.table import print_kept, print_outcome
 
     if options.history is not None and options.out is None:
-        raise Refused("bad_option", "--history is for what is kept", "Give --out, which keeps the run")
+        raise Refused("bad_option", "--history is for runs that are kept", "Give --out, which keeps the run")
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         recording = _recording(options)
         outcome = calibrated([recording])

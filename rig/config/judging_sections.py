@@ -141,7 +141,7 @@ class SiteSection(Section):
         if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
         if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
-            raise ValueError("heading_deg says nothing where the x axis of the base points up or down")
+            raise ValueError("heading_deg has no meaning if the x axis of the base points up or down")
         return self
 
     @property
@@ -181,8 +181,8 @@ class UncertaintySection(Section):
         default=None,
         ge=0,
         le=5,
-        description="standard deviation of a joint's angle about what its encoder tells: for sweeps that are no whole "
-        "turns. No default, for no maker of these arms states it; whole turns do not need it",
+        description="standard deviation of a joint's angle about the angle of its encoder: for sweeps that are no "
+        "whole turns. No default, for no maker of these arms states it; whole turns do not need it",
     )
     mount_deg: float = Field(
         default=1.0,
@@ -344,5 +344,5 @@ class HistorySection(Section):
     def a_place_without_a_password(cls, value: str | None) -> str | None:
         """A recording keeps the configuration, so a password in it would go wherever recordings go."""
         if value is not None and "://" in value and history_url(value).password is not None:
-            raise ValueError("holds a password, which every recording would keep; put it into ~/.pgpass")
+            raise ValueError("contains a password, and every recording would keep it; put it into ~/.pgpass")
         return value

@@ -57,7 +57,7 @@ class ArmSection(TurnerSection):
     host: str = Field(min_length=1, max_length=253, description="name or address of the arm's controller")
     model: ModelName = Field(
         default="ur10e",
-        description="which arm it is: its lengths, limits and room are reckoned with, and its controller must agree; "
+        description="which arm it is: its lengths, limits and free room are used, and its controller must agree; "
         "`ur10_cb3` is the UR10 of the CB3 series",
     )
     payload_kg: float = Field(

@@ -72,7 +72,7 @@ class SixSweepsSection(ProcedureSection):
         ge=30,
         le=3600,
         description="how far a sweep turns at constant speed, centred on `arm.home_deg`; 360 and its multiples are "
-        "whole turns, whose angle is known by closure of the circle; of any other the encoders tell it: "
+        "whole turns, whose angle is known because the circle closes; any other angle is that of the encoders: "
         "`uncertainty.angle_std_deg`",
     )
     acceleration_deg_s2: float = Field(
@@ -93,7 +93,7 @@ class SixSweepsSection(ProcedureSection):
         if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
         if len(set(self.speeds)) < len(self.speeds):
-            raise ValueError("speeds_deg_s must name each speed once; repeats says how often all of it is done")
+            raise ValueError("speeds_deg_s must name each speed once; repeats says how often everything is done")
         return self
 
     earth_rate: Literal["known", "find"] = Field(
@@ -142,8 +142,9 @@ class SixSweepsSection(ProcedureSection):
         """An arc that nobody knows well enough, or that takes longer than a board keeps readings."""
         if self.arcs and config.uncertainty.angle_std_deg is None:
             yield (
-                f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders tell how far a sweep went: give "
-                "uncertainty.angle_std_deg, how far a joint may be from the angle that its encoder tells"
+                f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders measure how far a "
+                "sweep went: give "
+                "uncertainty.angle_std_deg, how far a joint may be from the angle of its encoder"
             )
         if self.arcs and self.finds_earth_rate:
             yield f"procedure.earth_rate: find needs whole turns, and procedure.arc_deg is {self.arc_deg:g}"
@@ -277,7 +278,7 @@ class AttitudesSection(ProcedureSection):
         for attitude in value:
             turned = tuple(np.mod(attitude, 360).tolist())
             if turned in found:
-                raise ValueError(f"{list(attitude)} stands there twice; repeats says how often all of it is done")
+                raise ValueError(f"{list(attitude)} is listed twice; repeats says how often everything is done")
             found.add(turned)
         return value
 

@@ -33,7 +33,7 @@ def checked_host(name: str) -> str:
     try:
         name.encode("idna")
     except UnicodeError:
-        raise ValueError("no host's name; between its dots stand 1 to 63 characters each") from None
+        raise ValueError("not the name of a host; each part between dots has 1 to 63 characters") from None
     return name
 
 

@@ -213,7 +213,7 @@ class SensorSection(Section):
 def checked_serial_number(value: str) -> str:
     """Raises ValueError when the board could not keep it."""
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
-        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
     return value
 
 

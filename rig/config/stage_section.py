@@ -39,7 +39,7 @@ class StageSection(Section):
     def each_wrist_once(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
         """A wrist that stands there twice says nothing more."""
         if value is not None and len(set(value)) < len(value):
-            raise ValueError("must name each wrist once; procedure.repeats says how often all of it is done")
+            raise ValueError("must name each wrist once; procedure.repeats says how often everything is done")
         return value
 
 

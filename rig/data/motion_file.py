@@ -42,7 +42,7 @@ class Header:
             raise ValueError(f"its columns are {', '.join(columns)}")
         for name, column in columns.items():
             if not (np.abs(column) < LARGEST_NUMBER).all():
-                raise ValueError(f"a number of its {name} is none, or none that could be measured")
+                raise ValueError(f"a value of its {name} is not a number, or cannot have been measured")
 
 
 def samples_header(needed: Collection[Quantity] = ()) -> Header:

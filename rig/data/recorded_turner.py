@@ -59,7 +59,7 @@ def described(document: Any) -> RecordedTurner:
     if len({*turner.joints}) < len(turner.joints) or len({*names, *ALWAYS}) < len(names) + len(ALWAYS):
         raise ValueError("two joints of its turner, or two fields of its states, have one name")
     if not all(name.isascii() and name.isidentifier() and len(name) <= 40 for name in names):
-        raise ValueError("a field of its turner's states has a name that is none")
+        raise ValueError("a field of its turner's states has a name that is not allowed")
     if turner.geometry.joints != len(turner.joints):
         raise ValueError(f"its turner has {len(turner.joints)} joints and a geometry of {turner.geometry.joints}")
     return turner
@@ -79,4 +79,4 @@ def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable
         if isinstance(event, DwellStarted | DwellFinished):
             poses.append(event.dwell.q_rad)
     if any(len(pose) != len(turner.joints) for pose in poses):
-        raise ValueError(f"its turner has {len(turner.joints)} joints, and a pose of it has others")
+        raise ValueError(f"its turner has {len(turner.joints)} joints, and one of its poses has another number")

@@ -453,7 +453,7 @@ def passed_result(path: Path) -> ResultDocument:
         raise Refused(
             "verdict_failed",
             f"the run in {_file(path)} failed its verdict ({failed})",
-            "Mend the cause and calibrate again",
+            "Remove the cause and calibrate again",
         )
     return result
 

@@ -315,7 +315,7 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
     return Refused(
         "not_a_run_file",
         f"{path} cannot be read as a run ({why})",
-        "Give the path of a run.h5 the rig has written, and that nothing has damaged since",
+        "Give the path of a run.h5 that the rig has written and that was not damaged since",
     )
 
 
@@ -323,7 +323,7 @@ def _no_room(path: Path, why: str) -> Refused:
     return Refused(
         "temporary_folder_full",
         f"{tempfile.gettempdir()} has no room for what {path} holds ({why})",
-        "Make room there, or let TMPDIR name another folder",
+        "Make room there, or name another folder in the environment variable TMPDIR",
     )
 
 

@@ -111,7 +111,7 @@ def script_identity(folder: Path) -> ScriptIdentity:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused(
             "another_script",
-            f"{path} does not say which script the run was begun with ({why})",
+            f"{path} does not say with which script the run was begun ({why})",
             "Start a new run with `rig run`",
         ) from error
 
@@ -141,6 +141,6 @@ def refuse_links(*places: Path) -> None:
         if place.is_symlink() or (place.exists() and not (place.is_file() or place.is_dir())):
             raise Refused(
                 "not_written_through",
-                f"{place} is a link, a pipe or a device, and nothing is written through it",
-                "Look where it leads; remove it, or name another folder with --out",
+                f"{place} is a link, a pipe or a device, and the rig does not write through it",
+                "Look where the link leads; remove it, or name another folder with --out",
             )

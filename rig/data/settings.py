@@ -327,7 +327,7 @@ def settings_from_json(text: str) -> RunSettings:
         raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
     settings = checked(RunSettings, document, "settings")
     if settings.elsewhere is None and settings.limits is None:
-        raise ValueError("its settings have no limits, which those of a run have")
+        raise ValueError("its settings have no limits, but those of a run have them")
     if settings.mounts and settings.stage >= len(settings.mounts):
         raise ValueError(f"its settings are of stage {settings.stage}, and there are {len(settings.mounts)} mounts")
     for mount in settings.mounts:
@@ -376,9 +376,8 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 def _angle_std_not_stated() -> Refused:
     return Refused(
         "angle_std_not_stated",
-        "a sweep is no whole turn, so the encoders tell how far it went, and nobody says how well",
-        "Give uncertainty.angle_std_deg, how far a joint may be from the angle that its encoder tells, or sweep whole "
-        "turns",
+        "a sweep is no whole turn, so the encoders measure how far it went, and their error is not stated",
+        "Give uncertainty.angle_std_deg, how far a joint may be from the angle of its encoder, or sweep whole turns",
     )
 
 
@@ -443,7 +442,9 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
             f"Set one of {', '.join(_settable())}",
         )
     if settings.elsewhere is not None and key:
-        raise Refused("unknown_setting", "no threshold and no limit judges readings of files", f"Leave out {section}")
+        raise Refused(
+            "unknown_setting", "readings from files are not judged by thresholds or limits", f"Leave out {section}"
+        )
     document = settings.document()
     if key and document[section] is None:  # in recordings of before
         raise Refused("unknown_setting", f"this recording states no {section}", f"Leave out {path.strip()}")

@@ -193,7 +193,8 @@ def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
         return Fault(
             "not_white_noise",
             f"at {tau_s:.2g} s the deviation changes with the power {slope:+.2f} of τ, not −0.5",
-            "Look at the curve: something vibrates, the readings are filtered that long, or the bias moves that fast",
+            "Look at the curve: something vibrates, the readings are filtered over that time, or the bias "
+            "moves that fast",
         )
     value = float(curve.deviation[at, axis] * np.sqrt(tau_s))
     return Read(value, value * known, tau_s)
@@ -211,8 +212,8 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
     if least == 0:
         return Fault(
             "not_white_noise",
-            f"the deviation is least at {tau_s:.2g} s, the shortest there is, and only rises from there",
-            "Look at the curve: something moves or vibrates, or the readings are filtered that long",
+            f"the deviation is smallest at {tau_s:.2g} s, the shortest there is, and only rises from there",
+            "Look at the curve: something moves or vibrates, or the readings are filtered over that time",
         )
     by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, Read) else 0.0
     if least == last or deviation < by_noise * (1 + BEYOND * known[least]):

@@ -52,8 +52,9 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
     if abs(correlation) > MAX_CORRELATION:
         raise Fault(
             "temperature_and_time_confounded",
-            f"temperature went with time (correlation {correlation:+.2f}), so the bias may follow either",
-            "Let the sensor cool down in the course of the run and warm up again, for example switched off between "
+            f"the temperature changed steadily with time (correlation {correlation:+.2f}), so the bias may "
+            "follow either",
+            "Let the sensor cool down and warm up again during the run, for example switched off between "
             "two parts of it (`rig resume`)",
         )
     columns = np.column_stack([np.ones(len(bias)), _scaled(temperature_c), _scaled(time_s)])

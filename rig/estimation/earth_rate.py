@@ -229,8 +229,10 @@ def _check_told(seen: Seen, directions: Array, gravity: Array | None) -> None:
         if without.rank == fewer:
             raise Fault(
                 "earth_rate_and_g_sensitivity",
-                "the vertical part of the Earth's rate reads as a sensitivity to gravity does, and neither is known",
-                "Give site.latitude_deg, or uncertainty.g_sensitivity_deg_s_g: 0 for a gyroscope that has none",
+                "the vertical part of the Earth's rate looks the same as a sensitivity to gravity, and "
+                "neither is known",
+                "Give site.latitude_deg, or uncertainty.g_sensitivity_deg_s_g: 0 for a gyroscope without "
+                "such a sensitivity",
             )
     refusals.check_conditioning(told, needed, MAX_CONDITION, "the Earth's rate beside axes and bias", REMEDY)
 
@@ -259,7 +261,7 @@ def check_earth_seen(
             "earth_rate_not_observable",
             f"the gyroscope finds {what} to be {free / DEG_H:.3g} deg/h and knows it to {worst / DEG_H:.2g}, "
             f"not to a tenth",
-            "Take a gyroscope with a steadier bias and less noise, or rest longer; give latitude and heading instead",
+            "Use a gyroscope with a steadier bias and less noise, or rest longer; give latitude and heading instead",
         )
     along = free_rad_s / free
     std = float(np.sqrt(along @ covariance_rad2_s2 @ along))

@@ -202,7 +202,7 @@ def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
         )
     worst = float(np.sqrt(np.diag(settled.solved.covariance)[MATRIX].max()))
     if worst > UNTOLD:
-        raise Fault("ill_conditioned", f"an element of F is known to {worst:.2g} only", REMEDY)
+        raise Fault("ill_conditioned", f"an element of F is only known to {worst:.2g}", REMEDY)
     refusals.check_unit(scale_of(settled.state.matrix))
     refusals.check_handedness(settled.state.matrix)
 

@@ -278,7 +278,7 @@ def _check_closed(turns: Sequence[Turn], equations: Sequence[_Equations], widene
         "turn_not_closed",
         f"the turns contradict each other by {1e3 * off:.0f} mrad, most of all the one from {turns[worst].start_s:.1f} "
         f"to {turns[worst].end_s:.1f} s",
-        "Turn against a stop, so that it ends where it began; see that the rows name the angles and axes as they were",
+        "Turn against a stop, so that it ends where it began; check that the rows have the real angles and axes",
     )
 
 

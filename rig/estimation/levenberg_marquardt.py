@@ -17,7 +17,7 @@ from rig.estimation.six_observation import design, negative_square
 
 MAX_CONDITION = 40.0  # above `accumulator`'s 30: what only noise tells is left out before
 VANISHED = 0.05  # of the largest scale factor
-REMEDY = "Sweep every wrist in both directions; a direction swept twice does not stand in for the other"
+REMEDY = "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction"
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ def check_finite(**arrays: Array) -> None:
             row = int(np.argwhere(~finite)[0][0])
             raise Fault(
                 "not_finite",
-                f"what is not a number stands in {name}" + (f", row {row}" if len(array) > 1 else ""),
+                f"{name} contains values that are not numbers" + (f", row {row}" if len(array) > 1 else ""),
                 "Look at the samples of that observation and record it again",
             )
 
@@ -110,7 +110,7 @@ def check_duplicates(means: Array) -> None:
         raise Fault(
             "duplicated_observation",
             f"observations {earlier} and {again} hold the same readings",
-            "Give each recording once; one direction swept twice does not stand in for the other",
+            "Give each recording once; a second sweep in one direction cannot replace the other direction",
         )
 
 
@@ -187,7 +187,7 @@ def check_side(reference: Array, side: Array) -> None:
     if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",
-            "the reference lies across the direction that should tell its sign",
+            "the reference is at right angles to the direction that should show its sign",
             "Give a direction the reference points along, for example the vertical for gravity",
         )
 
@@ -207,7 +207,8 @@ def untrustworthy(what: str) -> Fault:
     return Fault(
         "attitude_untrustworthy",
         what,
-        "Check the attitudes: their frame, their direction (body to table), headings nobody measured, one not reached",
+        "Check the attitudes: their frame, their direction (body to table), headings that nobody measured, "
+        "an attitude that was not reached",
     )
 
 
@@ -250,7 +251,7 @@ def check_conditioning(told: Conditioning, needed: int, limit: float, what: str,
     if not told.condition <= limit:
         raise Fault(
             "ill_conditioned",
-            f"the observations hardly tell {what} (condition {told.condition:.3g}, {limit:g} is the most)",
+            f"the observations hardly determine {what} (condition {told.condition:.3g}, {limit:g} is the most)",
             remedy,
         )
 

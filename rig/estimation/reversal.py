@@ -52,8 +52,8 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     if together.shape[1] == 3:
         raise Refused(
             "mounting_not_turned",
-            "the sensor was mounted alike in all runs",
-            "Turn it over on its extension, say so in its `mounting`, and run again",
+            "the sensor had the same mounting in all runs",
+            "Turn it over on its extension, state this in its `mounting`, and run again",
         )
     # The directions of the holder's in which a is found; it is 0 in the others.
     told = np.eye(3) - together @ together.T
@@ -68,7 +68,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     if chi_square > limit:
         raise Fault(
             "reversal_contradicts",
-            "the runs do not agree on what turning the sensor over leaves alone: "
+            "the runs do not agree in what must stay the same when the sensor is turned over: "
             f"χ² is {chi_square:.3g}, at most {limit:.3g} by noise",
             "See that the sensor sits in the same place in all runs and the field did not change between them; repeat",
         )

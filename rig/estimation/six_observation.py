@@ -116,8 +116,8 @@ def rank_deficient(axis: str) -> Fault:
     """The error for a design that leaves something undetermined."""
     return Fault(
         "rank_deficient",
-        f"the sweeps do not tell scale from bias: {axis} was not swept in both directions",
-        "Sweep every wrist in both directions; a direction swept twice does not stand in for the other",
+        f"the sweeps cannot separate scale and bias: {axis} was not swept in both directions",
+        "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction",
     )
 
 
@@ -134,6 +134,6 @@ def negative_square(axis: int) -> Fault:
     """The error for readings that no scale factor of axis 0, 1 or 2 explains."""
     return Fault(
         "negative_square",
-        f"the squared scale factor of {'xyz'[axis]} comes out as zero, negative or not a number",
+        f"the squared scale factor of {'xyz'[axis]} is zero, negative or not a number",
         "The readings do not fit the speeds: check axes, units, and that all six directions were swept",
     )

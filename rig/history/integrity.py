@@ -96,7 +96,7 @@ def _files(run: Kept, here: str, documents: Mapping[str, set[tuple[str, str]]]) 
     if folder is None:
         elsewhere = [name for name, _ in run.places if name != here]
         state: State = "elsewhere" if elsewhere else "missing"
-        why = f"on {elsewhere[0]}" if elsewhere else "the folder is not there any more"
+        why = f"on {elsewhere[0]}" if elsewhere else "the folder does not exist any more"
         yield Found(run.places[0][1] if run.places else f"the folder of run {run.run_id}", state, why)
         return
     for recording in run.recordings:

@@ -70,14 +70,14 @@ def version_of(connection: Connection, label: str) -> int:
     if found is None or not found.isdecimal():
         raise Refused(
             "not_a_history",
-            f"{label} holds {', '.join(sorted(tables)[:5])}, which no history has",
+            f"{label} holds {', '.join(sorted(tables)[:5])}, which do not belong to a history",
             "Give a history, or a file or database that is new",
         )
     if int(found) > schema.VERSION:
         raise Refused(
             "history_too_new",
             f"{label} is of version {found}, made by a newer program; this one knows version {schema.VERSION}",
-            "Install the newer program here as well; the history was not touched",
+            "Install the newer program here as well; the history was not changed",
         )
     return int(found)
 

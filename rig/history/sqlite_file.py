@@ -65,7 +65,7 @@ def _header(file: Path) -> bytes | None:
     finally:
         os.close(descriptor)
     if not header:
-        raise UnfitFile("it is empty, and a history is made only where there is nothing")
+        raise UnfitFile("it is an empty file, and a new history needs a name that does not exist yet")
     if len(header) < HEADER_BYTES or not header.startswith(MAGIC):
         raise UnfitFile("it is no database of SQLite")
     return header
@@ -85,6 +85,6 @@ def _is_of_before(file: Path) -> bool:
 def _refused(file: Path, why: str) -> Refused:
     return Refused(
         "not_a_history",
-        f"{file} is no history, and was not touched: {why}",
+        f"{file} is not a history, and was not changed: {why}",
         "Give a history, or a file or database that is new",
     )

@@ -118,7 +118,8 @@ def open_history(where: str | Place | None = None) -> Iterator["History"]:
         raise Refused(
             "history_unreachable",
             f"the history {found.label} cannot be used: {why[0] if why else type(error).__name__}",
-            "Mend that, or name another with --history or RIG_HISTORY; runs are entered later by `rig history import`",
+            "Correct that, or name another history with --history or RIG_HISTORY; runs are entered later by "
+            "`rig history import`",
         ) from error
     finally:
         if engine is not None:

@@ -134,7 +134,7 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> FittingTable:
         Column("by ± U", [_effect(name, effect) for name, effect in rows], number=True),
         Column("shared sensors", [str(effect.sensors) for _, effect in rows], rank=1, number=True),
     )
-    return FittingTable("effects of rigs, told apart from those of sensors", columns)
+    return FittingTable("effects of rigs, separated from those of sensors", columns)
 
 
 def title_of(subject: Subject) -> str:

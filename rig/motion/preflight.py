@@ -19,7 +19,9 @@ def step_problems(plan: Plan) -> list[Problem]:
         if not 0 < step.duration_s < math.inf
     ]
     problems += [
-        Problem("no_travel", f"{motion.name} leads nowhere", "Leave it out of the plan, or let it move a joint")
+        Problem(
+            "no_travel", f"{motion.name} does not move anything", "Leave it out of the plan, or let it move a joint"
+        )
         for motion in plan.motions
         if not travels(motion)
     ]

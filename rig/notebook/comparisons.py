@@ -104,7 +104,7 @@ def _known(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
     if run.calibration is None:
         raise Refused(
             "nothing_to_compare",
-            f"{run.path} tells nothing of {name}'s own calibration",
+            f"{run.path} does not contain {name}'s own calibration",
             "Compare with the sensor whose role is reference",
         )
     found = run.calibration.results[name]

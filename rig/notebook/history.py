@@ -133,7 +133,7 @@ def calibrations(
     if not found and serial_number is not None:
         raise Refused(
             "not_in_history",
-            f"no calibration of {serial_number} was entered that fits",
+            f"no calibration of {serial_number} in the history fits",
             "Look with `rig history`, or enter runs with `rig history import`",
         )
     return Calibrations(tuple(found))

@@ -45,7 +45,8 @@ def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, w
         raise Refused(
             "not_readings",
             f"the readings for {whose} are whole numbers ({given.dtype}), which are counts and not {quantity.unit}",
-            f"Multiply them by the sensor's {quantity.unit} for each count; whole numbers that are in {quantity.unit} "
+            f"Multiply them by the sensor's {quantity.unit} for each count; whole numbers that are already in "
+            f"{quantity.unit} "
             "already become readings by .astype(float)",
         )
     if given.dtype.kind != "f" or given.ndim != 2 or given.shape[1] != axes:

@@ -65,7 +65,7 @@ def plot_residuals(sensors: Mapping[str, SensorEntry]) -> Plot:
         raise Refused(
             "nothing_to_plot",
             "no sweeps were solved by the vector model here",
-            "Read in the result why, sensor by sensor",
+            "The result says why, sensor by sensor",
         )
     figure = _figure(10, 3 * len(solved))
     panels = figure.subplots(len(solved), sharex=True, squeeze=False)[:, 0]

@@ -79,7 +79,7 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
     if saturated.any():
         raise Fault(
             "saturation",
-            f"in {where} {int(saturated.sum())} accelerations stand at the end of the sensor's range",
+            f"in {where} {int(saturated.sum())} accelerations are at the end of the sensor's range",
             "Choose a wider acceleration.range_g",
         )
     changing = np.any(counts != counts[0], axis=0) if len(counts) else np.ones(3, dtype=np.bool_)
@@ -137,7 +137,7 @@ def _check_standing(motion: Motion, window: Window, where: str) -> None:
         raise Fault(
             "arm_moved_in_dwell",
             f"in {where} a joint moved by {np.degrees(moved_rad):.2f}°",
-            "Let nothing move the arm while it stands, then repeat the run",
+            "Make sure that nothing moves the arm while it stands, then repeat the run",
         )
 
 
@@ -151,6 +151,6 @@ def check_complete(samples: NDArray[Any], where: str, settings: ObservationThres
         raise Fault(
             "lost_samples",
             f"in {where} there are {count} samples and {lost} are missing, "
-            f"{100 * settings.max_lost_fraction:g} % may, and {MIN_DWELL_SAMPLES} are needed",
+            f"{100 * settings.max_lost_fraction:g} % may be missing, and {MIN_DWELL_SAMPLES} are needed",
             "Check the cable to the board and the load of this computer, or dwell longer",
         )

@@ -161,8 +161,8 @@ def refuse_elsewhere(run: RunData) -> None:
     if run.elsewhere is not None:
         raise Refused(
             "recorded_elsewhere",
-            "no arm turned the sensor: its readings are those of a file, and another file tells the motion",
-            "Give the recording of an arm, or, where readings do, the file itself",
+            "no arm turned the sensor: its readings come from a file, and its motion from another file",
+            "Give the recording of an arm; for a command that uses readings alone, give the file",
         )
 
 

@@ -170,8 +170,8 @@ def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:
     if RATE not in readings:
         raise Refused(
             "wrong_columns",
-            "the samples hold no turn rate, by which their clock would be found",
-            f"Give {', '.join(RATE.columns)} beside them, or both files on one clock",
+            "the samples contain no turn rate, which is needed to find their clock",
+            f"Give {', '.join(RATE.columns)} with them, or write both files by one clock",
         )
 
 
@@ -216,6 +216,6 @@ def _stated(rows: Mapping[str, Array]) -> Array | None:
         raise Refused(
             "bad_attitude_row",
             f"attitude {int(np.argmin(stated)) + 1} has a negative {STD_COLUMN}",
-            "Give the standard deviation of the attitude about each axis in rad, 0 where it is exact",
+            "Give the standard deviation of the attitude about each axis in rad, 0 if it is exact",
         )
     return stated

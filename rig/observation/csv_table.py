@@ -131,7 +131,7 @@ def _check_columns(
             raise Refused(
                 "wrong_unit",
                 f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
-                f"Convert it to the unit that the name {' or '.join(meant)} carries",
+                f"Convert it to the unit in the name {' or '.join(meant)}",
             )
     needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
     problems = [f"lacks {name}" for name in needed if name not in names]

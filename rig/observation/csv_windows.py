@@ -72,6 +72,6 @@ def check_complete(count: int, window: Window, interval_s: float, where: str, le
     if count < least or count < (1 - MAX_LOST_FRACTION) * expected - 1:
         raise Fault(
             "lost_samples",
-            f"{where} has {count} samples where {expected:.0f} belong",
+            f"{where} has {count} samples, but {expected:.0f} are expected",
             "Check that both files use one clock in seconds, and that no samples are missing",
         )

@@ -282,7 +282,7 @@ def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresh
         what = f"{lost} of {count + lost} samples are missing" if covered else "the samples do not cover the revolution"
         raise Fault(
             "lost_samples",
-            f"in {where} {what}, {100 * settings.max_lost_fraction:g} % may",
+            f"in {where} {what}, {100 * settings.max_lost_fraction:g} % may be missing",
             "Check the cable to the board and the load of this computer, then repeat the sweep",
         )
     return lost
@@ -293,7 +293,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
     if saturated.any():
         raise Fault(
             "saturation",
-            f"in {where} {int(saturated.sum())} samples stand at the end of the sensor's range",
+            f"in {where} {int(saturated.sum())} samples are at the end of the sensor's range",
             "Choose a wider range or a slower sweep",
         )
 

@@ -74,8 +74,9 @@ def find_placements(
     if not groups:
         raise Fault(
             "not_at_rest",
-            f"the body moves in all of {len(windows)} rows, and only a body at rest feels gravity or a field alone",
-            "Give attitudes in which it lies still for half a second and longer, among the others or instead of them",
+            f"the body moves in all of {len(windows)} rows, but only a body at rest feels gravity, or a "
+            "field, and nothing else",
+            "Add attitudes in which it lies still for half a second or longer",
         )
     covered = [_covered(time_s, rests[rest[group[0]]], [windows[row] for row in group]) for group in groups]
     named = {int(each) for each in rest}

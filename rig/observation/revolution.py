@@ -113,7 +113,7 @@ def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
     turned = float(np.ptp(travelled)) if len(travelled) else 0.0
     raise Fault(
         "incomplete_revolution",
-        f"in {describe(sweep)} the joint turned {np.degrees(turned):.0f}° and not through {_extent(sweep)}",
+        f"in {describe(sweep)} the joint turned {np.degrees(turned):.0f}° and not {_extent(sweep)}",
         "Repeat the sweep; resume the run if it was interrupted",
     )
 
@@ -169,7 +169,7 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
     if deviation > settings.max_speed_deviation:
         raise Fault(
             "speed_not_constant",
-            f"in {where} the joint's speed strayed {100 * deviation:.0f} % from its mean, "
+            f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
             f"{100 * settings.max_speed_deviation:.0f} % is allowed",
             "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
         )
@@ -181,5 +181,5 @@ def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:
         raise Fault(
             "other_joint_moved",
             f"in {where} another joint moved by {np.degrees(others.max()):.1f}°",
-            "Let nothing else move the arm during a sweep, then repeat it",
+            "Make sure that nothing else moves the arm during a sweep, then repeat it",
         )

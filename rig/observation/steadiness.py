@@ -38,7 +38,7 @@ def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
         at_s = float(time_s[np.searchsorted(block, int(off.max(axis=1).argmax()) + 1)])
         raise Fault(
             "not_at_rest",
-            f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {quantity.unit} within a second or two beside "
-            "its noise",
+            f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {quantity.unit} within a second or two, "
+            "more than by its noise",
             "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved",
         )

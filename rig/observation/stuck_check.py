@@ -25,7 +25,8 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
     if apart > OF_A_SWEEP * slowest_rad_s:
         raise Fault(
             "stuck_sensor",
-            f"at rest the gyroscope reads {np.degrees(apart):.3g} °/s more one time than another, as if it turned",
+            f"at rest the gyroscope reads {np.degrees(apart):.3g} °/s more in one rest than in another, as if "
+            "it turned",
             REMEDY,
         )
 
@@ -36,7 +37,7 @@ def check_other_way(sweep: Sweep, read: Collection[str | None], fault: Fault) ->
     Raises Fault `stuck_sensor`.
     """
     if sweep.joint_name in read:
-        raise Fault("stuck_sensor", f"{fault.what}; the other way it read as it should", REMEDY) from fault
+        raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 
 
 def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:

@@ -65,5 +65,5 @@ def _not_found(what: str) -> Fault:
     return Fault(
         "time_base_not_found",
         f"{what}, and the sensor cannot be put on its clock",
-        "Let the table write a row every twentieth of a second or oftener while it turns, or use one clock",
+        "Let the table write a row every twentieth of a second or more often while it turns, or use one clock",
     )

@@ -111,13 +111,13 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
     if still.all():
         raise Fault(
             "stuck_sensor",
-            f"the gyroscope reads {_triple(readings[0])} rad/s throughout, whatever the arm does",
+            f"the gyroscope reads {_triple(readings[0])} rad/s all the time, although the arm moves",
             "Check the sensor's supply and its bus wiring",
         )
     if still.any():
         raise Fault(
             "stuck_axis",
-            f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, whatever the arm does",
+            f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, although the arm moves",
             "The sensor is broken or wrongly configured; replace it",
         )
 

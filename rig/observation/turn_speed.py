@@ -93,6 +93,7 @@ def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyo
 def _too_short(far_rad: float) -> Fault:
     return Fault(
         "turn_too_short",
-        f"the shaft has turned {far_rad / TURN_RAD:.2f} of a turn evenly, too little to see the same places again",
+        f"the shaft has turned {far_rad / TURN_RAD:.2f} of a turn evenly, which is too little to come to the "
+        "same positions again",
         "Turn a quarter of a turn more than the turn that is measured, between the ramps",
     )

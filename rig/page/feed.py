@@ -63,11 +63,10 @@ class Feed:
         """What has changed since the last time, None if nothing has."""
         with self._lock:
             shown = self._shown
-            if not shown.changed and shown.history.end == self._sent:
+            changed = shown.changed()
+            if not changed and shown.history.end == self._sent:
                 return None
-            changed = {name: shown.sections[name] for name in shown.changed}
             points = shown.history.since(self._sent)
-            shown.changed = set()
             self._sent = shown.history.end
         return _frame("some", {**changed, "points": points})
 

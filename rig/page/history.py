@@ -25,14 +25,16 @@ class History:
         """The number of the next point."""
         return self.first + len(self._points)
 
+    def due(self, time_s: float) -> bool:
+        """Whether a point of that time is wanted: the last one is older, or time runs backwards and begins anew."""
+        return not self._points or not 0 <= time_s - self._points[-1][0] < SOON_S
+
     def add(self, time_s: float, values: Values) -> None:
         """Take a point, unless the last one is as good as now; time that runs backwards begins anew."""
-        if self._points:
-            since_s = time_s - self._points[-1][0]
-            if since_s < 0:
-                self.clear()
-            elif since_s < SOON_S:
-                return
+        if not self.due(time_s):
+            return
+        if self._points and time_s < self._points[-1][0]:
+            self.clear()
         if len(self._points) == POINTS:
             self.first += 1
         self._points.append((time_s, values))

@@ -5,10 +5,11 @@ import socket
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.errors import Refused
 from rig.page.connections import Connections, counted
@@ -16,6 +17,9 @@ from rig.page.control import Control
 from rig.page.feed import Broadcast, Feed
 from rig.page.guard import Door, new_token
 from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    import uvicorn
 
 ADDRESS, PORT = "127.0.0.1", 8137
 LAST_NEWS_S = 2.0  # for browsers to take what was shown last
@@ -50,10 +54,6 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
 
     A page that fails says so on stderr and is gone: what it shows goes on. Raises Refused `page_address`.
     """
-    import uvicorn
-
-    from rig.page.application import application
-
     check(address)
     listening = _bound(address)
     port = listening.getsockname()[1]
@@ -61,7 +61,56 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
     names = {host, "localhost"} if address.loopback else {host}
     token = address.token or new_token()
     door = Door(frozenset(f"{name}:{port}".lower() for name in names), token, not address.loopback)
-    broadcast, connections = Broadcast(feed), Connections()
+    broadcast = Broadcast(feed)
+    server = _server(broadcast, control, door, folder)
+    loop, over = asyncio.new_event_loop(), asyncio.Event()
+
+    async def serve() -> None:
+        posting = asyncio.create_task(broadcast.run())
+        served = asyncio.create_task(server.serve([listening]))
+        while not server.started and not served.done():
+            await asyncio.sleep(0.01)
+        listening.listen(WAITING)  # the server has made it AT_ONCE
+        ending = asyncio.create_task(over.wait())
+        await asyncio.wait((ending, served, posting), return_when=asyncio.FIRST_COMPLETED)
+        ending.cancel()
+        try:
+            await broadcast.close(LAST_NEWS_S)
+        finally:
+            server.should_exit = True
+            await asyncio.wait((posting, served))
+            for task in (posting, served):
+                task.result()
+
+    def work() -> None:
+        try:
+            with asyncio.Runner(loop_factory=lambda: loop) as runner:
+                runner.run(serve())
+            why = "" if over.is_set() else "its server ended"
+        except (Exception, SystemExit) as error:
+            why = f"{type(error).__name__}: {error}"
+        finally:
+            listening.close()
+            control.leave()
+        if why:
+            say(f"The page has ended ({why}). What it showed goes on without it.", sys.stderr)
+
+    thread = threading.Thread(target=work, name="page", daemon=True)
+    thread.start()
+    try:
+        yield f"http://{host}:{port}/#{token}"
+    finally:
+        with suppress(RuntimeError):  # its loop is closed: it has ended before
+            loop.call_soon_threadsafe(over.set)
+        thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
+
+
+def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> "uvicorn.Server":
+    import uvicorn
+
+    from rig.page.application import application
+
+    connections = Connections()
     config = uvicorn.Config(
         application(broadcast, control, door, folder, connections),
         http=counted(connections),
@@ -77,44 +126,7 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
         server_header=False,
         timeout_graceful_shutdown=1,
     )
-    server = uvicorn.Server(config)
-    over = threading.Event()
-
-    async def serve() -> None:
-        posting = asyncio.create_task(broadcast.run())
-        served = asyncio.create_task(server.serve([listening]))
-        while not server.started and not served.done():
-            await asyncio.sleep(0.01)
-        listening.listen(WAITING)  # the server has made it AT_ONCE
-        while not (over.is_set() or served.done() or posting.done()):
-            await asyncio.sleep(0.05)
-        try:
-            await broadcast.close(LAST_NEWS_S)
-        finally:
-            server.should_exit = True
-            await asyncio.wait((posting, served))
-            for task in (posting, served):
-                task.result()
-
-    def work() -> None:
-        try:
-            asyncio.run(serve())
-            why = "" if over.is_set() else "its server ended"
-        except (Exception, SystemExit) as error:
-            why = f"{type(error).__name__}: {error}"
-        finally:
-            listening.close()
-            control.leave()
-        if why:
-            say(f"The page has ended ({why}). What it showed goes on without it.", sys.stderr)
-
-    thread = threading.Thread(target=work, name="page", daemon=True)
-    thread.start()
-    try:
-        yield f"http://{host}:{port}/#{token}"
-    finally:
-        over.set()
-        thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
+    return uvicorn.Server(config)
 
 
 def check(address: Address) -> None:
@@ -136,7 +148,7 @@ def check(address: Address) -> None:
     if not address.loopback and address.token is None:
         raise Refused(
             "page_address",
-            f"others than this computer reach {address.host}, so the page there needs a token",
+            f"other computers can reach {address.host}, so the page there needs a token",
             "Give --page-token-file FILE as well, or leave the address out",
         )
 

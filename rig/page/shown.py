@@ -1,12 +1,13 @@
 """What the page shows, made of a run's events. No thread, no clock, and of files only the result that is told of."""
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE, Quantity
+from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
@@ -51,10 +52,14 @@ ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
 class Shown:
-    """The page's `sections` by name, each of plain numbers and texts, and the `changed` ones since somebody looked."""
+    """The page's sections by name, each of plain numbers and texts, and the `changed` ones since somebody looked.
+
+    Samples, states and progress come fifty times a second, and somebody looks ten times: the newest are kept as they
+    came, and made into sections by `sections`.
+    """
 
     def __init__(self, about: About) -> None:
-        self.sections: dict[str, Any] = {
+        self._sections: dict[str, Any] = {
             "about": asdict(about),
             "state": {"kind": "connecting", "text": "Connecting to arm and board"},
             "step": None,
@@ -73,37 +78,60 @@ class Shown:
             "ended": None,
         }
         self.history = History()
-        self.changed: set[str] = set(self.sections)
+        self._changed: set[str] = set(self._sections)
         self._about, self._parts = about, about.parts
         self._checks: list[Check] = []
         self._stored = False
         self._modes: dict[str, str] = {}
-        self._values: dict[str, tuple[float, ...]] = {}
-        self._fresh = False
+        self._samples: tuple[SensorSamples, ...] = ()
+        self._fresh = False  # the samples are newer than the arm's state
+        self._newest: dict[type, SamplesTaken | ArmSeen | Progress] = {}  # not in the sections yet
         self._seen: dict[tuple[str, int], dict[str, Any]] = {}
         self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
         self._solved = False
         self.ended = False
 
+    @property
+    def sections(self) -> dict[str, Any]:
+        """Everything as it is now."""
+        for event in self._newest.values():
+            match event:
+                case SamplesTaken(sensors):
+                    self.put("sensors", [self._row_of(sensor) for sensor in sensors])
+                case ArmSeen(state, missed_states):
+                    self.put("arm", {**self._sections["arm"], **stance(state), "missed": missed_states})
+                case Progress():
+                    self.put("step", _progress(event))
+        self._newest.clear()
+        return self._sections
+
+    def changed(self) -> dict[str, Any]:
+        """The sections that have changed since this was asked last."""
+        sections = self.sections
+        changed = {name: sections[name] for name in self._changed}
+        self._changed.clear()
+        return changed
+
     def put(self, name: str, value: Any) -> None:
         """Replace a section."""
-        self.sections[name] = value
-        self.changed.add(name)
+        self._sections[name] = value
+        self._changed.add(name)
 
     def take(self, event: RunEvent) -> None:
         """Show what has happened."""
         match event:
             case SamplesTaken(sensors):
-                self._samples(sensors)
-                self._fresh = True
-            case ArmSeen(state, missed_states):
-                self.put("arm", {**self.sections["arm"], **stance(state), "missed": missed_states})
-                if self._fresh:  # the arm is seen once more when it was let go, and no sample came with that
-                    self.history.add(state.time_s, self._values)
+                self._newest[SamplesTaken] = event
+                self._samples, self._fresh = sensors, True
+            case ArmSeen(state):
+                self._newest[ArmSeen] = event
+                # The arm is seen once more when it was let go, and no sample came with that.
+                if self._fresh and self.history.due(state.time_s):
+                    self.history.add(state.time_s, _values(self._samples))
                 self._fresh = False
             case Progress():
-                self.put("step", _progress(event))
+                self._newest[Progress] = event
             case _:
                 self._told(event)
                 if (text := line(event)) is not None:
@@ -117,15 +145,16 @@ class Shown:
             self.put("parameters", look.parameters)
 
     def _told(self, event: RunEvent) -> None:
-        """What happens once."""
+        """What happens once, after all that came before is in the sections."""
+        sections = self.sections
         match event:
             case ArmConnected(report):
-                self.put("arm", {**self.sections["arm"], **connected(report)})
+                self.put("arm", {**sections["arm"], **connected(report)})
             case PhaseStarted(procedure, plan, sensors):
                 self._modes = sensors
                 self._turns = {each.index: _turn(each) for each in plan.sweeps}
                 self.history.clear()
-                self._values = {}
+                self._samples = ()
                 self.put("sensors", [])
                 self.put("step", {"number": 0, "count": len(plan.steps), "name": procedure, "kind": "waiting",
                                   "fraction": 0.0, "elapsed_s": 0.0, "remaining_s": plan.duration_s})  # fmt: skip
@@ -141,12 +170,12 @@ class Shown:
                 self.put("prompt", None)
                 self._state("ready", "The operator agreed" if agreed else "The operator did not agree")
             case StepStarted(number, count, step):
-                self.put("step", {**(self.sections["step"] or {}), **_place(number, count, step)})
+                self.put("step", {**(sections["step"] or {}), **_place(number, count, step)})
                 self._state(_kind(step), step.name)
             case StepFinished():
                 self._state("ready", "Between two steps")
             case PhaseRecorded(sensors, _):
-                self._samples(sensors)
+                self.put("sensors", [self._row_of(sensor) for sensor in sensors])
                 self._state("judging", "Recorded; averaging, solving, judging")
             case BoardObserved(sensor, sweep, speed_rad_s, observation):
                 seen = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
@@ -199,26 +228,16 @@ class Shown:
     def _state(self, kind: str, text: str) -> None:
         self.put("state", {"kind": kind, "text": text})
 
-    def _samples(self, sensors: tuple[SensorSamples, ...]) -> None:
-        rows: list[dict[str, Any]] = []
-        values: dict[str, tuple[float, ...]] = {}
-        for sensor in sensors:
-            row: dict[str, Any] = {
-                "name": sensor.sensor,
-                "part": self._parts.get(sensor.sensor, ""),
-                "mode": self._modes.get(sensor.sensor, "raw"),
-                "samples": sensor.samples,
-                "lost": sensor.lost,
-                "temperature_c": next(iter(sensor.latest.get(TEMPERATURE.name, ())), None),
-                "units": {},
-            }
-            for of in (measured()[name] for name in sensor.latest if name != TEMPERATURE.name):
-                line, shown = of.named(of.name), of.bias if isinstance(of, Quantity) else of.reading  # as its bias is
-                values[f"{sensor.sensor}.{line}"] = tuple(each / shown.size for each in sensor.latest[of.name])
-                row["units"][line] = [of.name, shown.name]
-            rows.append(row)
-        self._values = values
-        self.put("sensors", rows)
+    def _row_of(self, sensor: SensorSamples) -> dict[str, Any]:
+        return {
+            "name": sensor.sensor,
+            "part": self._parts.get(sensor.sensor, ""),
+            "mode": self._modes.get(sensor.sensor, "raw"),
+            "samples": sensor.samples,
+            "lost": sensor.lost,
+            "temperature_c": next(iter(sensor.latest.get(TEMPERATURE.name, ())), None),
+            "units": {of.named(of.name): [of.name, shown.name] for of, shown in _quantities(sensor)},
+        }
 
     def _observation(self, row: dict[str, Any]) -> None:
         """The host's own takes the place of what the board said of the same sweep, never the other way."""
@@ -227,6 +246,22 @@ class Shown:
         if before.get("by") != "host" or row["by"] == "host":
             self._seen[key] = {**self._turns.get(row["sweep"], {}), **before, **row}
             self.put("observations", [self._seen[each] for each in sorted(self._seen, key=lambda k: (k[1], k[0]))])
+
+
+def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Unit]]:
+    """What a sensor sends, and the unit it is shown in: that of its bias."""
+    known = measured()
+    for of in (known[name] for name in sensor.latest if name != TEMPERATURE.name):
+        yield of, of.bias if isinstance(of, Quantity) else of.reading
+
+
+def _values(sensors: tuple[SensorSamples, ...]) -> dict[str, tuple[float, ...]]:
+    """The newest readings, by the name of their line."""
+    return {
+        f"{sensor.sensor}.{of.named(of.name)}": tuple(each / shown.size for each in sensor.latest[of.name])
+        for sensor in sensors
+        for of, shown in _quantities(sensor)
+    }
 
 
 def _row(made: ObservationMade | AttitudeRead) -> dict[str, Any]:

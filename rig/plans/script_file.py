@@ -89,7 +89,7 @@ def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = N
             "foreign_script",
             f"no run of yours on this computer was begun with {path} (SHA-256 {kept.sha256[:16]}…), "
             "and a script can do anything that you can",
-            f"Read it; if it is what it should be: --script {shlex.quote(str(path))}",
+            f"Read it; if you trust it: --script {shlex.quote(str(path))}",
         )
     return _executed(path, kept.name, text)
 
@@ -98,7 +98,7 @@ def another_script(what: str) -> Refused:
     """The refusal of a script that a run was not begun with."""
     return Refused(
         "another_script",
-        f"{what} is not the script the run was begun with",
+        f"{what} is not the script with which the run was begun",
         "Undo the change in it, or start a new run with `rig run`",
     )
 

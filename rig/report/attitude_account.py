@@ -30,7 +30,7 @@ def account_document(account: AttitudeAccount) -> dict[str, Any]:
 
 def print_account(console: Console, account: AttitudeAccount) -> None:
     """A line on the attitudes, a table of what is expected of each sensor."""
-    second = f"{account.second.condition:.2f}" if math.isfinite(account.second.condition) else "not told"
+    second = f"{account.second.condition:.2f}" if math.isfinite(account.second.condition) else "not determined"
     console.print(
         f"{account.count} attitudes: rank {account.told.rank} of {account.told.needed}, condition "
         f"{account.first.condition:.2f} (second order {second}), G-efficiency {account.g_efficiency:.3f}",

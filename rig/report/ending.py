@@ -1,6 +1,5 @@
 """What a run amounts to, in few lines: each sensor's values ± U, what failed or nearly did, where the rest is. Pure."""
 
-import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +12,12 @@ from rig.report.kinds.kind import Shown, Three, Without
 from rig.report.kinds.registry import kinds
 from rig.report.mounts import farthest_off
 from rig.report.rounding import in_print, plus_minus
+from rig.station.plain_text import INDENT, wrapped
 
 NEAR = 0.9  # of its limit, from where on a check that passed is named
 MOST_NEAR = 2
-ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six
-INDENT = "  "
-UNBROKEN = "\N{NO-BREAK SPACE}"
+ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six, on
+LEAST_WIDTH = 80  # columns: a narrower screen says the same in more lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +45,35 @@ def ending(
     is said; `everything` is how all the rest is printed.
     """
     items = [*_items(result)]
-    values = [*(_one(items[0], width) if len(items) == 1 else _several(items, width))]
-    unsolved = [line for kind in kinds() for line in kind.unsolved(result)]
+    summary = "; ".join([*_what_the_values_are(items), _passed(result)])
+    needed = [line for kind in kinds() for line in kind.unsolved(result)], [*since]
     in_short = [line for kind in kinds() for found in kind.found(result) for line in kind.in_short(found)]
-    said = [*in_short, *farthest_off(result), *unsolved, *_near(result), *since]
-    summary = _wrapped("; ".join([*_what_the_values_are(items), _passed(result)]), width)
-    below = [*summary, *(line for each in said for line in _wrapped(each, width))]
-    if certificate is not None:
-        below.append(f"certificate: {certificate}")
-    below.append(f"everything: {everything}")
-    room = (ONE_SENSOR if len(items) == 1 else MANY) - len(values) - len(below) - 1
-    yield from values
-    yield from _failed(result, folder, width, room)
-    yield from below
+    files = [] if certificate is None else [f"certificate: {certificate}"]
+    files.append(f"everything: {everything}")
+    broken = _failed(result, folder)
+
+    def lines_of(*texts: str) -> int:
+        return sum(len([*_wrapped(text, max(width, LEAST_WIDTH))]) for text in texts)
+
+    room = (ONE_SENSOR if len(items) == 1 else MANY) - len([*_values(items, max(width, LEAST_WIDTH))])
+    room -= lines_of(*_first(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
+    spare = []
+    for text in (*in_short, *farthest_off(result), *_near(result)):
+        if lines_of(text) <= room:
+            spare.append(text)
+            room -= lines_of(text)
+    room += lines_of(*_first(broken, 1))
+    count = next((n for n in range(len(broken), 1, -1) if lines_of(*_first(broken, n)) <= room), 1)
+    brief = [text for text in in_short if text in spare]
+    yield from _values(items, width)
+    for text in (*_first(broken, count), summary, *brief, *needed[0], *spare[len(brief) :], *needed[1]):
+        yield from _wrapped(text, width)
+    yield from files
     yield f"verdict: {result.verdict.upper()}"
+
+
+def _values(items: Sequence[_Item], width: int) -> Iterator[str]:
+    return _one(items[0], width) if len(items) == 1 else _several(items, width)
 
 
 def _items(result: ResultDocument) -> Iterator[_Item]:
@@ -139,7 +153,7 @@ def _what_the_values_are(items: Sequence[_Item]) -> Iterator[str]:
     if not items:
         return
     combined = all(item.shown.combined for item in items)
-    yield "± U, about 95 %" if combined else "± two standard deviations of the noise alone"
+    yield "± U, about 95 %" if combined else "± 2 standard deviations of the noise"
     held = {(item.kind, item.shown.held_at) for item in items if item.shown.held_at}
     if len(held) == 1:
         (kind, held_at) = held.pop()
@@ -153,22 +167,25 @@ def _passed(result: ResultDocument) -> str:
     return f"{passed} of {len(result.checks)} checks passed"
 
 
-def _failed(result: ResultDocument, folder: Path | None, width: int, room: int) -> Iterator[str]:
-    """What failed, farthest beyond its limit first, with what to do: one in any case, more while there is room.
+def _failed(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
+    """What failed and was measured, farthest beyond its limit first, and what that means with what to do.
 
     What was not measured comes last: mostly because something else had failed before.
     """
     failed = sorted((each for each in result.checks if not each.passed), key=_over, reverse=True)
     failed.sort(key=lambda each: each.value is None)
-    for number, check in enumerate(failed):
-        words = what_failed(check, folder)
-        lines = [*_wrapped(f"FAILED {_measured(check)}" + ("" if words is None else f": {words}"), width)]
-        more = number < len(failed) - 1
-        if number > 0 and len(lines) + more > room:
-            yield f"and {len(failed) - number} more checks failed"
-            return
-        yield from lines
-        room -= len(lines)
+    words = [what_failed(check, folder) for check in failed]
+    return [
+        (f"FAILED {_measured(check)}", "" if said is None else f": {said}")
+        for check, said in zip(failed, words, strict=True)
+    ]
+
+
+def _first(broken: Sequence[tuple[str, str]], count: int) -> Iterator[str]:
+    """So many of what failed; the last one says how many more there are."""
+    more = len(broken[count:])
+    for number, (measured, words) in enumerate(broken[:count], 1):
+        yield measured + (f" ({more} more failed)" if more and number == count else "") + words
 
 
 def _near(result: ResultDocument) -> Iterator[str]:
@@ -198,6 +215,5 @@ def _over(check: CheckEntry) -> float:
 
 def _wrapped(text: str, width: int) -> Iterator[str]:
     """The text in lines; a command, which stands between backticks, is not broken."""
-    whole = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(text.split("`")))
-    for line in textwrap.wrap(whole, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False):
-        yield line.replace(UNBROKEN, " ")
+    for line in wrapped(text, width):
+        yield line.replace("`", "")

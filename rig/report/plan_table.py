@@ -128,7 +128,7 @@ def _print_steps(planned: Planned, console: Console) -> None:
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
     console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
     if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:
-        console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, as far as the encoders tell that")
+        console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, as far as the encoders show this angle")
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(
@@ -149,7 +149,7 @@ def _print_told(planned: Planned, console: Console) -> None:
         print_account(console, account)
     if told.rates or told.accelerations:
         console.print(
-            "What happens meanwhile is told in 95 of 100 runs from these sizes on, of parts as data sheets have them:"
+            "The smallest disturbance that the checks notice in 95 of 100 runs, for parts as in their data sheets:"
         )
     for what, by_sensor in (("to gyroscopes", told.rates), ("to accelerometers", told.accelerations)):
         if by_sensor:

@@ -43,7 +43,7 @@ def _lines(reversal: ReversalEntry) -> Iterator[str]:
     if mixed:
         yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
     else:
-        yield "the sensor's own on all axes: the arm's field is told apart"
+        yield "the sensor's own on all axes: it is separated from the arm's field"
     felt = triple(np.divide(reversal.arm_field_t, FIELD.bias.size), "+.3f")
     field = max(expanded(reversal.arm_field_std_t, reversal.arm_field_freedom).widths) / FIELD.bias.size
     yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"

@@ -23,7 +23,7 @@ def told_from_entries(damages: Sequence[ToldFrom]) -> tuple[ToldFromEntry, ...]:
 def told_lines(damages: Sequence[ToldFromEntry]) -> Iterator[str]:
     """A line at the terminal, where anything is known of it."""
     if damages:
-        yield f"in this run it would be told from: {told_words(damages)}"
+        yield f"smallest disturbance that the checks of this run notice: {told_words(damages)}"
 
 
 def told_words(damages: Sequence[ToldFromEntry]) -> str:

@@ -129,7 +129,7 @@ class Connector:
         if name not in self.found:
             raise Refused(
                 "nothing_to_correct_by",
-                f"sensors.{name}: there is no board that keeps its calibration, and this run has found none",
+                f"sensors.{name}: no board stores its calibration, and this run has found none",
                 "Verify it in the run that calibrates it: procedure.name six_observation with verify: true",
             )
         return calibration_of(self.found[name])

@@ -109,8 +109,8 @@ class Run:
             if path not in files:
                 raise Fault(
                     "run_folder_removed",
-                    f"{path} is not there any more",
-                    "Start a new run, and leave its folder in its place until it has ended",
+                    f"{path} does not exist any more",
+                    "Start a new run, and leave its folder in its place until the run has ended",
                 )
             if phase.procedure.reads_corrected:
                 files = files[-1:]  # one whole movement; what was interrupted before it does not count
@@ -145,8 +145,9 @@ class Run:
         if not self.station.ask(mounting(plan, number, kind_of(self.loaded.config.turner).words)):
             raise Refused(
                 "not_mounted",
-                f"nobody has said that the item is mounted for stage {number + 1}",
-                "Go on when somebody stands there to mount it; --yes cannot say so, for hands are at the item then",
+                f"nobody has confirmed that the item is mounted for stage {number + 1}",
+                "Go on when somebody stands there to mount it; --yes cannot confirm it, because somebody's "
+                "hands are at the item then",
             )
 
     def _settings(self, phase: Phase) -> RunSettings:

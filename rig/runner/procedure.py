@@ -108,7 +108,7 @@ class Recording:
             raise Fault(
                 "run_folder_removed",
                 f"{self.recorder.path} was removed or moved away while it was recorded",
-                "Start a new run, and leave its folder in its place until it has ended",
+                "Start a new run, and leave its folder in its place until the run has ended",
             )
 
 
@@ -166,9 +166,9 @@ class Rig:
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
                 "arm_moved",
-                f"the arm at {self.devices.report.host} has moved by {degrees(moved_rad):.1f}° since its way was "
-                "announced",
-                "Keep others off the arm and run again",
+                f"the arm at {self.devices.report.host} has moved by {degrees(moved_rad):.1f}° since the program "
+                "announced its way",
+                "Make sure that nobody else moves the arm, then run again",
             )
 
     def start_sampling(self) -> None:
@@ -216,7 +216,7 @@ class Rig:
 
         if not self._wait(long_enough, lasting_s + AT_REST_TIMEOUT_S, watch):
             raise Fault(
-                "no_samples", f"in {lasting_s:g} s too few samples came", "Check the cables, then run `rig check`"
+                "no_samples", f"in {lasting_s:g} s too few samples arrived", "Check the cables, then run `rig check`"
             )
         return [Felt(name, sensor, acquisition.newest(name)) for name, sensor in sensors.items()]
 
@@ -368,5 +368,6 @@ def _not_settled(dwell: Dwell, unsettled: Mapping[str, float | None]) -> Fault:
     return Fault(
         "not_settled",
         f"{dwell.settle_s:g} s after the arm came to {dwell.name} the sensors have not settled: {scatter}",
-        "Fix board and fixture more stiffly, keep the cable from swinging and the table from shaking, then resume",
+        "Fix board and holder more stiffly, fasten the cable so that it does not swing, keep the table "
+        "still, then resume",
     )

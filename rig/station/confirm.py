@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from rig.errors import Refused
 from rig.errors.quoting import printable_lines
+from rig.station.plain_text import for_file
 
 NOT_AGREED = "Run again and agree, or agree before: --yes, in Python yes=True"
 
@@ -12,7 +13,7 @@ NOT_AGREED = "Run again and agree, or agree before: --yes, in Python yes=True"
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     """Show what will be done and wait for yes or y; where there is no terminal, there is nobody to say it."""
     for line in announcement:
-        print(printable_lines(line), file=sys.stderr)
+        print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
     if not sys.stdin.isatty():
         return False
     print(f"Type yes to {to_do}: ", end="", file=sys.stderr, flush=True)

@@ -15,7 +15,7 @@ from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE
 from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
-from rig.station.plain_text import plain
+from rig.station.plain_text import for_file, plain
 from rig.station.station import Listener
 from rig.station.words import line
 
@@ -51,7 +51,7 @@ class LiveView:
                 text = line(event)
                 if text is not None:
                     # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
-                    shown = printable_lines(text)
+                    shown = for_file(printable_lines(text), sys.stderr)
                     self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
     def _show(self, progress: Progress) -> None:

@@ -43,7 +43,7 @@ def kind_of(section: TurnerSection) -> AnyTurner:
             return kind
     raise Refused(
         "turner_not_installed",
-        f"no turner is installed here that is configured by {type(section).__name__}",
+        f"no installed turner has the section {type(section).__name__}",
         "Install the package that brings it; after an update of the rig, install the rig again",
     )
 

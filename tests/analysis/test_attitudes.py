@@ -140,7 +140,7 @@ def test_a_file_of_stops_alone_tells_no_clock(capsys: pytest.CaptureFixture[str]
     assert main(solve([EXAMPLES / SWINGING[0], EXAMPLES / STILL[1]], "--find-clock")) == 2
     assert "time_base_not_found: of 16 rows 0 follow another" in capsys.readouterr().err
     assert main(solve(example(STILL), "--find-clock")) == 2
-    assert "wrong_columns: the samples hold no turn rate" in capsys.readouterr().err
+    assert "wrong_columns: the samples contain no turn rate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("estimator", ["as_published", "maximum_likelihood", "attitude_weighted"])

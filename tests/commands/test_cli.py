@@ -92,7 +92,7 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
 def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
     imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
     done = shell(f"{imu} --set 'procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]'")
-    assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes tell 9 of the 14" in done.stderr, done
+    assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes determine 9 of the 14" in done.stderr, done
 
 
 @pytest.mark.parametrize("procedure", ["six_observation", "verify", "static_attitudes", "imu"])
@@ -157,7 +157,7 @@ def test_a_plan_says_what_its_checks_will_tell() -> None:
     told = {each["what"]: each for each in document["told_from"]["gyro"]}
     assert told["all scale factors change half-way"]["check"] == "scale_changed"
     said = " ".join(shell(PLAN).stdout.split())
-    assert "told in 95 of 100 runs" in said and "another reading in one sweep" in said
+    assert "notice in 95 of 100 runs" in said and "another reading in one sweep" in said
     twice = json.loads(shell(f"{PLAN} --json --set procedure.repeats=2").stdout)["told_from"]["gyro"]
     assert all(each["size"] < told[each["what"]]["size"] for each in twice if "half-way" in each["what"])
 

@@ -121,8 +121,8 @@ NINE = [f"axis {number}" for number in range(9)]
         (field("current_a", "O"), r"turner\.fields"),
         (field("current_a", "S1000000000"), r"turner\.fields"),
         (field("q_rad", "f8"), "one name"),
-        (field("a b", "f8"), "a name that is none"),
-        (field("a" * 1000, "f8"), "a name that is none"),
+        (field("a b", "f8"), "a name that is not allowed"),
+        (field("a" * 1000, "f8"), "a name that is not allowed"),
         (field("current_a", "f8"), "states holds"),
         (described(joints=["a"], geometry=geometry(1)), "states holds"),
         (states_of("f8", (2, 3)), "states holds float64 in 2 dimensions"),
@@ -142,7 +142,7 @@ def test_poses_have_the_joints_of_the_turner(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         settings = json.loads(file.attrs["settings"])
         file.attrs["settings"] = json.dumps({**settings, "home_q_rad": [0.0] * 3})
-    with pytest.raises(Refused, match="2 joints, and a pose of it has others"):
+    with pytest.raises(Refused, match="2 joints, and one of its poses has another number"):
         read_run(path)
 
 

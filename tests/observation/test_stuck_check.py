@@ -52,7 +52,7 @@ def test_one_that_sticks_at_rest_is_told_from_a_wrong_unit_by_the_turn_the_other
     samples, late = USUAL.samples["gyro"].copy(), readings_of(Setup()).between(window.start_s - 0.5, 1e9)
     noise = np.random.default_rng(5).normal(scale=20, size=(int(late.sum()), 3))
     samples["counts"][late] = np.round(noise + np.array([20, 150, 10]))
-    with pytest.raises(Fault, match=r"stuck_sensor: in sweep 5 .*; the other way it read as it should"):
+    with pytest.raises(Fault, match=r"stuck_sensor: in sweep 5 .*; in the other direction it read correctly"):
         observe_run(replace(USUAL, samples={"gyro": samples}), SETTINGS)
 
 

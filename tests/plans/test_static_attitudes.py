@@ -181,14 +181,17 @@ def test_what_are_no_attitudes_is_refused(attitudes: object, said: str) -> None:
     [
         (
             ["procedure.attitudes=[[0,-90,0],[90,-90,0],[180,-90,0],[-90,-90,0],[45,-90,0]]"],
-            "5 attitudes tell 9 of the 14",
+            "5 attitudes determine 9 of the 14",
         ),
-        (["procedure.attitudes=[[0,-90,0],[90,-90,90],[-90,-90,45],[45,-90,20]]"], "4 attitudes tell 12 of the 14"),
+        (
+            ["procedure.attitudes=[[0,-90,0],[90,-90,90],[-90,-90,45],[45,-90,20]]"],
+            "4 attitudes determine 12 of the 14",
+        ),
         (
             ["procedure.attitudes=[[0,-90,0],[90,-90,90],[-90,-90,45],[45,-90,20]]", "procedure.name=imu"],
             "12 of the 14",
         ),
-        (["site.base_up=[0,1,0]"], "18 attitudes tell 11 of the 14"),  # wrist 1 turns about the vertical there
+        (["site.base_up=[0,1,0]"], "18 attitudes determine 11 of the 14"),  # wrist 1 turns about the vertical there
     ],
 )
 def test_attitudes_that_do_not_tell_enough_are_refused_before_anything_moves(overrides: list[str], said: str) -> None:
@@ -201,7 +204,7 @@ def test_attitudes_that_do_not_tell_enough_are_refused_before_anything_moves(ove
 def test_attitudes_that_hardly_differ_about_one_wrist_are_refused() -> None:
     attitudes = [[wrist_1, -90, 0.1 * turn] for turn, wrist_1 in enumerate(range(-180, 180, 45))]
     config = load(CONFIGS / "attitudes.yaml", [f"procedure.attitudes={attitudes}"]).config
-    with pytest.raises(Refused, match="ill_conditioned: 8 attitudes hardly tell"):
+    with pytest.raises(Refused, match="ill_conditioned: 8 attitudes hardly determine"):
         first_phase(installed()["static_attitudes"], config, installed()).plan()
 
 

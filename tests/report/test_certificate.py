@@ -223,7 +223,7 @@ def test_what_a_gyroscopes_recording_would_have_told_stands_there() -> None:
     told = ToldFromEntry(what="gain half-way", check="scale_changed", size=6e-4, unit="1", off_by_expanded=1.2)
     sensors = {name: each.model_copy(update={"told_from": (told,)}) for name, each in document.sensors.items()}
     text = read(certificate(document.model_copy(update={"sensors": sensors}))).text
-    assert "What would have contradicted itself" in text and "gain half-way" in text
+    assert "this measurement would have noticed" in text and "gain half-way" in text
 
 
 def test_a_measurement_that_contradicts_itself_is_not_valid() -> None:

@@ -262,7 +262,7 @@ def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid()
 @pytest.mark.parametrize(
     ("refused", "why"),
     [
-        (lambda: certificate(read_result(FIXTURES / "calibration")), "only noise is known"),
+        (lambda: certificate(read_result(FIXTURES / "calibration")), "only the noise part of the uncertainty"),
         (lambda: certificate(result().model_copy(update={"sensors": {}})), "calibrated nothing"),
         (lambda: certificate(stated=Stated()), "country is not stated"),
     ],

@@ -14,7 +14,7 @@ from rig.cli import main
 from rig.errors.quoting import printable, printable_lines
 from rig.station.events import RunFolderWritten
 from rig.station.log import log
-from rig.station.plain_text import duration_words, plain, say
+from rig.station.plain_text import duration_words, plain, say, wrapped
 from rig.station.view import LiveView, PlainView
 from support.paths import ROOT
 
@@ -47,6 +47,30 @@ def test_a_line_for_a_pipe_shows_it_as_it_is(capsys: pytest.CaptureFixture[str])
     say(f"{HOSTILE}\nready")
     say(HOSTILE, sys.stderr)
     assert capsys.readouterr() == (SHOWN + "\\nready\n", SHOWN + "\n")
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_a_terminal_gets_its_lines_broken_between_words_and_commands_whole(width: int) -> None:
+    said = "rig: foreign_folder: it would connect to 192.0.2.5. Read it, then `rig check CONFIG --json`. "
+    command = "rig resume runs/2026-11-25T10-00-00Z-imu --connect 192.0.2.5"
+    lines = wrapped(f"{said}If all of this is yours, state it: {command}", width)
+    assert " ".join(" ".join(lines).split()) == f"{said}If all of this is yours, state it: {command}"
+    assert any("`rig check CONFIG --json`" in line for line in lines) and lines[-1].endswith(command)
+    assert all(len(line) <= width for line in lines if command not in line)
+
+
+def test_an_error_is_broken_for_a_terminal_and_one_line_for_a_pipe(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = ["solve", "/nowhere/at-all/run.h5"]
+    assert main(wrong) == 2
+    piped = capsys.readouterr().err
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert main(wrong) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if not line.endswith("…")]
+    assert piped.count("\n") == 1 and len(lines) > 1 and max(map(len, lines)) <= 40
+    assert " ".join(" ".join(lines).split()) == piped.rstrip("\n")
 
 
 def test_the_log_shows_it_as_it_is(tmp_path: Path) -> None:

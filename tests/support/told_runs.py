@@ -35,7 +35,7 @@ from support.paths import DEMO
 
 STEP_S = 0.1
 SATURATED = (
-    "saturation: in sweep 3 (wrist_1 ccw) 12 samples stand at the end of the sensor's range. "
+    "saturation: in sweep 3 (wrist_1 ccw) 12 samples are at the end of the sensor's range. "
     "Choose a wider range or a slower sweep."
 )
 SHAKEN = "arm_moved_in_dwell: in dwell 7 (dwell at 0 -90 0) a joint moved by 0.31°. Let nothing move the arm."

@@ -103,7 +103,7 @@ enum solution_status {
 };
 
 /* hello, from the host: who is there? answered by identity */
-/* identity, from the board: answers hello; also sent twice a second while idle, so that a wrong baud rate can be told from silence */
+/* identity, from the board: answers hello; also sent twice a second while idle, so that a wrong baud rate can be distinguished from silence */
 struct identity_payload {
     uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
     uint8_t protocol; /* PROTOCOL_VERSION of the image */
@@ -228,7 +228,7 @@ struct rates_item {
 } __attribute__((packed));
 _Static_assert(sizeof(struct rates_item) == 18, "rates_item");
 
-/* keep, from the host: keep the readings from now on, so that observe finds them; what was kept before goes; answered by ack */
+/* keep, from the host: keep the readings from now on, so that observe finds them; readings kept before are discarded; answered by ack */
 struct keep_payload {
     uint8_t sensors; /* which sensors: bit i is the sensor of index i in the identity's list */
     float duration_s; /* for how long, at least */

@@ -39,14 +39,14 @@ def digital_certificate(certificate: Certificate) -> bytes:
     if unknown:
         raise Refused(
             "no_digital_certificate",
-            f"of the uncertainty of {unknown} only noise is known",
-            "Calibrate with the vector model, `rig run` does, in a configuration of this version",
+            f"only the noise part of the uncertainty of {unknown} is known",
+            "Calibrate with the vector model, as `rig run` does, and a configuration of this version",
         )
     if certificate.stated.where.country is None:
         raise Refused(
             "no_digital_certificate",
             "the laboratory's country is not stated",
-            "State site.country, by --set site.country=DE if need be",
+            "State site.country, for example with --set site.country=DE",
         )
     measured = list(_measured(certificate))
     root = dcc(

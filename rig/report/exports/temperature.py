@@ -50,7 +50,7 @@ def _change(
         why = "it did not watch that bias" if slope is None else slope.error
         raise Refused(
             "temperature_slope_unknown",
-            f"the run of bias_drift tells no slope of {name}'s {quantity} over temperature: {why}",
+            f"the run of bias_drift did not find how {name}'s {quantity} changes with temperature: {why}",
             "Give a run of bias_drift in which the sensor warmed and cooled, or export without --at-temperature",
         )
     low, high = slope.range_c
@@ -58,9 +58,10 @@ def _change(
         if not low <= temperature_c <= high:
             raise Refused(
                 "temperature_outside",
-                f"{what} {temperature_c:.1f} °C, and the slope of {name}'s {quantity} was seen "
+                f"{what} {temperature_c:.1f} °C, and the slope of {name}'s {quantity} was measured "
                 f"from {low:.1f} to {high:.1f} °C only",
-                "Calibrate at the temperature at which it is used, or watch the bias over a wider range",
+                "Calibrate at the temperature at which it is used, or measure the bias over a wider range of "
+                "temperature",
             )
     return np.array(slope.slope) * (to_c - from_c)
 
@@ -72,7 +73,7 @@ def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
         if name in watched and watched[name] != serial_number:
             raise Refused(
                 "another_sensor",
-                f"{name} is {serial_number}, and the run of bias_drift watched {watched[name]}",
+                f"{name} is {serial_number}, and the run of bias_drift is of {watched[name]}",
                 "Give a run of bias_drift of the same sensor",
             )
 

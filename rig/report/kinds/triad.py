@@ -93,10 +93,10 @@ def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
         return
     if laid.placement_std is not None:
         told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
-        beside = f", {laid.rests_elsewhere} rests beside the rows have told of it" if laid.rests_elsewhere else ""
+        beside = f", {laid.rests_elsewhere} more rests have helped to find it" if laid.rests_elsewhere else ""
         yield f"a placement found to change each reading by {told} beside its attitude{beside}"
         if laid.placement_uncertainty > laid.placement_std / 2:
-            yield "which is hardly told: lay it down in the same attitudes again, and the uncertainty becomes smaller"
+            yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
     if laid.rows_left_out:
         yield f"left out: not_at_rest: {laid.rows_left_out} rows in which the body moves"
 

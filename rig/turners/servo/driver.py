@@ -176,7 +176,7 @@ class Servo:
                     self._fail(
                         Problem(
                             "servo_slower_than_planned",
-                            f"{motion.name} did not end within {takes_s:.1f} s, planned were {motion.duration_s:.1f} s",
+                            f"{motion.name} did not end within {takes_s:.1f} s; planned were {motion.duration_s:.1f} s",
                             "Look for what holds the shaft, and whether the servo's supply is strong enough",
                         )
                     )
@@ -296,7 +296,7 @@ class Servo:
             return None
         return Problem(
             "servo_driver_hung",
-            f"the thread that has the servo's line has not come round for {silent_s:.1f} s",
+            f"the thread that uses the servo's line has not answered for {silent_s:.1f} s",
             "Look at the adapter and its cable, then start again",
         )
 
@@ -315,8 +315,8 @@ class Servo:
             self._fail(
                 Problem(
                     "servo_unwatched",
-                    f"nobody has looked at the servo for {UNWATCHED_S:.0f} s during {self._doing}",
-                    "See the log for what held the program up, then start again",
+                    f"the program has not looked at the servo for {UNWATCHED_S:.0f} s during {self._doing}",
+                    "See the log for what delayed the program, then start again",
                 )
             )
         with self._changed:

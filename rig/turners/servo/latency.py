@@ -29,7 +29,7 @@ def lower_latency(port: serial.Serial, path: str, devices: Path = DEVICES) -> No
     if found_ms is not None and found_ms > BEARABLE_MS:
         raise Refused(
             "servo_adapter_slow",
-            f"the adapter at {path} hands on what the servo says only every {found_ms} ms, and that cannot be changed",
+            f"the adapter at {path} passes data on only every {found_ms} ms, and that cannot be changed",
             f"Write 1 into {timer} as root, or add a udev rule: "
             'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"',
         )

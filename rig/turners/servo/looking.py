@@ -61,7 +61,7 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
     if odd > 1:
         raise Refused(
             "servo_not_alone",
-            f"to a ping of ID {servo_id} at {port} more comes than one answer",
+            f"a ping of ID {servo_id} at {port} has more than one answer",
             "Give every servo on the line an ID of its own, or unplug the others",
         )
     if found == 0:

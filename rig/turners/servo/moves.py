@@ -51,7 +51,7 @@ def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> lis
         elif move.total_ms > LONGEST_MS:
             problem = Problem(
                 "servo_move_too_long",
-                f"{motion.name} takes {motion.duration_s:.1f} s, and the servo knows none longer than "
+                f"{motion.name} takes {motion.duration_s:.1f} s, and the longest that the servo can do is "
                 f"{1e-3 * LONGEST_MS:.1f} s",
                 "Turn faster, or fewer turns at a time",
             )

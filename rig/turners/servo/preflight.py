@@ -33,10 +33,10 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, per
         problems.append(
             Problem(
                 "servo_line_slow",
-                f"a state of the servo takes {1e3 * report.round_trip_s:.1f} ms, and one is wanted "
-                f"each {1e3 * period_s:.1f} ms",
+                f"a state of the servo takes {1e3 * report.round_trip_s:.1f} ms, and one is needed "
+                f"every {1e3 * period_s:.1f} ms",
                 "Set Baud Rate (8) to 3, which is 1 Mbit/s, and Return Delay Time (9) to 0, and servo.baud to match; "
-                "an FTDI adapter wants a latency timer of 1 ms",
+                "an FTDI adapter needs a latency timer of 1 ms",
             )
         )
     return problems
@@ -95,7 +95,7 @@ def _settings(report: ServoReport) -> list[Problem]:
         problems.append(
             Problem(
                 "servo_unprotected",
-                f"the servo's Shutdown is 0x{report.shutdown:02x}: it does not switch off by overload and overheating",
+                f"the servo's Shutdown is 0x{report.shutdown:02x}: it does not switch off on overload and overheating",
                 "Set Shutdown (63) to 52 (0x34)",
             )
         )
@@ -104,7 +104,7 @@ def _settings(report: ServoReport) -> list[Problem]:
             Problem(
                 "servo_torque_on",
                 f"the servo holds its shaft in operating mode {report.operating_mode}, drive mode {report.drive_mode}; "
-                "they can only be changed with torque off, and then what it holds may fall",
+                "they can only be changed with the torque off, and then the load may fall",
                 "Hold the board, and switch the servo off and on",
             )
         )
@@ -146,7 +146,7 @@ def _load(report: ServoReport, carried: Carried) -> list[Problem]:
     return [
         Problem(
             "servo_load",
-            f"what the servo carries pulls with {torque_nm:.2f} N·m, and an {report.model.name} turns smoothly with "
+            f"the load of the servo pulls with {torque_nm:.2f} N·m, and an {report.model.name} turns smoothly with "
             f"{most_nm:.2f} N·m at most",
             "Balance the board about the shaft, or take a stronger servo",
         )

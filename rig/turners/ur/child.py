@@ -256,7 +256,7 @@ def _move_failure(what: str) -> Problem:
 def _payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
     return Problem(
         "payload_not_set",
-        f"the controller reckons with a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
+        f"the controller uses a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
         "Read the pendant's log, and correct the payload in the arm's installation",
     )
 
@@ -266,7 +266,7 @@ def _connection_failure(host: str, error: OSError) -> Problem:
         return series_problem(host, error.version) or Problem(
             "controller_too_old",
             f"the controller at {host} does not know {error.what}; its software is {version_text(error.version)}",
-            "Update it: the rig is tried with PolyScope 5.14",
+            "Update it: the rig was tested with PolyScope 5.14",
         )
     return no_states(host, error)
 

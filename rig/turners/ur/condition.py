@@ -42,7 +42,7 @@ _SAFETY_PROBLEMS: dict[int, Problem] = {
     SafetyMode.ROBOT_EMERGENCY_STOP: Problem("emergency_stop", "the arm's emergency stop is pressed", _RELEASE),
     SafetyMode.VIOLATION: Problem("safety_violation", "the safety system reports a violation", _UNLOCK),
     SafetyMode.FAULT: Problem(
-        "safety_fault", "the safety system reports a fault", "Read the pendant's log, restart the arm"
+        "safety_fault", "the safety system reports a fault", "Read the pendant's log, then restart the arm"
     ),
 }
 
@@ -60,7 +60,7 @@ def readiness(state: ArmState) -> Problem | None:
     if state.target_speed_fraction < FULL_SPEED_FRACTION:
         return Problem(
             "speed_slider",
-            f"the speed slider stands at {100 * state.target_speed_fraction:.0f} %, so sweeps run slower than planned",
+            f"the speed slider is at {100 * state.target_speed_fraction:.0f} %, so sweeps run slower than planned",
             "Set the speed slider on the pendant to 100 %",
         )
     return None

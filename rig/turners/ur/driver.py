@@ -170,7 +170,7 @@ class Arm:
                 self._fail(
                     Problem(
                         "arm_slower_than_planned",
-                        f"{motion.name} did not end within {takes_s:.1f} s, planned were {motion.duration_s:.1f} s",
+                        f"{motion.name} did not end within {takes_s:.1f} s; planned were {motion.duration_s:.1f} s",
                         "Look for a speed limit in the safety settings or a program that slows the arm down",
                     )
                 )

@@ -63,8 +63,8 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
         since = ".".join(map(str, POLYSCOPE_X_SINCE))
         return Problem(
             "polyscope_x",
-            f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig knows how to stop an arm "
-            f"there from {since} on",
+            f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig can stop an arm "
+            f"there only from {since} on",
             f"Update it to {since} or newer, or turn the sensors by other means: docs/how-to/other-hardware.md",
         )
     if version[0] < E_SERIES:

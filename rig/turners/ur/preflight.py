@@ -74,7 +74,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
         problems.append(
             Problem(
                 "far_from_home",
-                f"the way home is too long to take unseen ({', '.join(too_far)})",
+                f"the way to the home pose is too long to drive without a look ({', '.join(too_far)})",
                 "Bring the arm near its home pose from the pendant, or correct arm.home_deg",
             )
         )
@@ -91,8 +91,8 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     return [
         Problem(
             "tcp_rotated",
-            f"the tool's frame on the pendant is turned by {math.degrees(turn_rad):.2g}° against the flange's, "
-            "in which the rig measures: somebody's tool or mounting is meant",
+            f"the tool's frame on the pendant is turned by {math.degrees(turn_rad):.2g}° relative to the "
+            "flange's frame, in which the rig measures: it seems to describe a tool or a mounting",
             "Set the rotation of the TCP to zero on the pendant for this run",
         )
     ]
@@ -110,7 +110,8 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
         return [
             Problem(
                 "no_kinematics",
-                f"the controller at {report.host} does not say how its arm is made (primary interface, port 30001)",
+                f"the controller at {report.host} does not state the geometry of its arm (primary interface, "
+                "port 30001)",
                 "Enable the primary interface in the arm's security settings, or set arm.kinematics: nominal",
             )
         ]
@@ -120,8 +121,8 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     return [
         Problem(
             "kinematics_disagree",
-            f"by what the controller says the axis of {JOINT_NAMES[joint]} lies {math.degrees(angle):.1f}° from a "
-            f"{model.name}'s, {math.degrees(MAX_DISAGREEMENT_RAD):g}° is allowed",
+            f"according to the controller the axis of {JOINT_NAMES[joint]} lies {math.degrees(angle):.1f}° from that "
+            f"of a {model.name}; {math.degrees(MAX_DISAGREEMENT_RAD):g}° is allowed",
             "Check that the controller is set up for this arm, or set arm.kinematics: nominal",
         )
         for joint, angle in zip(WRISTS, angles, strict=True)
