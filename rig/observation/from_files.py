@@ -92,7 +92,7 @@ def _motion(files: Files) -> Columns:
 
 
 def _mapped(columns: Mapping[str, ColumnSection], skip_lines: int) -> Mapped | None:
-    """None where nothing is said: then a column that nobody knows is a mistake."""
+    """What is said of a file's columns; None where nothing is: then a column that nobody knows is a mistake."""
     if not columns and not skip_lines:
         return None
     return Mapped({name: (each.column, each.factor) for name, each in columns.items()}, skip_lines)
