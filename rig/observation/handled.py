@@ -1,0 +1,106 @@
+"""A recording by hand, cut into rests and moves, as its readings alone tell.
+
+Rests are those of `rig.observation.rests`; a move is all that is between two of them, and a little of either: what
+still rocks or already moves belongs to it.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session import Handled, Move, Rest
+from rig.observation.rests import find_rests
+from rig.observation.windows import Window
+
+MARGIN_S = 0.1  # of a rest at either end that belongs to the moves beside it
+GAP = 2.5  # intervals
+AT_THE_TOP = 3  # readings in a row that are the same, and the largest
+NEAR_RANGE = 0.995
+HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # so long in one place, if it turns no faster; blocks
+
+
+def handled(
+    time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
+) -> Handled:
+    """The session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` where it is known."""
+    windows = find_rests(time_s, {RATE: rates}) if len(time_s) > 1 else ()
+    rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
+    top = _at_the_top(rates, range_rad_s)
+    steps_s = np.diff(time_s)
+    gaps = np.append(steps_s > GAP * np.median(steps_s), False) if len(steps_s) else np.zeros(len(time_s), np.bool_)
+    moves = []
+    for first, second in zip(windows[:-1], windows[1:], strict=True):
+        start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
+        inside = (time_s >= start_s) & (time_s <= end_s)
+        peak = float(np.abs(rates[inside]).max())
+        moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
+    return Handled(time_s, rates, acceleration, rests, tuple(moves), _held(time_s, rates, rests))
+
+
+def _margin(window: Window) -> float:
+    return min(MARGIN_S, (window.end_s - window.start_s) / 4)
+
+
+def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> Rest:
+    start_s, end_s = window.start_s + _margin(window), window.end_s - _margin(window)
+    inside = (time_s >= start_s) & (time_s <= end_s)
+    felt = None if acceleration is None else acceleration[inside]
+    return Rest(
+        start_s,
+        end_s,
+        int(inside.sum()),
+        rates[inside].mean(axis=0),
+        rates[inside].std(axis=0, ddof=1),
+        None if felt is None else felt.mean(axis=0),
+        None if felt is None else felt.std(axis=0, ddof=1),
+    )
+
+
+def _at_the_top(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
+    """(n,) readings at the end of the range: where that is not known, as many in a row as noise never makes alike."""
+    if range_rad_s is not None:
+        return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
+    size = np.abs(rates)
+    same = (size >= size.max(axis=0, initial=0.0) * (1 - 1e-9)) & (size > 0)
+    run = same.copy()
+    for _ in range(AT_THE_TOP - 1):
+        run[1:] = run[1:] & run[:-1]
+        run[1:] &= same[1:]
+        run[0] = False
+    return np.asarray(run.any(axis=1))
+
+
+def _held(time_s: Array, rates: Array, rests: tuple[Rest, ...]) -> tuple[tuple[float, float], ...]:
+    """When the body was in one place and did not lie: it turned too little for a move, and too much for a rest."""
+    if not rests:
+        return ()
+    width = max(2, int(np.ceil(PAUSE_S / np.median(np.diff(time_s)))))
+    count = len(time_s) // width
+    bias = np.median([rest.mean_rad_s for rest in rests], axis=0)
+    blocks = (rates[: count * width] - bias).reshape(count, width, 3)
+    times = time_s[: count * width].reshape(count, width)
+    slow = np.linalg.norm(blocks.mean(axis=1), axis=1) < HELD_RAD_S
+    slow &= np.abs(blocks).max(axis=(1, 2)) < 4 * HELD_RAD_S
+    for rest in rests:
+        slow &= (times[:, -1] < rest.start_s - PAUSE_S) | (times[:, 0] > rest.end_s + PAUSE_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8))).reshape(-1, 2)
+    found = ((float(times[first, 0]), float(times[last - 1, -1])) for first, last in edges.tolist())
+    return tuple((start_s, end_s) for start_s, end_s in found if end_s - start_s >= HELD_S)
+
+
+State = Literal["starting", "resting", "moving", "held"]
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """What the body does at `time_s`, and since when; how far the move so far has turned it (3,) and its peak rate."""
+
+    time_s: float
+    state: State
+    since_s: float
+    turned_rad: Array
+    peak_rad_s: float
