@@ -18,8 +18,8 @@ from rig.estimation.by_hand.session import STATED, Faced, Handled, Sizes, Told
 
 PASSES, SIZED = 10, 4  # of the fit; in each but the first, how often the sizes are found anew
 SETTLED = 1e-2  # of the standard uncertainty
-SEEN = 8.0  # degrees of freedom that what is stated of hands counts
-LEAST = 0.5  # of what is stated: so good is no hand
+SEEN = 5.0  # degrees of freedom that what is stated of hands counts
+LEAST = 0.4  # of what is stated: so good is no hand
 OF_KIND = {
     "repeat_rad": (FLAT, "repeat"),
     "closure_rad": (CLOSURE, "closure"),

@@ -109,7 +109,7 @@ def _shaken(
 ) -> Array:
     """(n, ways) rates of an angle that swings by 1 within a window, and is zero at its ends."""
     part = np.clip((time_s - window_s[0]) / (window_s[1] - window_s[0]), 0, 1)
-    envelope = np.minimum(1.0, 4 * np.sin(np.pi * part) ** 2)
+    envelope = 0.5 - 0.5 * np.cos(np.pi * np.clip(4 * np.minimum(part, 1 - part), 0, 1))  # no kink: rates do not leap
     turns = np.outer(time_s, rng.uniform(*band_hz, ways)) + rng.uniform(0, 1, ways)
     angle = envelope[:, None] * np.sin(2 * np.pi * turns) * rng.normal(0, 1, ways).clip(-2, 2)
     return np.asarray(np.gradient(angle, time_s, axis=0), dtype=np.float64)
@@ -119,8 +119,8 @@ def _rocking(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Ge
     """(n, 2) rates of a body that rocks from edge to edge, less and less."""
     since = time_s - begins_s
     on = (since > 0) & (since < lasting_s)
-    decay = np.where(on, np.exp(-4 * since.clip(0) / lasting_s) * (1 - (since / lasting_s).clip(0, 1)), 0.0)
-    angle = decay * np.sin(2 * np.pi * rng.uniform(*ROCK_HZ) * since.clip(0))
+    part = np.where(on, since / lasting_s, 0.0)
+    angle = 20 * part**2 * np.exp(-4 * part) * (1 - part) ** 2 * np.sin(2 * np.pi * rng.uniform(*ROCK_HZ) * since.clip(0))
     return np.outer(np.gradient(angle, time_s), rng.normal(0, 1, 2))
 
 
