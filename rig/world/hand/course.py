@@ -47,7 +47,9 @@ def moved(start: Array, end: Array, vector: Array, habits: Habits, rng: np.rando
     last_s = grasp_s + 0.3 * (until_s - grasp_s)
     shape = _raised(time_s, last_s, until_s - last_s)[:, None]
     for _ in range(PASSES):
-        rates = rates + shape * (0.9 * vector_of((start @ integrated(time_s, rates)[-1]).T @ end))
+        turned_to = integrated(time_s, rates)
+        missed = turned_to[-1] @ vector_of((start @ turned_to[-1]).T @ end)  # in the axes that stand still
+        rates = rates + shape * (np.swapaxes(turned_to, -1, -2) @ missed)
     return time_s, rates
 
 
