@@ -4,7 +4,7 @@ Rests are those of `rig.observation.rests`; a move is all that is between two of
 still rocks or already moves belongs to it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,6 +20,7 @@ MARGIN_S = 0.1  # of a rest at either end that belongs to the moves beside it
 GAP = 2.5  # intervals
 AT_THE_TOP = 3  # readings in a row that are the same, and the largest
 NEAR_RANGE = 0.995
+SETTLED_S, LOOKS_S = 1.0, 0.25  # a rest of a session that goes on; how often it is looked at
 HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # so long in one place, if it turns no faster; blocks
 
 
@@ -104,3 +105,78 @@ class Live:
     since_s: float
     turned_rad: Array
     peak_rad_s: float
+
+
+class Segmenter:
+    """The feed of a session that is going on: what it finds is what `handled` finds in the readings so far.
+
+    A rest is settled after `SETTLED_S`. `range_rad_s` is that of the gyroscope, None where nobody says.
+    """
+
+    def __init__(self, range_rad_s: float | None = None) -> None:
+        self._range_rad_s = range_rad_s
+        self._pieces: list[tuple[Array, Array, Array | None]] = []
+        self._left_out: list[float] = []  # the middles of moves that were taken back
+        self._given_s = -np.inf  # beginning of the last rest that was given
+        self._looked_s = -np.inf
+        self._session = handled(np.empty(0), np.empty((0, 3)))
+
+    def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[Rest | Move, ...]:
+        """Takes readings (k, 3) at times (k,) that follow; gives the moves and rests that have settled since."""
+        if not len(time_s):
+            return ()
+        self._pieces.append((time_s, rates, acceleration))
+        if time_s[-1] < self._looked_s + LOOKS_S:
+            return ()
+        self._looked_s = float(time_s[-1])
+        self._session = handled(*self._all(), range_rad_s=self._range_rad_s)
+        found: list[Rest | Move] = []
+        for row, rest in enumerate(self._session.rests):
+            if rest.end_s - rest.start_s < SETTLED_S - 2 * MARGIN_S or rest.start_s < self._given_s + LOOKS_S:
+                continue
+            if row:
+                found.append(self._session.moves[row - 1])
+            found.append(rest)
+            self._given_s = rest.start_s
+        return tuple(found)
+
+    def leave_out(self, move: Move) -> None:
+        """Takes a move back: it ties the rests beside it no more."""
+        self._left_out.append((move.start_s + move.end_s) / 2)
+
+    @property
+    def handled(self) -> Handled:
+        """Everything so far, to the last rest that has settled."""
+        session = self._session
+        count = len(session.rests)
+        while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:
+            count -= 1
+        moves = tuple(
+            replace(move, left_out=any(move.start_s < middle < move.end_s for middle in self._left_out))
+            for move in session.moves[: max(count - 1, 0)]
+        )
+        return replace(session, rests=session.rests[:count], moves=moves)
+
+    @property
+    def live(self) -> Live:
+        """What the body does now, as far as the last look at it tells."""
+        session = self._session
+        if not session.rests:
+            return Live(self._looked_s, "starting", self._looked_s, np.zeros(3), 0.0)
+        last, now_s = session.rests[-1], self._looked_s
+        if now_s - last.end_s < MARGIN_S + 2 * PAUSE_S:
+            return Live(now_s, "resting", last.start_s - MARGIN_S, np.zeros(3), 0.0)
+        moving = session.time_s > last.end_s
+        rates = session.rates[moving] - last.mean_rad_s
+        turned = np.trapezoid(rates, session.time_s[moving], axis=0)
+        held = next((span for span in session.held if span[1] > now_s - 2 * PAUSE_S), None)
+        state: State = "moving" if held is None else "held"
+        since_s = last.end_s if held is None else held[0]
+        return Live(now_s, state, since_s, turned, float(np.abs(rates).max()))
+
+    def _all(self) -> tuple[Array, Array, Array | None]:
+        time_s, rates, acceleration = zip(*self._pieces, strict=True)
+        felt = [each for each in acceleration if each is not None]
+        whole = (np.concatenate(time_s), np.concatenate(rates), np.concatenate(felt) if felt else None)
+        self._pieces = [whole]
+        return whole
