@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.by_hand.faces import faced
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, WALK, Factor, State, factors
 from rig.estimation.by_hand.moves import Moved, moved
-from rig.estimation.by_hand.session import STATED, Faced, Handled, Sizes, Told
+from rig.estimation.by_hand.session import LARGEST, STATED, Faced, Handled, Sizes, Told
 
 PASSES, SIZED = 10, 4  # of the fit; in each but the first, how often the sizes are found anew
 SETTLED = 1e-2  # of the standard uncertainty
@@ -54,25 +54,25 @@ class Fit:
         return np.asarray(np.clip(1 - taken, 1e-6, 1.0), dtype=np.float64)
 
 
-def fit(session: Handled, told: Told, sizes: Sizes | None = None, start: Array | None = None) -> Fit:
-    """The solution of a session of two rests at least; `sizes` None finds them. `start` is about F (3, 3).
+def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
+    """The solution of a session of a rest at least, and the sizes by its first `trusted` rests, None by all.
 
     Raises Fault `no_fit`, Refused `first_face_not_told`.
     """
-    matrix = np.eye(3) if start is None else start
+    matrix = np.eye(3)
     biases = np.array([rest.mean_rad_s for rest in session.rests])
-    found, state = STATED if sizes is None else sizes, None
+    found, state = STATED, None
     seen = moved(session, matrix, biases, np.zeros((3, 3)), np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
     on = faced(session, told, seen)
     iterations, settled = 0, False
     while iterations < PASSES and not settled:
         state = _start(seen, on, matrix, biases) if state is None else state
         rows = tuple(factors(session, on, told, state, seen, found))
-        step, covariance = _solved(rows)
-        for _ in range(SIZED if sizes is None and iterations else 0):
-            found = _sized(rows, step, covariance, found)
+        step, covariance = solved(rows)
+        for _ in range(SIZED if iterations else 0):
+            found = _sized([row for row in rows if trusted is None or row.at < trusted], step, covariance, found)
             rows = tuple(factors(session, on, told, state, seen, found))
-            step, covariance = _solved(rows)
+            step, covariance = solved(rows)
         if not np.isfinite(step).all() or np.abs(step[:9]).max() > 1.0:
             raise Fault("no_fit", "the moves contradict each other so much that no fit converges", _REMEDY)
         state, iterations = state.stepped(step), iterations + 1
@@ -80,8 +80,8 @@ def fit(session: Handled, told: Told, sizes: Sizes | None = None, start: Array |
         seen = moved(session, state.matrix, state.biases, state.sensitivity, state.attitudes[:, 2])
     assert state is not None
     rows = tuple(factors(session, on, told, state, seen, found))
-    _, covariance = _solved(rows)
-    chi_square, freedom = _left(rows, covariance)
+    _, covariance = solved(rows)
+    chi_square, freedom = left(rows, covariance)
     return Fit(session, told, on, state, seen, found, rows, covariance, chi_square, freedom, iterations, settled)
 
 
@@ -121,7 +121,8 @@ def _upright(attitude: Array, up: Array) -> Array:
     return np.asarray(attitude @ turn.T, dtype=np.float64)
 
 
-def _solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
+def solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
+    """The step (p,) that the rows ask for, and its covariance (p, p)."""
     design = np.vstack([row.design / row.std[:, None] for row in rows])
     missed = np.concatenate([row.missed / row.std for row in rows])
     size = np.linalg.norm(design, axis=0)
@@ -130,7 +131,7 @@ def _solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
     return -covariance @ (design.T @ missed), covariance
 
 
-def _left(rows: Sequence[Factor], covariance: Array) -> tuple[float, float]:
+def left(rows: Sequence[Factor], covariance: Array) -> tuple[float, float]:
     """What is left of all but the priors, and its degrees of freedom."""
     chi_square = freedom = 0.0
     for row in rows:
@@ -156,5 +157,6 @@ def _sized(rows: Sequence[Factor], step: Array, covariance: Array, now: Sizes) -
             square += float(np.sum(share * left / unit**2))
             freedom += float(np.sum(share * free))
         least = stated * (1.0 if name in NEVER_LESS else LEAST)
-        found[name] = max(least, stated * float(np.sqrt(max(square, 0.0) / freedom)))
+        size = stated * float(np.sqrt(max(square, 0.0) / freedom))
+        found[name] = min(max(least, size), getattr(LARGEST, name))
     return Sizes(**found)
