@@ -66,13 +66,12 @@ def _at_the_top(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= NEAR_RANGE * range_rad_s).any(axis=1))
     size = np.abs(rates)
-    same = (size >= size.max(axis=0, initial=0.0) * (1 - 1e-9)) & (size > 0)
-    run = same.copy()
-    for _ in range(AT_THE_TOP - 1):
-        run[1:] = run[1:] & run[:-1]
-        run[1:] &= same[1:]
-        run[0] = False
-    return np.asarray(run.any(axis=1))
+    same = ((size >= size.max(axis=0) * (1 - 1e-9)) & (size > 0)).astype(np.intp)
+    ahead = np.cumsum(np.vstack([np.zeros((1, 3), np.intp), same]), axis=0)
+    top = np.zeros(len(rates), dtype=np.bool_)
+    for first in np.flatnonzero((ahead[AT_THE_TOP:] - ahead[:-AT_THE_TOP] == AT_THE_TOP).any(axis=1)):
+        top[first : first + AT_THE_TOP] = True
+    return top
 
 
 def _held(time_s: Array, rates: Array, rests: tuple[Rest, ...]) -> tuple[tuple[float, float], ...]:
@@ -119,7 +118,7 @@ class Segmenter:
         self._left_out: list[float] = []  # the middles of moves that were taken back
         self._given_s = -np.inf  # beginning of the last rest that was given
         self._looked_s = -np.inf
-        self._session = handled(np.empty(0), np.empty((0, 3)))
+        self._session = Handled(np.empty(0), np.empty((0, 3)), None, (), ())
 
     def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[Rest | Move, ...]:
         """Takes readings (k, 3) at times (k,) that follow; gives the moves and rests that have settled since."""

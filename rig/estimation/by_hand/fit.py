@@ -70,7 +70,7 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
         rows = tuple(factors(session, on, told, state, seen, found))
         step, covariance = solved(rows)
         for _ in range(SIZED if iterations else 0):
-            found = _sized([row for row in rows if trusted is None or row.at < trusted], step, covariance, found)
+            found = _sized([row for row in rows if trusted is None or _ends(row) < trusted], step, covariance, found)
             rows = tuple(factors(session, on, told, state, seen, found))
             step, covariance = solved(rows)
         if not np.isfinite(step).all() or np.abs(step[:9]).max() > 1.0:
@@ -119,6 +119,11 @@ def _upright(attitude: Array, up: Array) -> Array:
     angle = np.arctan2(sine, there @ up)
     turn = np.asarray(Rotation.from_rotvec(axis / np.linalg.norm(axis) * angle).as_matrix(), dtype=np.float64)
     return np.asarray(attitude @ turn.T, dtype=np.float64)
+
+
+def _ends(row: Factor) -> int:
+    """The last rest that a factor is of."""
+    return row.at + (row.kind in (MOVE, WALK, CLOSURE))
 
 
 def solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
