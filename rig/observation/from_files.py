@@ -1,4 +1,4 @@
-"""A recording of readings that were made elsewhere, from a file of them and one that tells their motion."""
+"""A recording of readings that were made elsewhere, from a file of them and one that tells their motion, if any does."""
 
 import hashlib
 from collections.abc import Callable
@@ -24,10 +24,13 @@ NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The two files, and whose readings they hold; `recorded` None is when the readings' file was last written."""
+    """The two files, and whose readings they hold; `recorded` None is when the readings' file was last written.
+
+    Of "turns" no file tells the motion: `motion` is what somebody said of them, by column.
+    """
 
     readings: Path
-    motion: Path
+    motion: Path | Columns
     tells: Told
     item: Item
     recorded: datetime | None = None
@@ -36,14 +39,15 @@ class Files:
 def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False) -> RunData:
     """The recording. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`."""
     read: Callable[[Path], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
-    samples = read_samples(files.readings, [RATE] if files.tells == "sweeps" else ())
+    samples = read_samples(files.readings, () if files.tells == "attitudes" else [RATE])
     columns = {"time_s": samples.time_s} | {
         name: readings[:, i]
         for quantity, readings in samples.readings.items()
         for i, name in enumerate(quantity.columns)
     }
     began = files.recorded or datetime.fromtimestamp(files.readings.stat().st_mtime, UTC)
-    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, read(files.motion))
+    motion = read(files.motion) if isinstance(files.motion, Path) else files.motion
+    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, motion)
     return RunData(
         config="",
         settings=RunSettings(
@@ -60,7 +64,9 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             reckoning=RECKONING,
             elsewhere=asked,
         ),
-        provenance=provenance_of_files(_named(files.readings), _named(files.motion), files.item, began),
+        provenance=provenance_of_files(
+            _named(files.readings), _named(files.motion) if isinstance(files.motion, Path) else None, files.item, began
+        ),
         sensors={files.item.name: read_elsewhere.sensor},
         samples={files.item.name: read_elsewhere.samples},
         turner=None,

@@ -152,6 +152,7 @@ def solution_of(found: Fit) -> HandSolution:
         sizes={
             name: (getattr(found.sizes, name), getattr(STATED, name), getattr(LARGEST, name))
             for name in found.sizes.__slots__
+            if name != "acceleration_m_s2" or found.session.acceleration is not None
         },
         chi_square=found.chi_square,
         freedom=found.freedom,
