@@ -11,7 +11,7 @@ from rig.report.entry import entry
 WORDS = {
     "repeat_rad": "faces that are laid down again lie otherwise by {:.2f} mrad",
     "closure_rad": "turns miss where they began by {:.1f} mrad",
-    "of_angle": "moves differ by {:.3f} % of their angle",
+    "of_angle": "moves differ by {:.3f} % of a quarter turn",
     "walk_rad_s_sqrt_s": "the bias walks by {:.1e} rad/s/√s",
     "acceleration_m_s2": "the accelerometer's level is off by {:.4f} m/s²",
 }

@@ -33,6 +33,8 @@ TABLE_STD_RAD = 0.02
 BIAS_STD_RAD_S = 1.0
 EARTH_STD_RAD_S = 4e-5  # of each axis
 LEAN_RAD = 0.02
+NONLINEARITY = 1e-4  # of the angle of a move: what is known of parts
+QUARTER_RAD = np.pi / 2  # of which `Sizes.of_angle` is said; it grows with the root, as errors of many pushes do
 ALONG_M_S2 = 0.1  # what an accelerometer's own errors may be along the vertical
 HEADING_STD_RAD = 1.0
 
@@ -143,7 +145,8 @@ def _move(state: State, moved: Moved, row: int, walk: float, sizes: Sizes, width
     design[:, first], design[:, second] = np.eye(3), -between
     causes = {
         "noise": np.full(3, walk * np.sqrt(moved.durations_s[row])),
-        "of_angle": np.full(3, sizes.of_angle * moved.paths_rad[row]),
+        "nonlinearity": np.full(3, NONLINEARITY * moved.paths_rad[row]),
+        "of_angle": np.full(3, sizes.of_angle * np.sqrt(QUARTER_RAD * moved.paths_rad[row])),
     }
     return Factor(MOVE, row, _vector(moved.rotations[row] @ between.T), design, causes)
 

@@ -82,13 +82,13 @@ class Sizes:
     """Standard deviations of what a hand does, and of what a part does that the model does not say.
 
     - `repeat_rad`: a face that is laid down again; `closure_rad`: the heading after a whole turn.
-    - `of_angle`: of the angle of a move, about each axis; `walk_rad_s_sqrt_s`: of the bias from rest to rest.
+    - `of_angle`: of the angle of a quarter turn, about each axis; `walk_rad_s_sqrt_s`: of the bias from rest to rest.
     - `acceleration_m_s2`: of an accelerometer's reading at rest, across the vertical.
     """
 
     repeat_rad: float = 3e-4
     closure_rad: float = 3e-3
-    of_angle: float = 2e-4
+    of_angle: float = 1e-4
     walk_rad_s_sqrt_s: float = 5e-6
     acceleration_m_s2: float = 0.003
 

@@ -30,7 +30,8 @@ LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
         "how the faces lie and the turns end, against each other",
     ),
     "bias from rest to rest": ("A", ("walk", "earth", "bias"), "scatter of the rests; the Earth's rate"),
-    "nonlinearity": ("B", ("of_angle", "matrix"), "what is known of parts; wider where the moves contradict each other"),
+    "angles of the moves": ("A", ("of_angle",), "how the moves contradict each other"),
+    "nonlinearity": ("B", ("nonlinearity", "matrix"), "what is known of parts"),
     "g-sensitivity": ("B", ("g-sensitivity",), "what is known of parts, and the rests on opposite faces"),
 }
 
@@ -234,6 +235,7 @@ def _budget(found: Fit, to_parameters: Array, clock: Array) -> Budget:
             spread[line_of[cause]] += effect @ effect.T
     samples = float(sum(rest.samples for rest in found.session.rests))
     freedom = {"noise": samples, "placement": found.freedom + SEEN, "bias from rest to rest": found.freedom + SEEN}
+    freedom["angles of the moves"] = found.freedom + SEEN
     lines = [
         Contributor(name, kind, "normal", None, "", source, freedom.get(name, np.inf), spread[name])
         for name, (kind, _, source) in LINES.items()
