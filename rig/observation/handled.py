@@ -20,6 +20,7 @@ MARGIN_S = 0.1  # of a rest at either end that belongs to the moves beside it
 GAP = 2.5  # intervals
 AT_THE_TOP = 3  # readings in a row that are the same, and the largest
 NEAR_RANGE = 0.995
+FIRST_S, STILL_RAD_S = 1.0, 0.03  # a hand that holds it as still as it can
 SETTLED_S, LOOKS_S = 1.0, 0.25  # a rest of a session that goes on; how often it is looked at
 HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # so long in one place, if it turns no faster; blocks
 
@@ -28,7 +29,7 @@ def handled(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> Handled:
     """The session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` where it is known."""
-    windows = find_rests(time_s, {RATE: rates}) if len(time_s) > 1 else ()
+    windows = find_rests(time_s, {RATE: rates}, _began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _at_the_top(rates, range_rad_s)
     steps_s = np.diff(time_s)
@@ -40,6 +41,12 @@ def handled(
         peak = float(np.abs(rates[inside]).max())
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
     return Handled(time_s, rates, acceleration, rests, tuple(moves), _held(time_s, rates, rests))
+
+
+def _began_still(time_s: Array, rates: Array) -> bool:
+    """Whether the body was in one place in the first second: if it was held then, it may be held later on."""
+    first = rates[time_s < time_s[0] + FIRST_S]
+    return bool(len(first) > 1 and first.std(axis=0).max() < STILL_RAD_S)
 
 
 def _margin(window: Window) -> float:

@@ -15,6 +15,7 @@ from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, M
 from rig.estimation.by_hand.session import LARGEST
 
 BY_MUCH = 25.0  # of chi square for two or three rows: 1 in 10^5
+JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
 AT_ONCE = 16.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
 
 
@@ -42,10 +43,13 @@ def _doubts(fit: Fit, since: int | None) -> Iterator[Doubt]:
     for at in range(max(first - 1, 0), count - 1):
         yield _doubt(fit, "turn_not_closed", at, [row for row in rows if not _is(row, at, CLOSURE, LEANING)])
         yield _doubt(fit, "lost_in_move", at, [row for row in rows if not _is(row, at, MOVE, CLOSURE, LEANING)])
-        yield _doubt(fit, "bias_jumped", at, [row for row in rows if not _is(row, at, WALK)])
-    for at in range(first, count):
+        if np.abs(np.subtract(*(fit.session.rests[at + each].mean_rad_s for each in (1, 0)))).max() > JUMP_RAD_S:
+            yield _doubt(fit, "bias_jumped", at, [row for row in rows if not _is(row, at, WALK)])
+    faces = fit.faced.faces
+    for at in (at for at in range(first, count) if faces[at] is not None):
         yield _doubt(fit, "not_flat", at, [row for row in rows if not _is(row, at, FLAT, ACCELERATION)])
-    for at in range(max(first, 1), count if fit.session.acceleration is not None else 0):
+    level = fit.session.acceleration is not None
+    for at in (at for at in range(max(first, 1), count) if level and faces[at] is not None):
         yield _doubt(fit, "table_moved", at, [_after(row, at) for row in rows])
 
 

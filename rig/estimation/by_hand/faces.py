@@ -9,6 +9,7 @@ from rig.errors import Refused
 
 ON_FACE = float(np.cos(np.radians(10.0)))  # read: an accelerometer's offset counts 4°
 RECKONED = float(np.cos(np.radians(30.0)))  # followed: a scale that is off by 10 % counts 18° in half a turn
+MOST = 0.7  # of the rests are on faces, where they are laid on faces at all
 WHOLE_RAD = float(np.radians(40.0))  # a turn that ends so near its beginning was to be a whole one
 AXES = np.array([axis_of(face) for face in FACES])
 
@@ -19,6 +20,8 @@ def faced(session: Handled, told: Told, moved: Moved) -> Faced:
     cosines = up @ AXES.T
     best = np.argmax(cosines, axis=1)
     near = cosines[np.arange(len(up)), best] > (ON_FACE if session.acceleration is not None else RECKONED)
+    if np.mean(near) < MOST:  # free attitudes, some of which happen to be near a face
+        near = np.zeros_like(near)
     faces = tuple(FACES[face] if on else None for face, on in zip(best.tolist(), near.tolist(), strict=True))
     nominal = np.where(near[:, None], AXES[best], up)
     turns = tuple(_turns(session, moved, faces, nominal, row) for row in range(len(session.moves)))

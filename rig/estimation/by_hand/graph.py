@@ -37,6 +37,7 @@ NONLINEARITY = 1e-4  # of the angle of a move: what is known of parts
 QUARTER_RAD = np.pi / 2  # of which `Sizes.of_angle` is said; it grows with the root, as errors of many pushes do
 ALONG_M_S2 = 0.1  # what an accelerometer's own errors may be along the vertical
 HEADING_STD_RAD = 1.0
+HELD_HZ, AS_QUIET = 4.0, 1.5  # of a hand that holds it; so much more than the quiet rests scatters a rest as well
 
 MOVE, REST, WALK, FLAT, SQUARE, CLOSURE, LEANING, ACCELERATION, PRIOR = (
     "move", "rest", "walk", "flat", "box", "closure", "lean", "acceleration", "prior",
@@ -121,9 +122,15 @@ def across(axis: Array) -> Array:
 
 
 def noise(session: Handled) -> float:
-    """The scatter of a reading at rest, rad/s: of all rests and axes."""
-    weight = [rest.samples for rest in session.rests]
-    return float(np.sqrt(np.average([np.mean(rest.noise_rad_s**2) for rest in session.rests], weights=weight)))
+    """The scatter of a reading at rest, rad/s: of all axes, and of the quieter half of the rests."""
+    scatter = sorted(float(np.mean(rest.noise_rad_s**2)) for rest in session.rests)
+    return float(np.sqrt(np.mean(scatter[: (len(scatter) + 1) // 2])))
+
+
+def _held(scatter: Array, quiet: float, lasting_s: float) -> float:
+    """What is left in the mean of a rest in which a hand held the body: it scatters more, and slowly."""
+    beyond = float(np.mean(scatter**2)) - (AS_QUIET * quiet) ** 2
+    return float(np.sqrt(max(beyond, 0.0) / max(HELD_HZ * lasting_s, 1.0)))
 
 
 def _walk_rad_sqrt_s(session: Handled) -> float:
@@ -186,6 +193,7 @@ def _rest(session: Handled, state: State, row: int, walk: float, width: int) -> 
     causes = {
         "noise": np.full(3, walk / np.sqrt(max(rest.end_s - rest.start_s, 1e-3))),
         "earth": np.full(3, EARTH_STD_RAD_S),
+        "held": np.full(3, _held(rest.noise_rad_s, noise(session), rest.end_s - rest.start_s)),
     }
     return Factor(REST, row, rest.mean_rad_s - state.biases[row] - state.sensitivity @ up, design, causes)
 
@@ -213,9 +221,12 @@ def _acceleration(session: Handled, state: State, row: int, told: Told, sizes: S
     axes = np.vstack([across(direction), direction])
     missed = axes @ (rest.acceleration_m_s2 - state.level @ felt - state.offset)
     scatter = float(np.sqrt(np.mean(rest.acceleration_noise_m_s2**2) / max(rest.samples, 1)))
+    others = [each.acceleration_noise_m_s2 for each in session.rests if each.acceleration_noise_m_s2 is not None]
+    quiet = float(np.sqrt(np.min([np.mean(each**2) for each in others])))
     causes = {
         "acceleration": np.full(3, sizes.acceleration_m_s2),
         "acceleration noise": np.full(3, scatter),
+        "held": np.full(3, _held(rest.acceleration_noise_m_s2, quiet, rest.end_s - rest.start_s)),
         "along": np.array([0.0, 0.0, ALONG_M_S2]),
     }
     return Factor(ACCELERATION, row, missed, axes @ design, causes)

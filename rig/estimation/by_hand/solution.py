@@ -26,7 +26,7 @@ LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
     "noise": ("A", ("noise", "acceleration noise"), "scatter at rest"),
     "placement": (
         "A",
-        ("repeat", "closure", "box", "table", "lean", "acceleration", "along", "level", "heading"),
+        ("repeat", "closure", "box", "table", "lean", "acceleration", "along", "level", "heading", "held"),
         "how the faces lie and the turns end, against each other",
     ),
     "bias from rest to rest": ("A", ("walk", "earth", "bias"), "scatter of the rests; the Earth's rate"),
