@@ -14,9 +14,10 @@ from rig.estimation.by_hand.fit import Fit, left, solved
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
 from rig.estimation.by_hand.session import LARGEST
 
-BY_MUCH = 25.0  # of chi square for two or three rows: 1 in 10^5
+A_ROW = 4.0  # of chi square: what leaves out more has to explain more
+BY_MUCH = 16.0  # of chi square beyond that: 1 in 10^5
 JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
-AT_ONCE = 16.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
+AT_ONCE = 8.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +73,10 @@ def _doubt(fit: Fit, name: str, at: int, rows: list[Factor]) -> Doubt:
         return Doubt(name, at, 0.0)
     remaining = sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
     before = sum(float(np.sum((row.missed / row.std) ** 2)) for row in fit.factors)
-    more = 1.0 if name == "table_moved" else 0.0  # a rest that lies otherwise, unless the table says more
-    return Doubt(name, at, before - remaining - more)
+    freed = 2 if name == "table_moved" else sum(len(row.missed) for row in fit.factors) - sum(
+        len(row.missed) for row in rows
+    )
+    return Doubt(name, at, before - remaining - A_ROW * freed)
 
 
 def named(fit: Fit, doubt: Doubt) -> Fault:
