@@ -13,7 +13,10 @@ from rig.station.plain_text import say, say_on_terminal
 def add(solve: ArgumentParser) -> None:
     """The arguments of `rig solve`."""
     solve.add_argument(
-        "run", type=Path, metavar="RUN", help="a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV"
+        "run",
+        type=Path,
+        metavar="RUN",
+        help="a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV",
     )
     elsewhere = solve.add_mutually_exclusive_group()
     elsewhere.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")

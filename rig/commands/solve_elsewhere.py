@@ -157,7 +157,7 @@ def _recording(options: Namespace) -> "RunData":
 
 
 def _told_of_turns(options: Namespace) -> "Columns":
-    """What the options say of a session by hand, as one row of a table. Raises Refused `bad_option`, `clock_unknown`."""
+    """What the options say of a session by hand, as a table's row. Raises Refused `bad_option`, `clock_unknown`."""
     import numpy as np
 
     from rig.estimation.by_hand.session import FACES
@@ -171,7 +171,9 @@ def _told_of_turns(options: Namespace) -> "Columns":
     for name, largest in (("clock_ppm", 1e5), ("box_deg", 10.0)):
         if not 0 < getattr(options, name) <= largest:
             option = f"--{name.replace('_', '-')}"
-            raise Refused("bad_option", f"{option} is {getattr(options, name):g}", f"Give more than 0, {largest:g} at most")
+            raise Refused(
+                "bad_option", f"{option} is {getattr(options, name):g}", f"Give more than 0, {largest:g} at most"
+            )
     told = {
         "clock_ppm": options.clock_ppm,
         "box_rad": np.radians(options.box_deg),

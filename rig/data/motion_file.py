@@ -64,7 +64,9 @@ MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
             (),
             (("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"), ("attitude_std_rad",)),
         ),
-        "turns": Header(("clock_ppm", "box_rad", "closure", "gravity_m_s2"), (), (("first_face",),)),  # one row, no file
+        "turns": Header(
+            ("clock_ppm", "box_rad", "closure", "gravity_m_s2"), (), (("first_face",),)
+        ),  # one row, no file
     }
 )
 

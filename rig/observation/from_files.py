@@ -1,4 +1,4 @@
-"""A recording of readings that were made elsewhere, from a file of them and one that tells their motion, if any does."""
+"""A recording of readings that were made elsewhere, from a file of them and, mostly, one of their motion."""
 
 import hashlib
 from collections.abc import Callable

@@ -5,6 +5,7 @@ still rocks or already moves belongs to it.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -35,7 +36,7 @@ def handled(
     steps_s = np.diff(time_s)
     gaps = np.append(steps_s > GAP * np.median(steps_s), False) if len(steps_s) else np.zeros(len(time_s), np.bool_)
     moves = []
-    for first, second in zip(windows[:-1], windows[1:], strict=True):
+    for first, second in pairwise(windows):
         start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
         inside = (time_s >= start_s) & (time_s <= end_s)
         peak = float(np.abs(rates[inside]).max())
@@ -174,7 +175,7 @@ class Segmenter:
             return Live(now_s, "resting", last.start_s - MARGIN_S, np.zeros(3), 0.0)
         moving = session.time_s > last.end_s
         rates = session.rates[moving] - last.mean_rad_s
-        turned = np.trapezoid(rates, session.time_s[moving], axis=0)
+        turned = np.asarray(np.trapezoid(rates, session.time_s[moving], axis=0), dtype=np.float64)
         held = next((span for span in session.held if span[1] > now_s - 2 * PAUSE_S), None)
         state: State = "moving" if held is None else "held"
         since_s = last.end_s if held is None else held[0]

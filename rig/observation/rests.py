@@ -25,9 +25,7 @@ FIRST = 4  # blocks of the first second
 GAP = 2.5  # intervals
 
 
-def find_rests(
-    time_s: Array, readings: Mapping[Quantity, Array], still_at_first: bool = False
-) -> tuple[Window, ...]:
+def find_rests(time_s: Array, readings: Mapping[Quantity, Array], still_at_first: bool = False) -> tuple[Window, ...]:
     """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,).
 
     `still_at_first`: the body was as still in the first second as it ever is meant to be.

@@ -44,7 +44,9 @@ def by_hand_lines(found: ByHandEntry) -> Iterator[str]:
             yield f"move {number}: {move.turns:+d} turns, {np.degrees(move.angle_rad):.2f}°, {closure}"
     there = {size.name: size for size in found.sizes}
     used = {"closure_rad": any(move.closure_rad is not None for move in found.moves)}
-    said = [WORDS[name].format(UNITS.get(name, 1.0) * size.found) for name, size in there.items() if used.get(name, True)]
+    said = [
+        WORDS[name].format(UNITS.get(name, 1.0) * size.found) for name, size in there.items() if used.get(name, True)
+    ]
     yield f"as found (one standard deviation): {'; '.join(said)}"
     worst = max([*(each.pull for each in found.rests), *(each.pull for each in found.moves)], default=0.0)
     yield f"χ²/dof {found.chi_square / max(found.freedom, 1.0):.2f}, the largest pull {worst:.1f}"

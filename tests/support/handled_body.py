@@ -14,7 +14,7 @@ from support.csv_tables import write_table
 TWELVE: tuple[Action, ...] = tuple(Flip(face) for face in FLIPS)
 SIX_TURNS: tuple[Action, ...] = (
     Turn(1),
-    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (Flip(face), Turn(1))),  # type: ignore[arg-type]
+    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (Flip(face), Turn(1))),
 )
 # Three faces, a turn either way on each.
 BOTH_WAYS: tuple[Action, ...] = (Turn(1), Turn(-1), Flip("+x"), Turn(1), Turn(-1), Flip("+y"), Turn(1), Turn(-1))

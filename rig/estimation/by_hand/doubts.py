@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.by_hand.fit import Fit, left, solved
+from rig.estimation.by_hand.fit import Fit, solved
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
 from rig.estimation.by_hand.session import LARGEST
 
@@ -73,8 +73,10 @@ def _doubt(fit: Fit, name: str, at: int, rows: list[Factor]) -> Doubt:
         return Doubt(name, at, 0.0)
     remaining = sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
     before = sum(float(np.sum((row.missed / row.std) ** 2)) for row in fit.factors)
-    freed = 2 if name == "table_moved" else sum(len(row.missed) for row in fit.factors) - sum(
-        len(row.missed) for row in rows
+    freed = (
+        2
+        if name == "table_moved"
+        else sum(len(row.missed) for row in fit.factors) - sum(len(row.missed) for row in rows)
     )
     return Doubt(name, at, before - remaining - A_ROW * freed)
 
@@ -87,8 +89,8 @@ def named(fit: Fit, doubt: Doubt) -> Fault:
         missed = float(next(row for row in fit.factors if _is(row, doubt.at, CLOSURE)).missed[0])
         return Fault(
             "turn_not_closed",
-            f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(missed)):.1f}° from where it "
-            "began",
+            f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(missed)):.1f}° from where "
+            "it began",
             "Turn against a straight edge, so that it ends where it began; or say that there was none: --no-closure",
         )
     if doubt.name == "lost_in_move":

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.moves import Moved
 from rig.estimation.by_hand.session import FACES, Faced, Handled, Told, axis_of
-from rig.errors import Refused
 
 ON_FACE = float(np.cos(np.radians(10.0)))  # read: an accelerometer's offset counts 4°
 RECKONED = float(np.cos(np.radians(30.0)))  # followed: a scale that is off by 10 % counts 18° in half a turn

@@ -5,14 +5,14 @@ stated of hands as if that had been seen in a few more (`SEEN`): a short session
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.faces import faced
-from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, WALK, Factor, State, factors
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, WALK, Factor, Graph, State, factors
 from rig.estimation.by_hand.moves import Moved, moved
 from rig.estimation.by_hand.session import LARGEST, STATED, Faced, Handled, Sizes, Told
 
@@ -67,11 +67,11 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
     iterations, settled = 0, False
     while iterations < PASSES and not settled:
         state = _start(seen, on, matrix, biases) if state is None else state
-        rows = tuple(factors(session, on, told, state, seen, found))
+        rows = tuple(factors(Graph(session, on, told, state, seen, found)))
         step, covariance = solved(rows)
         for _ in range(SIZED if iterations else 0):
             found = _sized([row for row in rows if trusted is None or _ends(row) < trusted], step, covariance, found)
-            rows = tuple(factors(session, on, told, state, seen, found))
+            rows = tuple(factors(Graph(session, on, told, state, seen, found)))
             step, covariance = solved(rows)
         if not np.isfinite(step).all() or np.abs(step[:9]).max() > 1.0:
             raise Fault("no_fit", "the moves contradict each other so much that no fit converges", _REMEDY)
@@ -79,7 +79,7 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
         settled = iterations > 2 and bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
         seen = moved(session, state.matrix, state.biases, state.sensitivity, state.attitudes[:, 2])
     assert state is not None
-    rows = tuple(factors(session, on, told, state, seen, found))
+    rows = tuple(factors(Graph(session, on, told, state, seen, found)))
     _, covariance = solved(rows)
     chi_square, freedom = left(rows, covariance)
     return Fit(session, told, on, state, seen, found, rows, covariance, chi_square, freedom, iterations, settled)

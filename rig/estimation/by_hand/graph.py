@@ -93,25 +93,46 @@ class Factor:
         return np.asarray(np.sqrt(sum(np.square(each) for each in self.causes.values())), dtype=np.float64)
 
 
-def factors(session: Handled, faced: Faced, told: Told, state: State, moved: Moved, sizes: Sizes) -> Iterator[Factor]:
-    """Every factor of the graph at a `state`."""
-    width = RESTS + 6 * len(session.rests)
-    walk = _walk_rad_sqrt_s(session)
-    yield from _priors(state, told, width)
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """A session, on which faces, with what was told of it; where the solution is, and what the gyroscope says there."""
+
+    session: Handled
+    faced: Faced
+    told: Told
+    state: State
+    moved: Moved
+    sizes: Sizes
+
+    @property
+    def width(self) -> int:
+        """How many parameters there are."""
+        return RESTS + 6 * len(self.session.rests)
+
+    @property
+    def walk_rad_sqrt_s(self) -> float:
+        """The angle random walk, of the scatter at rest as white noise."""
+        return noise(self.session) * float(np.sqrt(np.median(np.diff(self.session.time_s))))
+
+
+def factors(graph: Graph) -> Iterator[Factor]:
+    """Every factor of the graph where it is."""
+    session, faced = graph.session, graph.faced
+    yield from _priors(graph)
     for row, move in enumerate(session.moves):
         if move.tells:
-            yield _move(state, moved, row, walk, sizes, width)
+            yield _move(graph, row)
         if faced.turns[row]:
-            yield _lean(state, moved, faced, row, walk, width)
-            if told.closure:
-                yield _closure(state, row, faced.up[row], sizes, width)
-        yield _bias_walk(session, state, row, sizes, width)
+            yield _lean(graph, row)
+            if graph.told.closure:
+                yield _closure(graph, row)
+        yield _bias_walk(graph, row)
     for row, rest in enumerate(session.rests):
-        yield _rest(session, state, row, walk, width)
+        yield _rest(graph, row)
         if (face := faced.faces[row]) is not None:
-            yield _flat(state, row, FACES.index(face), sizes, width)
+            yield _flat(graph, row, FACES.index(face))
         if rest.acceleration_m_s2 is not None:
-            yield _acceleration(session, state, row, told, sizes, width)
+            yield _acceleration(graph, row)
 
 
 def across(axis: Array) -> Array:
@@ -133,87 +154,90 @@ def _held(scatter: Array, quiet: float, lasting_s: float) -> float:
     return float(np.sqrt(max(beyond, 0.0) / max(HELD_HZ * lasting_s, 1.0)))
 
 
-def _walk_rad_sqrt_s(session: Handled) -> float:
-    """The angle random walk, of the scatter at rest as white noise."""
-    return noise(session) * float(np.sqrt(np.median(np.diff(session.time_s))))
-
-
 def _place(row: int) -> tuple[slice, slice]:
     """The columns of a rest's attitude and of its bias."""
     return slice(RESTS + 6 * row, RESTS + 6 * row + 3), slice(RESTS + 6 * row + 3, RESTS + 6 * row + 6)
 
 
-def _move(state: State, moved: Moved, row: int, walk: float, sizes: Sizes, width: int) -> Factor:
+def _move(graph: Graph, row: int) -> Factor:
+    state, moved, sizes = graph.state, graph.moved, graph.sizes
     between = state.attitudes[row].T @ state.attitudes[row + 1]
-    design = np.zeros((3, width))
+    design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _place(row), _place(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = moved.by_matrix[row], moved.by_gravity[row]
     design[:, first_bias] = design[:, second_bias] = moved.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -between
     causes = {
-        "noise": np.full(3, walk * np.sqrt(moved.durations_s[row])),
+        "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(moved.durations_s[row])),
         "nonlinearity": np.full(3, NONLINEARITY * moved.paths_rad[row]),
         "of_angle": np.full(3, sizes.of_angle * np.sqrt(QUARTER_RAD * moved.paths_rad[row])),
     }
     return Factor(MOVE, row, _vector(moved.rotations[row] @ between.T), design, causes)
 
 
-def _lean(state: State, moved: Moved, faced: Faced, row: int, walk: float, width: int) -> Factor:
+def _lean(graph: Graph, row: int) -> Factor:
+    state, moved, faced = graph.state, graph.moved, graph.faced
     up, angle = faced.up[row], float(faced.up[row] @ moved.swept_rad[row])
     ways = across(state.matrix @ up / np.linalg.norm(state.matrix @ up))
-    design = np.zeros((2, width))
+    design = np.zeros((2, graph.width))
     design[:, MATRIX] = -np.kron(ways, up)
     (_, first), (_, second) = _place(row), _place(row + 1)
     design[:, first] = design[:, second] = -ways * moved.durations_s[row] / angle / 2
-    noisy = walk * np.sqrt(moved.durations_s[row]) / abs(angle)
+    noisy = graph.walk_rad_sqrt_s * np.sqrt(moved.durations_s[row]) / abs(angle)
     causes = {"lean": np.full(2, LEAN_RAD), "noise": np.full(2, noisy)}
     return Factor(LEANING, row, ways @ (moved.swept_rad[row] / angle - state.matrix @ up), design, causes)
 
 
-def _closure(state: State, row: int, up: Array, sizes: Sizes, width: int) -> Factor:
+def _closure(graph: Graph, row: int) -> Factor:
+    state, up = graph.state, graph.faced.up[row]
     between = state.attitudes[row].T @ state.attitudes[row + 1]
-    design = np.zeros((1, width))
+    design = np.zeros((1, graph.width))
     design[0, _place(row)[0]], design[0, _place(row + 1)[0]] = -up, up @ between
-    return Factor(CLOSURE, row, np.array([up @ _vector(between)]), design, {"closure": np.array([sizes.closure_rad])})
+    causes = {"closure": np.array([graph.sizes.closure_rad])}
+    return Factor(CLOSURE, row, np.array([up @ _vector(between)]), design, causes)
 
 
-def _bias_walk(session: Handled, state: State, row: int, sizes: Sizes, width: int) -> Factor:
+def _bias_walk(graph: Graph, row: int) -> Factor:
+    session, state, sizes = graph.session, graph.state, graph.sizes
     first, second = session.rests[row], session.rests[row + 1]
     apart_s = (second.start_s + second.end_s - first.start_s - first.end_s) / 2
-    design = np.zeros((3, width))
+    design = np.zeros((3, graph.width))
     design[:, _place(row)[1]], design[:, _place(row + 1)[1]] = -np.eye(3), np.eye(3)
     causes = {"walk": np.full(3, sizes.walk_rad_s_sqrt_s * np.sqrt(apart_s))}
     return Factor(WALK, row, state.biases[row + 1] - state.biases[row], design, causes)
 
 
-def _rest(session: Handled, state: State, row: int, walk: float, width: int) -> Factor:
+def _rest(graph: Graph, row: int) -> Factor:
+    session, state = graph.session, graph.state
     rest, up = session.rests[row], state.attitudes[row][2]
-    design = np.zeros((3, width))
+    design = np.zeros((3, graph.width))
     design[:, _place(row)[1]], design[:, GRAVITY] = -np.eye(3), -np.kron(np.eye(3), up)
     causes = {
-        "noise": np.full(3, walk / np.sqrt(max(rest.end_s - rest.start_s, 1e-3))),
+        "noise": np.full(3, graph.walk_rad_sqrt_s / np.sqrt(max(rest.end_s - rest.start_s, 1e-3))),
         "earth": np.full(3, EARTH_STD_RAD_S),
         "held": np.full(3, _held(rest.noise_rad_s, noise(session), rest.end_s - rest.start_s)),
     }
     return Factor(REST, row, rest.mean_rad_s - state.biases[row] - state.sensitivity @ up, design, causes)
 
 
-def _flat(state: State, row: int, face: int, sizes: Sizes, width: int) -> Factor:
+def _flat(graph: Graph, row: int, face: int) -> Factor:
+    state = graph.state
     axis, up = axis_of(FACES[face]), state.attitudes[row][2]
     ways = across(axis)
-    design = np.zeros((2, width))
+    design = np.zeros((2, graph.width))
     design[:, _place(row)[0]] = ways @ _skew(up)
     design[:, BOX.start + 2 * face : BOX.start + 2 * face + 2] = -np.eye(2)
-    causes = {"repeat": np.full(2, sizes.repeat_rad)}
+    causes = {"repeat": np.full(2, graph.sizes.repeat_rad)}
     return Factor(FLAT, row, ways @ up - state.normals[face], design, causes)
 
 
-def _acceleration(session: Handled, state: State, row: int, told: Told, sizes: Sizes, width: int) -> Factor:
+def _acceleration(graph: Graph, row: int) -> Factor:
+    session, state, told = graph.session, graph.state, graph.told
     rest = session.rests[row]
     assert rest.acceleration_m_s2 is not None and rest.acceleration_noise_m_s2 is not None
     up = told.gravity_m_s2 * np.array([*state.table, 1.0])
     felt = state.attitudes[row].T @ up
-    design = np.zeros((3, width))
+    design = np.zeros((3, graph.width))
     design[:, LEVEL], design[:, OFFSET] = -np.kron(np.eye(3), felt), -np.eye(3)
     design[:, _place(row)[0]] = -state.level @ _skew(felt)
     design[:, TABLE] = -told.gravity_m_s2 * state.level @ state.attitudes[row].T[:, :2]
@@ -224,7 +248,7 @@ def _acceleration(session: Handled, state: State, row: int, told: Told, sizes: S
     others = [each.acceleration_noise_m_s2 for each in session.rests if each.acceleration_noise_m_s2 is not None]
     quiet = float(np.sqrt(np.min([np.mean(each**2) for each in others])))
     causes = {
-        "acceleration": np.full(3, sizes.acceleration_m_s2),
+        "acceleration": np.full(3, graph.sizes.acceleration_m_s2),
         "acceleration noise": np.full(3, scatter),
         "held": np.full(3, _held(rest.acceleration_noise_m_s2, quiet, rest.end_s - rest.start_s)),
         "along": np.array([0.0, 0.0, ALONG_M_S2]),
@@ -232,7 +256,9 @@ def _acceleration(session: Handled, state: State, row: int, told: Told, sizes: S
     return Factor(ACCELERATION, row, missed, axes @ design, causes)
 
 
-def _priors(state: State, told: Told, width: int) -> Iterator[Factor]:
+def _priors(graph: Graph) -> Iterator[Factor]:
+    state, told, width = graph.state, graph.told, graph.width
+
     def prior(name: str, columns: slice, missed: Array, std: float) -> Factor:
         return Factor(PRIOR, 0, missed, np.eye(width)[columns], {name: np.full(len(missed), std)})
 

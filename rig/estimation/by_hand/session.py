@@ -99,7 +99,7 @@ LARGEST = Sizes(5e-3, 2e-2, 3e-3, 1e-3, 0.05)  # beyond, it is not what it was t
 
 @dataclass(frozen=True, slots=True)
 class Faced:
-    """Which axis of the body pointed upwards at each rest (N,), None on no face; `up` (N, 3) the nominal axis or as read.
+    """Which axis of the body pointed upwards at each rest (N,), None on no face; `up` (N, 3) is it or as read.
 
     `turns` (N − 1,) of each move: whole turns on its face, 0 where it was none.
     """

@@ -1,10 +1,11 @@
-"""A session by hand solved: scale, bias and axes, with what their uncertainty is made of and what was found on the way."""
+"""A session by hand solved: scale, bias and axes, what their uncertainty is made of, and what was found on the way."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation import refusals
@@ -46,7 +47,7 @@ class RestFound:
 
 @dataclass(frozen=True, slots=True)
 class MoveFound:
-    """A move by `angle_rad` in all, a flip or so many whole `turns` on a face; `closure_rad` is by how much it missed."""
+    """A move by `angle_rad` in all, a flip or so many whole `turns` on a face, which missed by `closure_rad`."""
 
     kind: Literal["flip", "turn", "left out"]
     angle_rad: float
@@ -61,7 +62,7 @@ class HandSolution:
 
     - `turned` is the solution as that of told turns is; its budget is `budget`.
     - `sizes` are what was found of the hand, what was stated and what is refused, by name.
-    - `expanded_scale` (3,) is U (k = 2) by this session and its clock alone; the budget has what real hands tell beside.
+    - `expanded_scale` (3,) is U (k = 2) by this session and its clock alone; the budget has real hands beside.
     """
 
     turned: TurnedSolution
@@ -105,7 +106,7 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
         found = fit(session, told)
         fault = _too_little(found) or doubted(found)
     except Fault as error:
-        fault = error
+        fault = error if all(move.tells for move in session.moves) else too_few(session, None)
     if fault is not None or found.sizes.repeat_rad > LOOSE_RAD:
         other = _another_face(session, told, None if fault is not None else found)
         if (reason := other or fault) is not None:
@@ -161,10 +162,10 @@ def solution_of(found: Fit) -> HandSolution:
     )
 
 
-def sought(found: Fit) -> Array:
+def sought(found: Fit) -> NDArray[np.intp]:
     """(12,) the places of F and of the last rest's bias among all that is found."""
     count = found.covariance.shape[0]
-    return np.r_[0:9, count - 3 : count]
+    return np.asarray(np.r_[0:9, count - 3 : count])
 
 
 def too_few(session: Handled, expanded: Array | None) -> Fault:
@@ -195,7 +196,7 @@ def too_few(session: Handled, expanded: Array | None) -> Fault:
     so_far = "" if expanded is None else f"; the scale is known to {100 * expanded.max():.1g} %"
     return Fault(
         "too_few_moves",
-        f"there are {len(session.rests)} rests and {sum(move.tells for move in session.moves)} moves between them{so_far}",
+        f"there are {len(session.rests)} rests and {sum(move.tells for move in session.moves)} moves{so_far}",
         "Lay it on all six faces, eight moves at least, with a second of rest after each",
     )
 
@@ -218,7 +219,7 @@ def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None
         if better and _too_little(found) is None and doubted(found) is None:
             return Fault(
                 "wrong_face",
-                f"the body did not begin with {told.first_face} upwards: the moves are those of one that began with {face}",
+                f"the body did not begin with {told.first_face} upwards: its moves are those from {face}",
                 f"Say --first-face {face}, or look again which axis is which",
             )
     return None

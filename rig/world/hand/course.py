@@ -29,7 +29,7 @@ class Course:
 
 
 def moved(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Times from 0 on and rates of a move from `start` to `end` (3, 3), which is about by `vector` (3,) in body axes."""
+    """Times from 0 on and rates of a move from `start` to `end` (3, 3), about by `vector` (3,) in body axes."""
     angle = float(np.linalg.norm(vector))
     axis = vector / angle
     grasp_s, rock_s = rng.uniform(*GRASP_S), rng.uniform(*ROCK_S)
@@ -122,7 +122,9 @@ def _rocking(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Ge
     since = time_s - begins_s
     on = (since > 0) & (since < lasting_s)
     part = np.where(on, since / lasting_s, 0.0)
-    angle = 20 * part**2 * np.exp(-4 * part) * (1 - part) ** 2 * np.sin(2 * np.pi * rng.uniform(*ROCK_HZ) * since.clip(0))
+    angle = (
+        20 * part**2 * np.exp(-4 * part) * (1 - part) ** 2 * np.sin(2 * np.pi * rng.uniform(*ROCK_HZ) * since.clip(0))
+    )
     return np.outer(np.gradient(angle, time_s), rng.normal(0, 1, 2))
 
 

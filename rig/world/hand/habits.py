@@ -34,7 +34,7 @@ class Mistake:
 
     - `short`: the turn ends so many degrees before it is whole, as against an edge that slipped.
     - `two_turns` for one, the turn the `other_way` round, the `wrong_face`; `skipped`: nothing is done.
-    - `crumb`: the face lies on something, tilted by so many mrad; `table_pushed`: the table leans otherwise from then on.
+    - `crumb`: the face lies on something, tilted by so many mrad; `table_pushed`: the table leans otherwise then.
     - `held` in the air for so many seconds, and not laid down; `lifted` by so many degrees while it should rest.
     - `dropped`: biases have jumped; `cable_pulled` for so many seconds; `left` lying for so many; so many times
       `too_fast`.
