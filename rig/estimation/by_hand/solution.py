@@ -19,7 +19,7 @@ from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told
 from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-LOOSE_RAD = 1.5e-3  # faces that repeat no better may be other faces
+LOOSE = 3.0  # times what is stated of hands: faces that repeat no better may be other faces
 ENOUGH = 0.02  # U (k = 2) of the scale, beyond which nothing has been told
 REAL_HANDS = 5e-4  # of the scale: by so much (1 u) recordings of real hands have been seen to disagree with themselves
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
@@ -107,7 +107,7 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
         fault = _too_little(found) or doubted(found)
     except Fault as error:
         fault = error if all(move.tells for move in session.moves) else too_few(session, None)
-    if fault is not None or found.sizes.repeat_rad > LOOSE_RAD:
+    if fault is not None or _looseness(found) > LOOSE:
         other = _another_face(session, told, None if fault is not None else found)
         if (reason := other or fault) is not None:
             raise reason
@@ -206,6 +206,12 @@ def _too_little(found: Fit) -> Fault | None:
     return too_few(found.session, expanded) if expanded.max() > ENOUGH else None
 
 
+def _looseness(found: Fit) -> float:
+    """How many times as large as stated what holds faces and moves together was found to be."""
+    sizes = found.sizes
+    return max(sizes.repeat_rad / STATED.repeat_rad, sizes.of_angle / STATED.of_angle)
+
+
 def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None:
     """That it lay otherwise at first, where with another face all is well."""
     if session.acceleration is not None or told.first_face is None:
@@ -215,7 +221,7 @@ def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None
             found = fit(session, replace(told, first_face=face))
         except Fault:
             continue
-        better = but is None or found.sizes.repeat_rad < but.sizes.repeat_rad / 2
+        better = but is None or _looseness(found) < _looseness(but) / 2
         if better and _too_little(found) is None and doubted(found) is None:
             return Fault(
                 "wrong_face",
