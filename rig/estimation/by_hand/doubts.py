@@ -16,6 +16,7 @@ from rig.estimation.by_hand.session import LARGEST
 
 A_ROW = 4.0  # of chi square: what leaves out more has to explain more
 BY_MUCH = 16.0  # of chi square beyond that: 1 in 10^5
+NEARLY = 0.99  # of the largest size
 JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
 AT_ONCE = 8.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
 
@@ -117,16 +118,22 @@ def named(fit: Fit, doubt: Doubt) -> Fault:
 
 def _beyond(fit: Fit) -> Fault | None:
     """Something was found to be larger than a hand, or a sensor, makes it."""
-    said = {
-        "repeat_rad": ("not_flat", "the faces do not lie as they lay before, by {:.1f} mrad", 1e3),
-        "closure_rad": ("turn_not_closed", "the turns end otherwise than they began, by {:.0f} mrad", 1e3),
-        "of_angle": ("lost_in_move", "the moves contradict each other by {:.2f} % of their angles", 1e2),
-        "walk_rad_s_sqrt_s": ("bias_jumped", "the bias goes by {:.1g} rad/s within a second", 1.0),
-        "acceleration_m_s2": ("not_flat", "the accelerometer contradicts the faces by {:.2f} m/s²", 1.0),
-    }
-    for name, (error, words, unit) in said.items():
-        if (size := getattr(fit.sizes, name)) >= 0.99 * getattr(LARGEST, name):
-            return Fault(error, words.format(unit * size) + " or more", _REMEDY)
+    sizes = fit.sizes
+    if sizes.repeat_rad >= NEARLY * LARGEST.repeat_rad:
+        what = f"the faces do not lie as they lay before, by {1e3 * sizes.repeat_rad:.1f} mrad or more"
+        return Fault("not_flat", what, _REMEDY)
+    if sizes.acceleration_m_s2 >= NEARLY * LARGEST.acceleration_m_s2:
+        what = f"the accelerometer contradicts the faces by {sizes.acceleration_m_s2:.2f} m/s² or more"
+        return Fault("not_flat", what, _REMEDY)
+    if sizes.closure_rad >= NEARLY * LARGEST.closure_rad:
+        what = f"the turns do not end where they began, by {1e3 * sizes.closure_rad:.0f} mrad or more"
+        return Fault("turn_not_closed", what, "Turn against a straight edge; or say that there was none: --no-closure")
+    if sizes.of_angle >= NEARLY * LARGEST.of_angle:
+        what = f"the moves contradict each other by {100 * sizes.of_angle:.2f} % of a quarter turn or more"
+        return Fault("lost_in_move", what, _REMEDY)
+    if sizes.walk_rad_s_sqrt_s >= NEARLY * LARGEST.walk_rad_s_sqrt_s:
+        what = f"the bias goes by {sizes.walk_rad_s_sqrt_s:.1g} rad/s within a second"
+        return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
     return None
 
 

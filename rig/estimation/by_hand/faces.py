@@ -1,4 +1,4 @@
-"""On which face the body lay at each rest: the accelerometer reads it, else it follows from the first face."""
+"""The faces on which the body lay: an accelerometer reads them, else they follow from the first one."""
 
 import numpy as np
 
@@ -29,13 +29,13 @@ def faced(session: Handled, told: Told, moved: Moved) -> Faced:
 
 
 def _read(session: Handled) -> Array:
-    """(N, 3) by the accelerometer, whose offset is about what opposite faces leave."""
+    """The verticals in the body (N, 3) as the accelerometer reads them, its offset included."""
     readings = np.array([rest.acceleration_m_s2 for rest in session.rests])
     return np.asarray(readings / np.linalg.norm(readings, axis=1)[:, None], dtype=np.float64)
 
 
 def _followed(told: Told, moved: Moved, session: Handled) -> Array:
-    """(N, 3) by dead reckoning; each face that is reached is taken for where it should be."""
+    """The verticals (N, 3) by dead reckoning; each face that is reached is taken for where it should be."""
     if told.first_face is None:
         raise Refused(
             "first_face_not_told",

@@ -281,6 +281,6 @@ def _vector(matrix: Array) -> Array:
 
 
 def _skew(vector: Array) -> Array:
-    """(3, 3) that takes δ to vector × δ."""
+    """The matrix (3, 3) that takes δ to vector × δ."""
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -79,7 +79,7 @@ def _inside(time_s: Array, start_s: float, end_s: float) -> slice:
 
 
 def _vertical(attitudes: Array, up: Array) -> Array:
-    """(m, 3) in the body along attitudes (m, 3, 3), where it is `up` (3,) at the first of them."""
+    """The vertical (m, 3) in the body along attitudes (m, 3, 3), where it is `up` (3,) at the first of them."""
     return np.asarray((np.swapaxes(attitudes, -1, -2) @ (attitudes[0] @ up)[:, None])[..., 0], dtype=np.float64)
 
 

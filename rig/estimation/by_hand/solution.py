@@ -83,12 +83,12 @@ class HandSolution:
 
     @property
     def bias_rad_s(self) -> Array:
-        """(3,) as g = K (m + b) has it, at the last rest."""
+        """Biases (3,) as g = K (m + b) has them, at the last rest."""
         return self.turned.bias_rad_s
 
     @property
     def covariance(self) -> Array:
-        """(6, 6) of scale and bias, by this session and its clock."""
+        """The covariance (6, 6) of scale and bias, by this session and its clock."""
         return self.turned.covariance
 
 
@@ -213,7 +213,7 @@ def _looseness(found: Fit) -> float:
 
 
 def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None:
-    """That it lay otherwise at first, where with another face all is well."""
+    """The Fault that the body lay otherwise at first, where with another face all is well."""
     if session.acceleration is not None or told.first_face is None:
         return None
     for face in (each for each in FACES if each != told.first_face):

@@ -80,7 +80,7 @@ def course_of(start: Array, time_s: Array, rates: Array, habits: Habits, knock_m
 
 
 def integrated(time_s: Array, rates: Array) -> Array:
-    """(n, 3, 3) by rates (n, 3) that are linear between times (n,), to the third order of a step."""
+    """Attitudes (n, 3, 3) by rates (n, 3) that are linear between times (n,), to the third order of a step."""
     step = np.diff(time_s)[:, None]
     vectors = 0.5 * step * (rates[1:] + rates[:-1]) + step**2 / 12 * np.cross(rates[:-1], rates[1:])
     return running(vectors)

@@ -35,7 +35,7 @@ def running(steps: Array) -> Array:
 
 
 def shortest(start: Array, end: Array) -> Array:
-    """(3, 3) that takes the unit vector `start` to `end`, about the axis at right angles to both."""
+    """The rotation (3, 3) that takes the unit vector `start` to `end`, about the axis at right angles to both."""
     axis = np.cross(start, end)
     if (size := float(np.linalg.norm(axis))) < 1e-3:
         if start @ end > 0:
