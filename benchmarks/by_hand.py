@@ -74,8 +74,8 @@ def main(sessions: int) -> None:
         name: [float(np.sqrt(np.mean(np.square(part)))) for part in zip(*each, strict=True)]
         for name, each in errors.items()
     }
-    for name, (scale, off) in rms.items():
-        print(f"{name:30} scale {scale:.2e}, off-diagonals {off:.2e}")
+    for name, (scale, beside) in rms.items():
+        print(f"{name:30} scale {scale:.2e}, off-diagonals {beside:.2e}")
     theirs, ours = rms.values()
     print(f"better by {theirs[0] / ours[0]:.1f} in scale, {theirs[1] / ours[1]:.1f} in the off-diagonals")
 
