@@ -90,7 +90,7 @@ class Sizes:
     closure_rad: float = 3e-3
     of_angle: float = 1e-4
     walk_rad_s_sqrt_s: float = 5e-6
-    acceleration_m_s2: float = 0.003
+    acceleration_m_s2: float = 0.002
 
 
 STATED = Sizes()
