@@ -32,7 +32,7 @@ MISTAKES = {
     "skipped": (5, None, set()),
     "crumb": (5, None, {"not_flat"}),
     "table_pushed": (5, None, {"table_moved"}),
-    "held": (5, None, set()),
+    "held": (5, None, {"held_not_laid_down", "not_flat"}),
     "dropped": (5, None, {"bias_jumped"}),
     "cable_pulled": (5, None, set()),
     "left": (5, None, set()),
@@ -51,7 +51,7 @@ def refused(recorded: Recorded, *, level: bool = True, told: Told = TOLD) -> str
         found = solved(recorded, level=level, told=told)
     except RigError as error:
         return error.problem.name
-    assert (np.abs(found.scale - recorded.truth[:3]) < 1.5 * found.expanded_scale).all()
+    assert (np.abs(found.scale - recorded.truth[:3]) < found.budget.expanded[:3]).all()
     return None
 
 
@@ -87,7 +87,7 @@ def test_uncertainties_are_those_of_many_sessions(
 ) -> None:
     actions, part, level, largest = session
     both = []
-    for seed in range(200 if thorough else 8):
+    for seed in range(200 if thorough else 3):
         recorded = handle(actions, seed, part)
         both.append(compared(solved(recorded, level=level), recorded))
     errors, over = (np.array(each) for each in zip(*both, strict=True))
@@ -97,10 +97,10 @@ def test_uncertainties_are_those_of_many_sessions(
         rms, ratio = (float(np.sqrt(np.mean(each[:, columns] ** 2))) for each in (errors, over))
         within = float(np.mean(np.abs(over[:, columns]) < 2))
         print(f"{name}: RMS {rms:.2e}, over u {ratio:.2f}, {100 * within:.1f} % within U")
-        assert rms < limit * (1.0 if thorough else 1.3)
+        assert rms < limit * (1.0 if thorough else 1.5)
         if name == "scale":
-            assert (0.6 if thorough else 0.3) < ratio < (1.2 if thorough else 1.5)
-        assert within > (0.93 if thorough else 0.85)
+            assert (0.6 if thorough else 0.2) < ratio < (1.2 if thorough else 1.6)
+        assert within > (0.93 if thorough else 0.77)
 
 
 @pytest.mark.proof
