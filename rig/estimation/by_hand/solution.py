@@ -102,15 +102,17 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
     if len(session.rests) < 2:
         raise too_few(session, None)
     check_axes(session)
+    found: Fit | None = None
     try:
         found = fit(session, told)
         fault = _too_little(found) or doubted(found)
     except Fault as error:
         fault = error if all(move.tells for move in session.moves) else too_few(session, None)
-    if fault is not None or _looseness(found) > LOOSE:
+    other = None
+    if found is None or _looseness(found) > LOOSE:
         other = _another_face(session, told, None if fault is not None else found)
-        if (reason := other or fault) is not None:
-            raise reason
+    if (reason := other or fault) is not None or found is None:
+        raise reason or too_few(session, None)
     refusals.check_unit(scale_of(found.state.matrix))
     refusals.check_handedness(found.state.matrix)
     return solution_of(found)
