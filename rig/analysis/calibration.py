@@ -18,6 +18,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, budget
+from rig.estimation.by_hand import HandSolution
 from rig.estimation.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import TurnedSolution
@@ -45,7 +46,8 @@ class SensorResult:
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
     each recording that took part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is what
-    the sensor found of the Earth's rate, or the Fault for which it did not, None where it was not to.
+    the sensor found of the Earth's rate, or the Fault for which it did not, None where it was not to. `by_hand`
+    is there where a hand turned it.
     """
 
     sensor: RecordedSensor | Item
@@ -60,6 +62,7 @@ class SensorResult:
     time_bases: tuple[TimeBase, ...]
     corrected_by: Correction
     earth: EarthRate | Fault | None = None
+    by_hand: HandSolution | None = None
 
     @property
     def serial_number(self) -> str:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
+from rig.analysis.by_hand import solved_by_hand
 from rig.analysis.calibration import SensorResult, or_fault, solve_observations, solve_six_observation, solve_vector
 from rig.analysis.check import Check
 from rig.analysis.correction import diagonal_correction, matrix_correction
@@ -66,6 +67,8 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     Raises Refused `unknown_estimator`; Fault as the observers do, and where no quantity has a solution what the
     estimator does, or of several `nothing_solved` with every reason.
     """
+    if read.tells == "turns":
+        return _by_hand(read, estimator)
     found = _by_sweeps(read, estimator) if read.tells == "sweeps" else _by_attitudes(read, settings, estimator)
     if found.gyroscope is None and not found.at_rest and not found.of_kinds:
         raise _nothing_solved(found.unsolved)
@@ -85,6 +88,12 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
         if (error := result.solution.attitude_error) is not None:
             at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements tell it badly
             yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
+
+
+def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
+    if name not in (None, "by_hand"):
+        estimator_among(("by_hand",), str(name))
+    return OfSensor(read.item, solved_by_hand(read.item, _samples(read), read.motion), None, {}, {})
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:

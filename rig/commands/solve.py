@@ -13,17 +13,23 @@ from rig.station.plain_text import say, say_on_terminal
 def add(solve: ArgumentParser) -> None:
     """The arguments of `rig solve`."""
     solve.add_argument(
-        "run", type=Path, metavar="RUN", help="a run folder or its run.h5; with --sweeps or --attitudes, samples as CSV"
+        "run",
+        type=Path,
+        metavar="RUN",
+        help="a run folder or its run.h5; with --sweeps, --attitudes or --turns, samples as CSV",
     )
     elsewhere = solve.add_mutually_exclusive_group()
     elsewhere.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
     elsewhere.add_argument("--attitudes", type=Path, metavar="CSV", help="the attitudes, for samples recorded in them")
+    elsewhere.add_argument(
+        "--turns", action="store_true", help="samples of a sensor that a hand turned on a table: they tell the motion"
+    )
     solve.add_argument(
         "--estimator",
         metavar="NAME",
         help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published; with --sweeps increments "
         "too (default for turns from rest to rest); with --attitudes increments (gyroscope), attitude_weighted, "
-        "maximum_likelihood, or as_published",
+        "maximum_likelihood, or as_published; none other with --turns",
     )
     judge = "judge by another threshold or limit than was recorded, for example observation.max_lost_fraction=0.01"
     add_set(solve, judge, metavar="NAME=VALUE")
@@ -41,7 +47,7 @@ def run(options: Namespace) -> int:
 
     Of a recording nothing is written. Raises Refused `bad_option`, `unknown_setting`, and as each of them.
     """
-    if options.sweeps is None and options.attitudes is None:
+    if options.sweeps is None and options.attitudes is None and not options.turns:
         if options.out is not None:
             raise Refused("bad_option", "--out is for samples with their motion", "Use rig report RUN --out DIR")
         if options.columns is not None:

@@ -1,4 +1,4 @@
-"""`rig solve SAMPLES.csv --sweeps|--attitudes FILE`: readings made elsewhere go the way of a run."""
+"""`rig solve SAMPLES.csv --sweeps|--attitudes FILE` or `--turns`: readings made elsewhere go the way of a run."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rig.analysis.outcome import Outcome
     from rig.commands.remember import Beside
     from rig.config.column_map import ColumnMap
+    from rig.data.motion_file import Columns
     from rig.data.run_file import RunData
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -22,12 +23,12 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 def add(solve: ArgumentParser) -> None:
     """The arguments of readings that were made elsewhere."""
-    group = solve.add_argument_group("with --sweeps or --attitudes")
+    group = solve.add_argument_group("with --sweeps, --attitudes or --turns")
     group.add_argument(
         "--columns",
         type=Path,
         metavar="YAML",
-        help="what stands where in the two files, where their columns have names and units of their own",
+        help="what stands where in the files, where their columns have names and units of their own",
     )
     group.add_argument("--out", type=Path, metavar="DIR", help="a new run folder for result, certificate, pictures")
     add_history(group)
@@ -39,6 +40,20 @@ def add(solve: ArgumentParser) -> None:
         type=datetime.fromisoformat,
         metavar="TIME",
         help="when the readings were made (2026-11-25T08:30, UTC); left out, when their file was last written",
+    )
+    hand = solve.add_argument_group("with --turns")
+    hand.add_argument(
+        "--clock-ppm",
+        type=float,
+        metavar="PPM",
+        help="how far the time stamps may be off (20 to 50 of a crystal); needed, for no reading shows it",
+    )
+    hand.add_argument(
+        "--box-deg", type=float, default=0.2, metavar="DEG", help="how far the faces are out of square (default: 0.2)"
+    )
+    hand.add_argument("--no-closure", action="store_true", help="turns on a face were not against a straight edge")
+    hand.add_argument(
+        "--first-face", choices=AXES, help="which axis pointed upwards at first; needed without an accelerometer"
     )
     place = solve.add_argument_group("with --attitudes")
     place.add_argument(
@@ -122,10 +137,15 @@ def _recording(options: Namespace) -> "RunData":
     recorded: datetime | None = options.recorded
     if recorded is not None and recorded.tzinfo is None:
         recorded = recorded.replace(tzinfo=UTC)
-    by_sweeps = options.sweeps is not None
-    motion: Path = options.sweeps if by_sweeps else options.attitudes
+    named = _columns(options.columns)
+    if options.turns:
+        files = Files(options.run, _told_of_turns(options), "turns", told, recorded, named)
+    elif options.sweeps is not None:
+        files = Files(options.run, options.sweeps, "sweeps", told, recorded, named)
+    else:
+        files = Files(options.run, options.attitudes, "attitudes", told, recorded, named)
     return recorded_in_files(
-        Files(options.run, motion, "sweeps" if by_sweeps else "attitudes", told, recorded, _columns(options.columns)),
+        files,
         Site(
             up=(x, y, z),
             gravity_m_s2=options.gravity_m_s2,
@@ -150,6 +170,35 @@ def _columns(path: Path | None) -> "ColumnMap":
     from rig.config.load import load_as
 
     return ColumnMap() if path is None else load_as(ColumnMap, path)
+
+
+def _told_of_turns(options: Namespace) -> "Columns":
+    """What the options say of a session by hand, as a table's row. Raises Refused `bad_option`, `clock_unknown`."""
+    import numpy as np
+
+    from rig.estimation.by_hand.session import FACES
+
+    if options.clock_ppm is None:
+        raise Refused(
+            "clock_unknown",
+            "nothing in the readings shows how far their time stamps are off, and the scale factors are off by as much",
+            "Say it: --clock-ppm 50 for a crystal; a part's own data rate is some per cent off, and is no clock",
+        )
+    for name, largest in (("clock_ppm", 1e5), ("box_deg", 10.0)):
+        if not 0 < getattr(options, name) <= largest:
+            option = f"--{name.replace('_', '-')}"
+            raise Refused(
+                "bad_option", f"{option} is {getattr(options, name):g}", f"Give more than 0, {largest:g} at most"
+            )
+    told = {
+        "clock_ppm": options.clock_ppm,
+        "box_rad": np.radians(options.box_deg),
+        "closure": 0.0 if options.no_closure else 1.0,
+        "gravity_m_s2": options.gravity_m_s2,
+    }
+    if options.first_face is not None:
+        told["first_face"] = FACES.index(options.first_face)
+    return {name: np.array([value], dtype=np.float64) for name, value in told.items()}
 
 
 def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[Beside, ...]":

@@ -15,7 +15,7 @@ from rig.data.installed_kinds import measured, quantities
 from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 
-Told = Literal["sweeps", "attitudes"]
+Told = Literal["sweeps", "attitudes", "turns"]
 Columns = Mapping[str, NDArray[np.float64]]
 
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
@@ -64,6 +64,9 @@ MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
             (),
             (("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"), ("attitude_std_rad",)),
         ),
+        "turns": Header(
+            ("clock_ppm", "box_rad", "closure", "gravity_m_s2"), (), (("first_face",),)
+        ),  # one row, no file
     }
 )
 
@@ -89,7 +92,10 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class ReadElsewhere:
-    """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes that tell its `motion`, by column."""
+    """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes that tell its `motion`, by column.
+
+    Of "turns" by hand the readings tell it: then there is one row, of what somebody said beside.
+    """
 
     item: Item
     readings: Columns

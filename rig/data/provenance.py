@@ -83,7 +83,7 @@ def calls_itself_simulated(software: str) -> bool:
     return software.endswith(SIMULATED)
 
 
-def provenance_of_files(readings: FileEntry, motion: FileEntry, item: Item, began: datetime) -> Provenance:
+def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, began: datetime) -> Provenance:
     """Provenance of an item's readings recorded elsewhere, which `began` then: no arm and no board is known."""
     return Provenance(
         started_utc=began.astimezone(UTC).isoformat(timespec="seconds"),

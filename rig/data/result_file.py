@@ -18,6 +18,7 @@ from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.hand_entries import ByHandEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.meaning import Meaning, meaning_by_name
 from rig.data.result_types import (
@@ -284,7 +285,8 @@ class SensorEntry(Entry):
     - `earth_rate` is there where it was to be found, or says why it was not.
     - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
     - `in_attitudes` is there where a file told the attitudes, and no arm turned it; what nobody told, as its range and
-      its temperature, is null then. `turned` is there where sweeps of a file were solved by how far the body turned.
+      its temperature, is null then. `turned` is there where sweeps of a file were solved by how far the body turned,
+      `by_hand` where a hand turned it on a table.
     """
 
     part: str
@@ -324,6 +326,7 @@ class SensorEntry(Entry):
     told_from: tuple[ToldFromEntry, ...] = ()
     in_attitudes: InAttitudesRatesEntry | None = None
     turned: TurnedEntry | None = None
+    by_hand: ByHandEntry | None = None
 
 
 class RotationEntry(Entry):

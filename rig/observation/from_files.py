@@ -1,4 +1,4 @@
-"""A recording of readings that were made elsewhere, from a file of them and one that tells their motion."""
+"""A recording of readings that were made elsewhere, from a file of them and, mostly, one of their motion."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -32,10 +32,11 @@ class Files:
     """The two files, and whose readings they hold; `recorded` None is when the readings' file was last written.
 
     `columns` say what stands where, of files that do not name their columns as the rig does.
+    Of "turns" no file tells the motion: `motion` is what somebody said of them, by column.
     """
 
     readings: Path
-    motion: Path
+    motion: Path | Columns
     tells: Told
     item: Item
     recorded: datetime | None = None
@@ -45,7 +46,7 @@ class Files:
 def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False) -> RunData:
     """The recording. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`."""
     told = files.columns
-    needed = [RATE] if files.tells == "sweeps" else ()
+    needed = () if files.tells == "attitudes" else [RATE]
     samples = read_samples(files.readings, needed, _mapped(told.samples, told.samples_skip_lines))
     columns = {"time_s": samples.time_s} | {
         name: readings[:, i]
@@ -70,7 +71,9 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             reckoning=RECKONING,
             elsewhere=asked,
         ),
-        provenance=provenance_of_files(_named(files.readings), _named(files.motion), files.item, began),
+        provenance=provenance_of_files(
+            _named(files.readings), _named(files.motion) if isinstance(files.motion, Path) else None, files.item, began
+        ),
         sensors={files.item.name: read_elsewhere.sensor},
         samples={files.item.name: read_elsewhere.samples},
         turner=None,
@@ -81,8 +84,10 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
 
 
 def _motion(files: Files) -> Columns:
-    """The columns of sweeps or attitudes. Raises Refused as they do, and `bad_option` for a table's log of sweeps."""
+    """What is told of the motion, by column. Raises Refused as the readers do, and `bad_option` for a table's log of sweeps."""
     told = files.columns
+    if not isinstance(files.motion, Path):
+        return files.motion
     if told.table is not None:
         if files.tells == "sweeps":
             raise Refused("bad_option", "the columns are those of a table's log", "Give that log with --attitudes")

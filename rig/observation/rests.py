@@ -21,11 +21,15 @@ from rig.observation.windows import Window
 BLOCK_S, FEWEST = 0.25, 5  # samples of a block
 QUIETEST, AS_QUIET = 0.1, 3.0  # share of the blocks that tell the noise; times as much is at rest as well
 COUNTS = 0.2  # of what is steady: so much may always scatter, where the noise is below the resolution
+FIRST = 4  # blocks of the first second
 GAP = 2.5  # intervals
 
 
-def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Window, ...]:
-    """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,)."""
+def find_rests(time_s: Array, readings: Mapping[Quantity, Array], still_at_first: bool = False) -> tuple[Window, ...]:
+    """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,).
+
+    `still_at_first`: the body was as still in the first second as it ever is meant to be.
+    """
     quantity = next(each for each in quantities().values() if each in readings)
     interval_s = float(np.median(np.diff(time_s)))
     width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s)))
@@ -36,6 +40,8 @@ def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Windo
     blocks = readings[quantity][: count * width].reshape(count, width, -1)
     means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
     noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), COUNTS * quantity.steady)
+    if still_at_first:
+        noise = np.maximum(noise, np.median(scatter[:FIRST], axis=0))
     apart = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
     still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= GAP * interval_s)
     if quantity == RATE and still.any():

@@ -31,6 +31,7 @@ from rig.observation.average import Average
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import counted, entry
+from rig.report.hand_entry import by_hand_entry
 
 
 def sensor_entry(
@@ -57,6 +58,7 @@ def sensor_entry(
         vector_model=_vector_or_error(result),
         six_observation=entry_or_error(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
+        by_hand=None if result.by_hand is None else by_hand_entry(result.by_hand),
         **({} if agreed is None else {"board": _board(agreed)}),
         **_uncertain(result),
         **more,

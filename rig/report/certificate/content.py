@@ -85,7 +85,18 @@ class Certificate:
     @property
     def elsewhere(self) -> bool:
         """Whether the readings were recorded elsewhere, and a file tells the motion."""
-        return self.provenance.motion_file is not None
+        return self.provenance.readings_file is not None
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether a hand turned the items on a table."""
+        return any(each.sensor.by_hand is not None for each in self.gyroscopes)
+
+    @property
+    def levelled(self) -> bool:
+        """Whether an accelerometer told the faces on which a hand laid them."""
+        found = (each.sensor.by_hand for each in self.gyroscopes)
+        return any(size.name == "acceleration_m_s2" for each in found if each is not None for size in each.sizes)
 
     @property
     def turns(self) -> str:
@@ -106,6 +117,8 @@ class Certificate:
     def arm(self) -> str:
         """What turned the items, by what was found of it."""
         found = self.provenance
+        if found.readings_file is not None and found.motion_file is None:
+            return "a hand, which turned the items on a table"
         if found.motion_file is not None:
             return f"whatever the file {_named(found.motion_file)} tells the motion of"
         if found.arm_model is None and found.turner_kind is None:

@@ -225,6 +225,8 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
 
 
 def _method(c: Certificate) -> str:
+    if c.by_hand:
+        return "by hand: turned on a flat table between rests"
     if c.elsewhere:
         return "readings recorded elsewhere, of a motion that a file tells"
     return c.words.briefly.format(turns=c.turns)

@@ -19,6 +19,7 @@ from rig.report.certificate import dcc_results
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.elsewhere_entries import rates_in_attitudes, turned
 from rig.report.expanded import flat
+from rig.report.hand_entry import by_hand_lines
 from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
 from rig.report.kinds.triad import item_words, shown_of, tables, unsolved_lines
@@ -116,12 +117,14 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
     yield from told_lines(sensor.told_from)
     yield from _in_attitudes(sensor.in_attitudes, sensor.time_bases)
     yield from _turned(sensor)
+    if sensor.by_hand is not None:
+        yield from by_hand_lines(sensor.by_hand)
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
     scale, bias = f".{decimals(std[:3])}f", f"+.{decimals(std[3:])}f"
     others = {"vector_model": vector, "six_observation": sensor.six_observation, "algorithm_1": sensor.algorithm_1}
-    for name, other in others.items() if sensor.in_attitudes is None else ():
+    for name, other in others.items() if sensor.in_attitudes is None and sensor.by_hand is None else ():
         if isinstance(other, ErrorEntry):
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
@@ -155,7 +158,7 @@ def _differs(sensor: SensorEntry, other: EstimateEntry | VectorEntry) -> Iterato
 def _turned(sensor: SensorEntry) -> Iterator[str]:
     """How sweeps of a file were read, and what was taken as known of them."""
     if (found := sensor.turned) is None:
-        if sensor.range_rad_s is None and sensor.in_attitudes is None:
+        if sensor.range_rad_s is None and sensor.in_attitudes is None and sensor.by_hand is None:
             yield "the axes of the sweeps are taken as given: an error of theirs is an error of F across its rows"
         return
     rows, sweeps = ", ".join(map(str, found.rows)), len(sensor.observations)

@@ -1,0 +1,140 @@
+"""What of a session contradicts all the rest of it, by name.
+
+Each doubt is that some factors are not what they were taken for: they are left out, and what is left is compared. The
+doubt after which least is left is the one that is named.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.by_hand.fit import Fit, solved
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
+from rig.estimation.by_hand.session import LARGEST
+
+A_ROW = 4.0  # of chi square: what leaves out more has to explain more
+BY_MUCH = 16.0  # of chi square beyond that: 1 in 10^5
+NEARLY = 0.99  # of the largest size
+JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
+AT_ONCE = 8.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A doubt about a rest or move, and by how much less is left without what is doubted."""
+
+    name: str
+    at: int
+    less: float
+
+
+def doubted(fit: Fit, since: int | None = None) -> Fault | None:
+    """What is wrong with a session, or with what came `since` a rest; None where nothing is."""
+    told = tuple(_doubts(fit, since))
+    worst = max(told, key=lambda each: each.less, default=None)
+    if worst is not None and worst.less > (BY_MUCH if since is None else AT_ONCE):
+        return named(fit, worst)
+    return None if since is not None else _beyond(fit)
+
+
+def _doubts(fit: Fit, since: int | None) -> Iterator[Doubt]:
+    rows, count = fit.factors, len(fit.session.rests)
+    first = 0 if since is None else since
+    for at in range(max(first - 1, 0), count - 1):
+        yield _doubt(fit, "turn_not_closed", at, [row for row in rows if not _is(row, at, CLOSURE, LEANING)])
+        yield _doubt(fit, "lost_in_move", at, [row for row in rows if not _is(row, at, MOVE, CLOSURE, LEANING)])
+        if np.abs(np.subtract(*(fit.session.rests[at + each].mean_rad_s for each in (1, 0)))).max() > JUMP_RAD_S:
+            yield _doubt(fit, "bias_jumped", at, [row for row in rows if not _is(row, at, WALK)])
+    faces = fit.faced.faces
+    for at in (at for at in range(first, count) if faces[at] is not None):
+        yield _doubt(fit, "not_flat", at, [row for row in rows if not _is(row, at, FLAT, ACCELERATION)])
+    level = fit.session.acceleration is not None
+    for at in (at for at in range(max(first, 1), count) if level and faces[at] is not None):
+        yield _doubt(fit, "table_moved", at, [_after(row, at) for row in rows])
+
+
+def _is(row: Factor, at: int, *kinds: str) -> bool:
+    return row.at == at and row.kind in kinds
+
+
+def _after(row: Factor, at: int) -> Factor:
+    """The row with two columns more: how the table leans from rest `at` on."""
+    other = row.design[:, TABLE] if row.kind == ACCELERATION and row.at >= at else np.zeros((len(row.design), 2))
+    return replace(row, design=np.hstack([row.design, other]))
+
+
+def _doubt(fit: Fit, name: str, at: int, rows: list[Factor]) -> Doubt:
+    if len(rows) == len(fit.factors) and name != "table_moved":
+        return Doubt(name, at, 0.0)
+    try:
+        step, _ = solved(rows)
+    except np.linalg.LinAlgError:
+        return Doubt(name, at, 0.0)
+    remaining = sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
+    before = sum(float(np.sum((row.missed / row.std) ** 2)) for row in fit.factors)
+    freed = (
+        2
+        if name == "table_moved"
+        else sum(len(row.missed) for row in fit.factors) - sum(len(row.missed) for row in rows)
+    )
+    return Doubt(name, at, before - remaining - A_ROW * freed)
+
+
+def named(fit: Fit, doubt: Doubt) -> Fault:
+    rests, moves = fit.session.rests, fit.session.moves
+    at_s = rests[doubt.at].start_s
+    if doubt.name == "turn_not_closed":
+        move = moves[doubt.at]
+        missed = float(next(row for row in fit.factors if _is(row, doubt.at, CLOSURE)).missed[0])
+        return Fault(
+            "turn_not_closed",
+            f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(missed)):.1f}° from where "
+            "it began",
+            "Turn against a straight edge, so that it ends where it began; or say that there was none: --no-closure",
+        )
+    if doubt.name == "lost_in_move":
+        move = moves[doubt.at]
+        return Fault(
+            "lost_in_move",
+            f"what the gyroscope read from {move.start_s:.1f} to {move.end_s:.1f} s is not how the body turned",
+            "See that no reading is lost, and that time stamps are those of the readings; make the move again",
+        )
+    if doubt.name == "bias_jumped":
+        return Fault(
+            "bias_jumped",
+            f"the gyroscope's bias was another after the move that ended at {rests[doubt.at + 1].start_s:.1f} s",
+            "Handle it gently: a fall or a knock does that; begin anew",
+        )
+    if doubt.name == "table_moved":
+        return Fault("table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin anew, and leave it alone")
+    return Fault(
+        "not_flat",
+        f"at {at_s:.1f} s the body did not lie flat on its face, as it does at the other rests",
+        "Look for what lies under it, and lay it down again",
+    )
+
+
+def _beyond(fit: Fit) -> Fault | None:
+    """Something was found to be larger than a hand, or a sensor, makes it."""
+    sizes = fit.sizes
+    if sizes.repeat_rad >= NEARLY * LARGEST.repeat_rad:
+        what = f"the faces do not lie as they lay before, by {1e3 * sizes.repeat_rad:.1f} mrad or more"
+        return Fault("not_flat", what, _REMEDY)
+    if sizes.acceleration_m_s2 >= NEARLY * LARGEST.acceleration_m_s2:
+        what = f"the accelerometer contradicts the faces by {sizes.acceleration_m_s2:.2f} m/s² or more"
+        return Fault("not_flat", what, _REMEDY)
+    if sizes.closure_rad >= NEARLY * LARGEST.closure_rad:
+        what = f"the turns do not end where they began, by {1e3 * sizes.closure_rad:.0f} mrad or more"
+        return Fault("turn_not_closed", what, "Turn against a straight edge; or say that there was none: --no-closure")
+    if sizes.of_angle >= NEARLY * LARGEST.of_angle:
+        what = f"the moves contradict each other by {100 * sizes.of_angle:.2f} % of a quarter turn or more"
+        return Fault("lost_in_move", what, _REMEDY)
+    if sizes.walk_rad_s_sqrt_s >= NEARLY * LARGEST.walk_rad_s_sqrt_s:
+        what = f"the bias goes by {sizes.walk_rad_s_sqrt_s:.1g} rad/s within a second"
+        return Fault("bias_jumped", what, "Let it warm up, and handle it gently")
+    return None
+
+
+_REMEDY = "Lay it down on a flat table, each time on the whole of a face, and see that no reading is lost"
