@@ -5,12 +5,21 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.events import BoardNotObserved, BoardObserved
+from rig.data.hand_events import (
+    HandAsked,
+    HandBegunAnew,
+    HandMoveRefused,
+    HandMoveTaken,
+    HandRested,
+    HandRestRefused,
+)
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
+from rig.page import by_hand
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
 from rig.page.history import History, rounded
@@ -28,6 +37,7 @@ from rig.station.events import (
     Crashed,
     DocumentWritten,
     Failed,
+    HandSeen,
     Interrupted,
     ObservationMade,
     PhaseRecorded,
@@ -60,6 +70,7 @@ class Shown:
             "arm": {**geometry(NOMINAL), **about.arm},
             "sensors": [],
             "prompt": None,
+            "hand": None,
             "observations": [],
             "parameters": [],
             "checks": [],
@@ -102,10 +113,24 @@ class Shown:
                 self._fresh = False
             case Progress():
                 self.put("step", _progress(event))
+            case HandAsked() | HandRested() | HandMoveTaken() | HandMoveRefused() | HandRestRefused() | HandBegunAnew():
+                self.put("hand", by_hand.told(self.sections["hand"] or {}, event))
+                if isinstance(event, HandAsked):
+                    self._state("by_hand", event.instruction.words)
+                self._said(event)
+            case HandSeen():
+                self.put("hand", {**(self.sections["hand"] or {}), **by_hand.seen(event)})
+                self.put("step", by_hand.step(event))
+                if self._fresh:
+                    self.history.add(event.time_s, self._values)
+                self._fresh = False
             case _:
                 self._told(event)
-                if (text := line(event)) is not None:
-                    self.put("lines", [*self.sections["lines"], text][-LINES:])
+                self._said(event)
+
+    def _said(self, event: RunEvent) -> None:
+        if (text := line(event)) is not None:
+            self.put("lines", [*self.sections["lines"], text][-LINES:])
 
     def look(self, look: Look) -> None:
         """What the recording so far amounts to: each sweep's observation or refusal, and the parameters."""
@@ -145,6 +170,7 @@ class Shown:
                 self._state("ready", "Between two steps")
             case PhaseRecorded(sensors, _):
                 self._samples(sensors)
+                self.put("hand", None)
                 self._state("judging", "Recorded; averaging, solving, judging")
             case BoardObserved(sensor, sweep, speed_rad_s, observation):
                 seen = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
@@ -191,6 +217,7 @@ class Shown:
                 self.put("next", after_fault(folder, repeats=repeats))
         if isinstance(event, ENDINGS):
             self.ended = True
+            self.put("hand", None)
             self.put("prompt", None)
 
     def _state(self, kind: str, text: str) -> None:
