@@ -21,6 +21,7 @@ from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT
 
+LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
 BETWEEN_S = 10.0  # of nothing between two recordings of a session, whose boards' clocks do not tell it
 MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
 
@@ -95,14 +96,15 @@ def _within(part: Rest | Move, spans: Sequence[tuple[float, float]]) -> bool:
 
 
 def _joined(moves: Sequence[Move]) -> Move:
-    """Moves one after the other, with the pauses between them, as one."""
+    """Moves one after the other, with the pauses between them, as one; of a long one nothing is known well enough."""
+    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
     return Move(
         moves[0].start_s,
         moves[-1].end_s,
         max(each.peak_rad_s for each in moves),
         any(each.lost for each in moves),
         any(each.clipped for each in moves),
-        any(each.left_out for each in moves),
+        long or any(each.left_out for each in moves),
     )
 
 

@@ -176,8 +176,10 @@ class HandSession:
         return None if enough else asked_next(self._open, face)
 
     def _take(self, move: Move, now: Progress, face: Face) -> None:
-        """A move counts."""
+        """A move counts, unless too much time passed in it for it to tell anything."""
         self._refused = 0
+        if now.moves[-1].kind == "left out":
+            return
         before, turns = self._lay[-1] if self._lay else face, now.moves[-1].turns
         kind: Literal["flip", "turn"] = "flip" if before != face else "turn"
         self._taken.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
