@@ -41,7 +41,7 @@ def asking(url: str) -> socket.socket:
     return connection
 
 
-def browser(url: str, frames: Synchronized) -> None:
+def browser(url: str, frames: "Synchronized[int]") -> None:
     """A browser that reads all that comes, and counts the frames."""
     connection = asking(url)
     while piece := connection.recv(1 << 16):

@@ -8,8 +8,9 @@ These names are the public ones; where they are made may change. docs/how-to/own
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
-from rig.analysis.analyses import calibrated, drifted, verified, verified_alone
+from rig.analysis.analyses import calibrated, calibrated_by_hand, drifted, verified, verified_alone
 from rig.analysis.outcome import Outcome
+from rig.config.hand_sections import ByHandSection, HandSection
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, TurnerSection
 from rig.config.procedure_sections import (
     AttitudesSection,
@@ -24,6 +25,7 @@ from rig.data.run_file import RunData
 from rig.errors import Refused
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
+from rig.plans.by_hand import plan_by_hand
 from rig.plans.imu import plan_imu
 from rig.plans.registry import Procedure
 from rig.plans.six_sweeps import plan_six_observation
@@ -31,9 +33,10 @@ from rig.plans.static_attitudes import plan_static_attitudes
 from rig.plans.verbs import Verbs
 
 __all__ = [
-    "ArmSection", "AttitudesSection", "BiasDriftSection", "Dwell", "ImuSection", "Joints", "Outcome", "Plan",
-    "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData", "SixObservationSection",
-    "SixSweepsSection", "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection", "Verbs",
-    "VerifySection", "calibrated", "drifted", "plan_imu", "plan_six_observation", "plan_static_attitudes", "run_script",
-    "trapezoid_duration", "travel", "verified", "verified_alone",
+    "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Dwell", "HandSection", "ImuSection",
+    "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
+    "SixObservationSection", "SixSweepsSection", "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection",
+    "Verbs", "VerifySection", "calibrated", "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu",
+    "plan_six_observation", "plan_static_attitudes", "run_script", "trapezoid_duration", "travel", "verified",
+    "verified_alone",
 ]  # fmt: skip

@@ -7,6 +7,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1])]
 
 from axes import home, mounting  # noqa: E402
+from by_hand import by_hand  # noqa: E402
 from choice import choice  # noqa: E402
 from sweep import sweep  # noqa: E402
 from wiring import wirings  # noqa: E402
@@ -20,6 +21,7 @@ def drawings() -> dict[str, str]:
         "home-pose.svg": home(),
         "sweep.svg": sweep(),
         "own-imu.svg": choice(),
+        "by-hand.svg": by_hand(),
     }
     return {name: drawing.text() for name, drawing in all_of_them.items()}
 

@@ -34,6 +34,16 @@ def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Ou
     return judging.drifted(runs, estimator)
 
 
+def calibrated_by_hand(runs: "Sequence[RunData]") -> Outcome:
+    """Solve and judge the recordings of a session by hand, at least one.
+
+    Raises Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` where the board's clock has none.
+    """
+    from rig.analysis import hand_judging
+
+    return hand_judging.calibrated_by_hand(runs)
+
+
 def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
     """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
 

@@ -15,10 +15,9 @@ from rig.data.provenance import calls_itself_simulated
 from rig.data.settings import Uncertainty
 from rig.observation.coloured_noise import widening
 from rig.observation.observed_run import ObservedRun
+from rig.observation.timebase import NOMINAL_DRIFT
 from rig.observation.windows import swept
 
-# The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
-NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
 # A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
 LOCKED, REAL_TIME = 150e-6, 1e-3  # beyond these no comparison was made, before what contradicts was told

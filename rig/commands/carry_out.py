@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured
-from rig.commands.laboratory import hands_of, simulated_laboratory
+from rig.commands.laboratory import SimulatedOperator, hands_of, simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
@@ -51,6 +51,7 @@ def carry_out(
                 if configured.loaded.simulated:
                     control = held.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
                     station.mount = hands_of(control)
+                    station.listeners = (*station.listeners, SimulatedOperator(control))
             outcome = this.carry_out(configured.phase)
             try:
                 entered, beside = remember(folder, configured.loaded.config.history)

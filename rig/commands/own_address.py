@@ -28,12 +28,14 @@ def own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    host = config.turner.address
+    key = f"{_turner_key(laboratory)}.host" if config.turner.address else None
+    host = config.turner.address or _board_host(config)
     with ExitStack() as held:
         own = next((each for each in (host, *_others()) if _take(each, held)), host)
         if own != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
-        yield [] if own == host else [f"{_turner_key(laboratory)}.host={own}", *_moved(config, own)]
+        moved = [] if key is None else [f"{key}={own}"]
+        yield [] if own == host else [*moved, *_moved(config, own)]
 
 
 @contextmanager
@@ -64,6 +66,11 @@ def _take(host: str, held: ExitStack) -> bool:
             return False
         held.push(claims.pop_all())
     return True
+
+
+def _board_host(config: SensorsConfig) -> str:
+    """Where a simulated board answers that no arm turns."""
+    return "" if config.board is None else urlsplit(config.board.port).hostname or ""
 
 
 def _turner_key(text: str) -> str:

@@ -1,5 +1,6 @@
 """`rig plan`: the dry run. Connects to nothing."""
 
+import json
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -7,6 +8,7 @@ from rig.commands.config_arguments import add_config, add_json, add_script
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
+    from rig.config.hand_sections import ByHandSection
     from rig.report.plan_table import Planned
 
 
@@ -23,16 +25,34 @@ def add(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print the plan as `planned` has it; returns 0."""
+    from rig.config.hand_sections import ByHandSection
     from rig.report.plan_profile import profile_csv
     from rig.report.plan_table import print_plan
 
     found = planned(options)
+    if isinstance(found.config.procedure, ByHandSection):
+        _print_by_hand(found.config.procedure, as_json=options.json)
+        return 0
     if options.table:
         for line in profile_csv(found.plan):
             say(line)
     else:
         print_plan(found, as_json=options.json)
     return 0
+
+
+def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
+    """What an operator is asked for, in the order in which it is when nothing comes between."""
+    from rig.plans.by_hand import Wanted, listed
+
+    asked = list(listed(Wanted(section.flips, section.turns)))
+    if as_json:
+        moves = [{"say": each.say, "face": each.face, "turns": each.turns} for each in asked]
+        say(json.dumps({"schema": "rig.by_hand_plan/1", "moves": moves}))
+        return
+    for number, each in enumerate(asked, 1):
+        say(f"{number:2d}  {each.words}")
+    say(f"{len(asked)} moves, {section.rest_s:g} s of rest between them; any order does")
 
 
 def planned(options: Namespace) -> "Planned":

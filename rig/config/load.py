@@ -14,6 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from rig.config.as_written import take_text_as_written
+from rig.config.hand_sections import HandSection
 from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
@@ -24,8 +25,8 @@ from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
-Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for an arm
-ARM = "ur"  # the kind of turner that `arm` is the section of
+Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for what can be simulated
+ARM, HAND = "ur", "hand"  # the kinds of turners that the simulated laboratory knows; `arm` is the section of the first
 TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
 
@@ -205,7 +206,7 @@ def _validate_turner(
         if "arm" not in document:
             return None, ["arm: missing"]
         return _validate(ArmSection, document["arm"], ("arm",), layered)
-    known: dict[str, type[TurnerSection]] = {ARM: ArmSection, **(turners or {})}
+    known: dict[str, type[TurnerSection]] = {ARM: ArmSection, HAND: HandSection, **(turners or {})}
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:
@@ -304,13 +305,16 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
-    if not isinstance(config.turner, ArmSection):
-        yield "world: simulates an arm, and turner says another kind"
+    turner = config.turner
+    if not isinstance(turner, ArmSection | HandSection):
+        yield "world: simulates an arm or a hand, and turner says another kind"
         return
-    host = config.turner.host
+    host = turner.address
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
-    if not _is_loopback(host):
+    if isinstance(turner, HandSection) and config.board is None:
+        yield "board: missing; the simulated hand turns sensors on a board"
+    if isinstance(turner, ArmSection) and not _is_loopback(host):
         yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     for place, port in ports.items():
         if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):

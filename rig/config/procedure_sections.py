@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rig.config.attitude_sets import SETS
+from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
@@ -18,6 +19,7 @@ __all__ = [
     "STOCK_SECTIONS",
     "AttitudesSection",
     "BiasDriftSection",
+    "ByHandSection",
     "ImuSection",
     "ProcedureSection",
     "SixObservationSection",
@@ -354,6 +356,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
         "static_attitudes": StaticAttitudesSection,
         "imu": ImuSection,
         "bias_drift": BiasDriftSection,
+        "by_hand": ByHandSection,
     }
 )
 

@@ -112,7 +112,8 @@ def _turners() -> Iterator[str]:
         "### `turner`",
         "",
         "What turns the sensors, said by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
-        "`arm`; a file has one of the two. A package may bring another kind, which brings its own keys",
+        "`arm`; a file has one of the two. `turner: {kind: hand}` is an operator's hand, and has no keys",
+        "([by hand](how-to/by-hand.md)). A package may bring another kind, which brings its own keys",
         "([another turner](how-to/other-hardware.md)).",
         "",
     )
@@ -154,7 +155,8 @@ def _world() -> Iterator[str]:
     yield from (
         "## The simulated laboratory",
         "",
-        "With a `world:` section a simulated arm, an emulated board and simulated KVH 1775s answer at `arm.host`,",
+        "With a `world:` section a simulated arm, or the hand of a simulated operator (`turner: {kind: hand}`), an",
+        "emulated board and simulated KVH 1775s answer at `arm.host`,",
         "`board.port` and `sensors.<name>.serial.port`. They answer on this computer only: the host must be a loopback",
         "address (127.x.y.z), and a port must be `socket://host:port`. If another simulated laboratory already has",
         "this address, a command takes a free one and says so; only `rig world` never changes the address.",

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.stage_section import StageMountSection
+from rig.config.world_hand import SimulatedHandSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
@@ -405,6 +406,9 @@ class WorldSection(Section):
     )
     site: SiteSection = SiteSection()
     arm: SimulatedArmSection = SimulatedArmSection()
+    hand: SimulatedHandSection = Field(
+        default=SimulatedHandSection(), description="the simulated operator, where a hand turns the item"
+    )
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})

@@ -11,6 +11,15 @@ from typing import Any
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from rig.data.checked import Finite, checked
+from rig.data.hand_events import (
+    HandAsked,
+    HandBegunAnew,
+    HandMoveRefused,
+    HandMoveTaken,
+    HandRested,
+    HandRestRefused,
+    OfTheHand,
+)
 from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
@@ -91,7 +100,8 @@ class BoardSolved:
 
 
 OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
-Event = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished | OfTheBoard
+OfTheArm = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished
+Event = OfTheArm | OfTheBoard | OfTheHand
 
 _KINDS: dict[str, type[Event]] = {
     "sweep_started": SweepStarted,
@@ -104,6 +114,12 @@ _KINDS: dict[str, type[Event]] = {
     "board_not_observed": BoardNotObserved,
     "board_recalled": BoardRecalled,
     "board_solved": BoardSolved,
+    "hand_asked": HandAsked,
+    "hand_rested": HandRested,
+    "hand_move_taken": HandMoveTaken,
+    "hand_move_refused": HandMoveRefused,
+    "hand_rest_refused": HandRestRefused,
+    "hand_begun_anew": HandBegunAnew,
 }
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 

@@ -25,7 +25,7 @@ from rig.motion.geometry import OfJoints
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import SiteSection
-    from rig.config.models import RigConfig
+    from rig.config.models import ProcedureSection, RigConfig
     from rig.motion.steps import Dwell, Plan
 
 SCHEMA = "rig.settings/7"
@@ -166,6 +166,22 @@ class Elsewhere:
 
 
 @dataclass(frozen=True, slots=True)
+class ByHand:
+    """How a session by hand is solved, and what it was to have: so many `flips` and whole `turns`.
+
+    The next move is asked for `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard
+    deviations: of the item's faces from right angles, and of a whole turn's end from its beginning.
+    """
+
+    flips: Annotated[int, Field(ge=0)]
+    turns: Annotated[int, Field(ge=0)]
+    rest_s: Positive
+    box_rad: Positive
+    closure_rad: Positive
+    wanted_scale_u: Positive | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedSweep:
     """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed, how far it turns."""
 
@@ -224,6 +240,7 @@ class RunSettings:
     elsewhere: Elsewhere | None = None
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
+    by_hand: ByHand | None = None
 
     @property
     def mount(self) -> Mounting:
@@ -276,7 +293,7 @@ class RunSettings:
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         steps = self.planned_sweeps, self.planned_dwells
-        return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts
+        return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
     @property
     def holds_all_kinds(self) -> bool:
@@ -310,6 +327,8 @@ class RunSettings:
         document = {**asdict(self), "limits": None if self.limits is None else self.limits.model_dump()}
         if self.elsewhere is None:
             del document["elsewhere"]
+        if self.by_hand is None:
+            del document["by_hand"]
         if not self.mounts:
             del document["mounts"], document["stage"]
         return document
@@ -367,10 +386,26 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         extension_m=config.turner.extension_m,
         reckoning=RECKONING,
         mounts=tuple(stage.mount for stage in plan.stages),
+        by_hand=_by_hand(config.procedure),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
         raise _angle_std_not_stated()
     return settings
+
+
+def _by_hand(section: "ProcedureSection") -> ByHand | None:
+    from rig.config.hand_sections import ByHandSection
+
+    if not isinstance(section, ByHandSection):
+        return None
+    return ByHand(
+        flips=section.flips,
+        turns=section.turns,
+        rest_s=section.rest_s,
+        box_rad=float(np.radians(section.box_deg)),
+        closure_rad=float(np.radians(section.closure_deg)),
+        wanted_scale_u=section.wanted_scale_u,
+    )
 
 
 def _angle_std_not_stated() -> Refused:

@@ -15,6 +15,8 @@ from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import widening
 from rig.observation.known_motion import KnownMotion, check_span, not_finite
 
+# The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
+NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
 MIN_SAMPLES = 100
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
 COARSE_REACH_S = 0.15  # what the clock may be off at either end of the data when the fine fit starts

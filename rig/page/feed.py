@@ -14,7 +14,7 @@ from typing import Any
 
 from rig.page.rows import Look
 from rig.page.shown import Shown
-from rig.station.events import ArmConnected, ArmSeen, RunEvent
+from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent
 
 FRAME_S = 0.1
 SIGN_OF_LIFE_S = 0.8  # without news: a browser that hears nothing for 2 s says so
@@ -37,7 +37,7 @@ class Feed:
         with self._lock:
             before = self._shown.ended
             self._shown.take(event)
-            if isinstance(event, ArmSeen | ArmConnected):
+            if isinstance(event, ArmSeen | ArmConnected | HandSeen):
                 self._seen_s, self._seen_at = time.monotonic(), _clock()
             if self._shown.ended and not before:
                 self._shown.put("ended", {"at": _clock(), "seen_at": self._seen_at})

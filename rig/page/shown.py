@@ -6,12 +6,21 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.events import BoardNotObserved, BoardObserved
+from rig.data.hand_events import (
+    HandAsked,
+    HandBegunAnew,
+    HandMoveRefused,
+    HandMoveTaken,
+    HandRested,
+    HandRestRefused,
+)
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Dwell, Rest, Step, Sweep
+from rig.page import by_hand
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
 from rig.page.history import History, rounded
@@ -30,6 +39,7 @@ from rig.station.events import (
     Crashed,
     DocumentWritten,
     Failed,
+    HandSeen,
     Interrupted,
     ObservationMade,
     PhaseRecorded,
@@ -66,6 +76,7 @@ class Shown:
             "arm": {**geometry(NOMINAL), **about.arm},
             "sensors": [],
             "prompt": None,
+            "hand": None,
             "observations": [],
             "parameters": [],
             "checks": [],
@@ -85,7 +96,7 @@ class Shown:
         self._modes: dict[str, str] = {}
         self._samples: tuple[SensorSamples, ...] = ()
         self._fresh = False  # the samples are newer than the arm's state
-        self._newest: dict[type, SamplesTaken | ArmSeen | Progress] = {}  # not in the sections yet
+        self._newest: dict[type, SamplesTaken | ArmSeen | Progress | HandSeen] = {}  # not in the sections yet
         self._seen: dict[tuple[str, int], dict[str, Any]] = {}
         self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
@@ -103,6 +114,9 @@ class Shown:
                     self.put("arm", {**self._sections["arm"], **stance(state), "missed": missed_states})
                 case Progress():
                     self.put("step", _progress(event))
+                case HandSeen():
+                    self.put("hand", {**(self._sections["hand"] or {}), **by_hand.seen(event)})
+                    self.put("step", by_hand.step(event))
         self._newest.clear()
         return self._sections
 
@@ -132,10 +146,23 @@ class Shown:
                 self._fresh = False
             case Progress():
                 self._newest[Progress] = event
+            case HandAsked() | HandRested() | HandMoveTaken() | HandMoveRefused() | HandRestRefused() | HandBegunAnew():
+                self.put("hand", by_hand.told(self.sections["hand"] or {}, event))
+                if isinstance(event, HandAsked):
+                    self._state("by_hand", event.instruction.words)
+                self._said(event)
+            case HandSeen(time_s=time_s):
+                self._newest[HandSeen] = event
+                if self._fresh and self.history.due(time_s):
+                    self.history.add(time_s, _values(self._samples))
+                self._fresh = False
             case _:
                 self._told(event)
-                if (text := line(event)) is not None:
-                    self.put("lines", [*self.sections["lines"], text][-LINES:])
+                self._said(event)
+
+    def _said(self, event: RunEvent) -> None:
+        if (text := line(event)) is not None:
+            self.put("lines", [*self.sections["lines"], text][-LINES:])
 
     def look(self, look: Look) -> None:
         """What the recording so far amounts to: each sweep's observation or refusal, and the parameters."""
@@ -176,6 +203,7 @@ class Shown:
                 self._state("ready", "Between two steps")
             case PhaseRecorded(sensors, _):
                 self.put("sensors", [self._row_of(sensor) for sensor in sensors])
+                self.put("hand", None)
                 self._state("judging", "Recorded; averaging, solving, judging")
             case BoardObserved(sensor, sweep, speed_rad_s, observation):
                 seen = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
@@ -223,6 +251,7 @@ class Shown:
                 self.put("next", after_fault(folder, repeats=repeats))
         if isinstance(event, ENDINGS):
             self.ended = True
+            self.put("hand", None)
             self.put("prompt", None)
 
     def _state(self, kind: str, text: str) -> None:

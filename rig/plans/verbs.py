@@ -38,6 +38,10 @@ class Verbs(Protocol):
         """Stand still in an attitude and measure there, once the sensors have settled."""
         ...
 
+    def turn_by_hand(self) -> None:
+        """Let the operator lay the item on its faces and turn it, until the list is done or U is small enough."""
+        ...
+
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration; nothing where it does not calibrate along."""
         ...

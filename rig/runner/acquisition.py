@@ -5,6 +5,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,7 @@ class Acquisition:
     _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _thinning: "_Thinning | None" = None
+    _heard: "SimpleQueue[tuple[str, NDArray[Any]]] | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor) -> None:
         """Count the samples of a sensor, before its stream begins; only rates tell whether the arm settled."""
@@ -105,6 +107,8 @@ class Acquisition:
             if self._kept:
                 self._kept[-1].batches[sensor].append(samples)
         self.settling.add(sensor, samples)
+        if self._heard is not None:
+            self._heard.put((sensor, samples))
         if self.recorder is not None:
             self.recorder.add_samples(sensor, samples)
 
@@ -128,6 +132,11 @@ class Acquisition:
             yield
         finally:
             self._thinning = None
+
+    def hear(self) -> "SimpleQueue[tuple[str, NDArray[Any]]]":
+        """A queue into which goes, from now on, all that comes: the sensor's name and samples (n,)."""
+        self._heard = SimpleQueue()
+        return self._heard
 
     def keep(self) -> None:
         """Hold what comes from now on, as a part of its own; the oldest part goes when there are too many."""

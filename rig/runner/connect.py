@@ -19,9 +19,11 @@ from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.motion.state import Made, Report
 from rig.motion.steps import Plan
+from rig.observation.hand_runs import told_of
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
+from rig.runner.by_hand import HandSession
 from rig.runner.host_correction import HostCorrected, correcting
 from rig.runner.mounted import Memory, mounted
 from rig.runner.onboard import BoardCalibration
@@ -82,7 +84,8 @@ class Connector:
             kind = kind_of(self.loaded.config.turner)
             turner, report, made = self._connect_turner(kind, stack, acquisition)
             recorded = RecordedTurner.of(kind.name, made, report.joints, kind.fields)
-            recording = self._record(stack, self._provenance(kind, board, report, made), recorded, described)
+            made_with = self._provenance(kind, board, report, made)
+            recording = self._record(stack, made_with, recorded, described)
             acquisition.recorder = recording.recorder
             simulated = self.loaded.simulated or calls_itself_simulated(report.software)
             on_board = None if board is None else board.board.identity.unique_id
@@ -94,6 +97,7 @@ class Connector:
                 recording=recording,
                 along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
                 phase=self.phase,
+                hand=self._by_hand(acquisition, recording, made_with, described),
                 stage=self.settings.stage,
                 last=not any(each.indices - self.resumed.done for each in whole_plan.stages[self.settings.stage + 1 :]),
                 up=self.loaded.config.site.up,
@@ -185,6 +189,28 @@ class Connector:
             )
         return Recording(stack.enter_context(recorder), described, self.station, turner.geometry)
 
+    def _by_hand(
+        self,
+        acquisition: Acquisition,
+        recording: Recording,
+        made_with: Provenance,
+        described: Mapping[str, RecordedSensor],
+    ) -> HandSession | None:
+        """The session in which a hand turns the item; None where none does. Raises Refused `clock_unknown`."""
+        if self.settings.by_hand is None:
+            return None
+        name = self.settings.to_calibrate[0]
+        return HandSession(
+            acquisition=acquisition,
+            note=recording.note,
+            tell=self.station.event,
+            settings=self.settings.by_hand,
+            name=name,
+            sensor=described[name],
+            told=told_of(self.settings, made_with, described[name]),
+            earlier=self.resumed.earlier,
+        )
+
     def _calibrating_along(
         self, source: BoardSource, acquisition: Acquisition, recording: Recording, turner: RecordedTurner
     ) -> BoardCalibration | None:
@@ -197,7 +223,7 @@ class Connector:
             for name, sensor in source.set_up.items()
             if name in self.settings.to_calibrate
         }
-        if not (self.phase.procedure.calibrates_along and to_calibrate):
+        if self.settings.by_hand is not None or not (self.phase.procedure.calibrates_along and to_calibrate):
             return None
         along = BoardCalibration(
             source.board,

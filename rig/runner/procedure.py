@@ -35,6 +35,7 @@ from rig.motion.steps import Dwell, Motion, Plan, Rest, Stage, Step, Sweep, Tran
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
+from rig.runner.by_hand import HandSession
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.mounting import (
     REST_S,
@@ -117,8 +118,8 @@ class Rig:
     """The verbs of one phase.
 
     `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
-    one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board
-    calibrates along, and `up` is that direction in the frame of the arm's base.
+    one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
+    `hand` where an operator's turns the item, and `up` is that direction in the frame of the arm's base.
     """
 
     devices: Devices
@@ -127,6 +128,7 @@ class Rig:
     recording: Recording
     along: BoardCalibration | None
     phase: Phase
+    hand: HandSession | None = None
     stage: int = 0
     last: bool = True
     up: Vector3 = (0.0, 0.0, 1.0)
@@ -145,6 +147,9 @@ class Rig:
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
         self.recording.station.event(PreflightPassed(self.plan, report))
+        if self.hand is not None:
+            self._motions = iter(())
+            return  # nothing moves by itself, so nothing is asked before
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()
@@ -296,6 +301,21 @@ class Rig:
                 return False
             turner.rest(SETTLING_LOOK_S, watch)
         return True
+
+    def turn_by_hand(self) -> None:
+        """Let the operator lay the item down and turn it. Raises Refused `other_turner` where an arm is configured."""
+        if self.hand is None:
+            raise Refused(
+                "other_turner",
+                "the script lets a hand turn the item, and the procedure is none by hand",
+                "Use the section of the procedure by_hand",
+            )
+        self.hand.carry_out(self._check_along)
+
+    def _check_along(self) -> None:
+        """Raise what has become of the board, and tell how many samples came."""
+        self._check()
+        self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from what it has averaged; it stands beside the host's.

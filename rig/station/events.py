@@ -171,6 +171,29 @@ class PhaseRecorded:
 
 
 @dataclass(frozen=True, slots=True)
+class HandSeen:
+    """What a hand does at this moment, ten times a second, by the first sensor to calibrate.
+
+    `time_s` counts by the board's clock. `doing` is "starting", "resting", "moving" or "held" for `since_s`; the move
+    has `turned_rad` so far, its fastest reading was `peak_rad_s` of the `range_rad_s`. `expanded_scale` is U (k = 2) of
+    the scale factors so far, the largest, None before anything is known; `faces` lay up already, `pairs` and `turns`
+    are still open.
+    """
+
+    time_s: float
+    doing: str
+    since_s: float
+    turned_rad: float
+    peak_rad_s: float
+    range_rad_s: float
+    expanded_scale: float | None
+    faces: tuple[str, ...]
+    pairs: tuple[tuple[str, str], ...]
+    turns: tuple[tuple[str, int], ...]
+    taken: int
+
+
+@dataclass(frozen=True, slots=True)
 class ObservationMade:
     """The host has averaged a revolution of `sensor`: once a phase is judged, each that its calibration rests on."""
 
@@ -336,6 +359,7 @@ RunEvent = (
     | SamplesTaken
     | StepFinished
     | PhaseRecorded
+    | HandSeen
     | ObservationMade
     | AttitudeRead
     | CalibrationStored

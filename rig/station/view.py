@@ -11,10 +11,12 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from rig.data.hand_events import HandAsked
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE
 from rig.errors.quoting import printable_lines
-from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
+from rig.station.by_hand_words import live_rows
+from rig.station.events import HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.plain_text import for_file, plain
 from rig.station.station import Listener
 from rig.station.words import line
@@ -39,6 +41,7 @@ class LiveView:
         self._live = live
         self._shown_at_s = 0.0
         self._samples = SamplesTaken(())
+        self._asked: HandAsked | None = None
 
     def event(self, event: RunEvent) -> None:
         """Show an event: as a line, or in the panel."""
@@ -46,19 +49,27 @@ class LiveView:
             case SamplesTaken():
                 self._samples = event
             case Progress():
-                self._show(event)
+                self._show(_panel(event, self._samples))
+            case HandAsked():
+                self._asked = event
+                self._line(event)
+            case HandSeen():
+                self._show(_panel_by_hand(event, self._asked, self._samples))
             case _:
-                text = line(event)
-                if text is not None:
-                    # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
-                    shown = for_file(printable_lines(text), sys.stderr)
-                    self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
+                self._line(event)
 
-    def _show(self, progress: Progress) -> None:
+    def _line(self, event: RunEvent) -> None:
+        text = line(event)
+        if text is not None:
+            # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
+            shown = for_file(printable_lines(text), sys.stderr)
+            self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
+
+    def _show(self, panel: Table) -> None:
         now_s = time.monotonic()
         if now_s - self._shown_at_s >= REFRESH_S:
             self._shown_at_s = now_s
-            self._live.update(_panel(progress, self._samples), refresh=True)
+            self._live.update(panel, refresh=True)
 
 
 def _panel(progress: Progress, samples: SamplesTaken) -> Table:
@@ -70,6 +81,18 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
         for name, readings in _readings(sensor):
             table.add_row(plain(name), readings)
     table.add_row("time", f"{progress.elapsed_s:5.1f} s gone, {progress.remaining_s:5.1f} s left")
+    return table
+
+
+def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTaken) -> Table:
+    table = Table.grid(padding=(0, 2))
+    if asked is not None:
+        table.add_row("to do", plain(asked.instruction.words, "bold"))
+    for name, text in live_rows(seen):
+        table.add_row(name, plain(text))
+    for sensor in samples.sensors:
+        for name, readings in _readings(sensor):
+            table.add_row(plain(name), readings)
     return table
 
 

@@ -7,6 +7,7 @@ from traceback import format_exception
 from firmware_host.installation import install_command
 from rig.data.run_folder import resuming
 from rig.motion.doubts import doubts
+from rig.station.by_hand_words import by_hand_line
 from rig.station.events import (
     Advice,
     ArmConnected,
@@ -39,6 +40,8 @@ def line(event: RunEvent) -> str | None:
     match event:
         case Prompt(mounts=int(), announcement=(stage, *_)):
             text = f"to be mounted: {stage}"
+        case RunResumed(planned=0):
+            text = "resuming: the rests and moves so far count"
         case RunResumed(done, planned):
             text = f"resuming: {done} of {planned} sweeps and dwells are recorded and sound"
         case BoardConnected(port, identity):
@@ -49,6 +52,8 @@ def line(event: RunEvent) -> str | None:
             )
         case ArmConnected(report):
             text = f"arm: {report.words} at {report.host}"
+        case PreflightPassed(plan, report) if not plan.motions:
+            text = "pre-flight: nothing moves by itself; the board's clock follows its crystal"
         case PreflightPassed(plan, report):
             text = (
                 f"pre-flight: arm {report.serial_number} at {report.host} is ready; "
@@ -62,7 +67,7 @@ def line(event: RunEvent) -> str | None:
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
             text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
         case _:
-            text = _of_the_outcome(event)
+            text = by_hand_line(event) or _of_the_outcome(event)
     return text
 
 

@@ -16,6 +16,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
+    instruct say face turns again               what the operator reads, where a hand turns the sensors
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
@@ -27,6 +28,7 @@ from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
+from rig.world.ur10e.on_arm import OnArm
 
 Reply = dict[str, Any]
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
@@ -59,13 +61,27 @@ class ControlSession:
         self._world = world
         self._buffer = bytearray()
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
-        robot = world.laboratory.robot
         self._orders: dict[str, Callable[..., Reply | None]] = {
-            "state": self._state,
             "hold": self._hold,
             "run": self._run,
             "advance": self._advance,
             "pace": lambda time_scale: world.clock.pace(float(time_scale)),
+            "kvh_fault": self._kvh_fault,
+            "kvh_power": self._kvh_power,
+            "mount": lambda stage: world.laboratory.mount(int(stage)),
+            "unplug_board": world.unplug_board,
+            "plug_in_board": world.plug_in_board,
+            "reset_board": self._reset_board,
+            "sensor_fault": self._sensor_fault,
+            "silence_board": self._silence_board,
+            "host_baud": self._host_baud,
+            **(self._of_the_arm() if isinstance(world.laboratory.turning, OnArm) else self._of_the_hand()),
+        }
+
+    def _of_the_arm(self) -> dict[str, Callable[..., Reply | None]]:
+        robot = self._world.laboratory.robot
+        return {
+            "state": self._state,
             "protective_stop": robot.protective_stop,
             "emergency_stop": robot.emergency_stop,
             "safeguard_stop": robot.safeguard_stop,
@@ -81,18 +97,13 @@ class ControlSession:
             "register_in_use": self._register_in_use,
             "register_free": self._register_free,
             "close_arm": self._close_arm,
-            "close_dashboard": world.close_dashboard,
+            "close_dashboard": self._world.close_dashboard,
             "silence_arm": self._silence_arm,
-            "kvh_fault": self._kvh_fault,
-            "kvh_power": self._kvh_power,
-            "mount": lambda stage: world.laboratory.mount(int(stage)),
-            "unplug_board": world.unplug_board,
-            "plug_in_board": world.plug_in_board,
-            "reset_board": self._reset_board,
-            "sensor_fault": self._sensor_fault,
-            "silence_board": self._silence_board,
-            "host_baud": self._host_baud,
         }
+
+    def _of_the_hand(self) -> dict[str, Callable[..., Reply | None]]:
+        operator = self._world.laboratory.operator
+        return {"instruct": operator.instruct, "state": lambda: operator.state}
 
     def greeting(self) -> bytes:
         return b""

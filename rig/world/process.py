@@ -17,7 +17,8 @@ from urllib.parse import urlsplit
 
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
-from rig.config.world_models import SimulatedArmSection
+from rig.config.models import ArmSection, RigConfig, TurnerSection
+from rig.config.world_models import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
@@ -64,16 +65,9 @@ class World:
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False
-        host, board = loaded.config.arm.host, loaded.config.board
+        host, board = _host_of(loaded.config), loaded.config.board
         try:
-            self.arm_listeners = [
-                self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
-                for port, (new_session, lag_s) in ARM_PORTS.items()
-                if port not in _closed_ports(section.arm, self.laboratory.robot)
-            ]
-            if robot_api.offered(self.laboratory.robot):
-                new_session = partial(robot_api.RobotApiSession, self.laboratory.robot)
-                self.arm_listeners.append(self.network.listen(host, loaded.config.arm.robot_api_port, new_session))
+            self.arm_listeners = self._listen_as_arm(loaded.config.turner, section)
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
@@ -92,7 +86,7 @@ class World:
         self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
         self._description = {
             "ready": True,
-            "arm": host,
+            "arm": host if self.arm_listeners else None,
             "board": None if board is None else board.port,
             "pty": pty.path if pty else None,
             "kvh_ports": kvh_ports,
@@ -103,6 +97,21 @@ class World:
     def describe(self) -> str:
         """The line that says where everything listens."""
         return json.dumps(self._description)
+
+    def _listen_as_arm(self, turner: TurnerSection, section: WorldSection) -> list[Listener]:
+        """The ports of the arm's controller, where an arm turns the sensors."""
+        if not isinstance(turner, ArmSection):
+            return []
+        robot = self.laboratory.robot
+        listeners = [
+            self.network.listen(turner.host, port, partial(new_session, robot), lag_s=lag_s)
+            for port, (new_session, lag_s) in ARM_PORTS.items()
+            if port not in _closed_ports(section.arm, robot)
+        ]
+        if robot_api.offered(robot):
+            new_session = partial(robot_api.RobotApiSession, robot)
+            listeners.append(self.network.listen(turner.host, turner.robot_api_port, new_session))
+        return listeners
 
     def _listen(self, key: str, url: str, line: SerialLine) -> Listener:
         """The far end of a serial line; a client who opens what another has open is hung up on."""
@@ -175,7 +184,7 @@ class World:
         for left in reversed(range(LEAP if self.board_listener is None else 1)):
             self.clock.count()
             self.laboratory.turn()
-            last = not (left and self.laboratory.robot.waiting and self.clock.wait_s() <= 0.0)
+            last = not (left and self.laboratory.turning.waiting and self.clock.wait_s() <= 0.0)
             if last:
                 self._sense()
             for line in self.lines:
@@ -198,6 +207,13 @@ class World:
         for pty in self._ptys:
             pty.close()
         self.network.close()
+
+
+def _host_of(config: RigConfig) -> str:
+    """The address of the laboratory: the arm's, or the board's where a hand turns it."""
+    if config.turner.address or config.board is None:
+        return config.turner.address
+    return _address("board.port", config.board.port)[0]
 
 
 def _closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:

@@ -3,6 +3,7 @@
 import yaml
 
 from rig.config.load import Loaded
+from rig.config.models import ArmSection
 from rig.config.world_models import WorldSection
 from rig.errors import Refused
 
@@ -19,7 +20,8 @@ def world_section(loaded: Loaded) -> WorldSection:
             "Name a file with a world: section, for example configs/demo.yaml",
         )
     world = WorldSection.model_validate(yaml.safe_load(loaded.text)["world"])
-    there = {"offset_mm": loaded.config.arm.extension_mm}
+    turner = loaded.config.turner
+    there = {"offset_mm": turner.extension_mm if isinstance(turner, ArmSection) else (0.0, 0.0, 0.0)}
     sensors = {
         name: each if "offset_mm" in each.model_fields_set else each.model_copy(update=there)
         for name, each in world.sensors.items()

@@ -268,9 +268,10 @@ def _priors(graph: Graph) -> Iterator[Factor]:
     yield prior("level", OFFSET, state.offset, OFFSET_STD_M_S2)
     yield prior("table", TABLE, state.table, TABLE_STD_RAD)
     yield prior("box", BOX, state.normals.ravel(), told.box_rad)
-    design = np.zeros((1, width))
-    design[0, RESTS : RESTS + 3] = state.attitudes[0][2]
-    yield Factor(PRIOR, 0, np.zeros(1), design, {"heading": np.array([HEADING_STD_RAD])})
+    for row in (0, *(row + 1 for row, move in enumerate(graph.session.moves) if not move.tells)):
+        design, at = np.zeros((1, width)), RESTS + 6 * row
+        design[0, at : at + 3] = state.attitudes[row][2]
+        yield Factor(PRIOR, row, np.zeros(1), design, {"heading": np.array([HEADING_STD_RAD])})
     yield prior("bias", slice(RESTS + 3, RESTS + 6), state.biases[0], BIAS_STD_RAD_S)
 
 

@@ -3,6 +3,7 @@
 import { ENDED, age, hear, linked as lineIs, take as aged } from "./age.js";
 import { act, follow, token } from "./stream.js";
 import { drawArm } from "./arm.js";
+import { hand } from "./hand.js";
 import { outcome } from "./outcome.js";
 import { prompt } from "./prompt.js";
 import * as readings from "./readings.js";
@@ -13,7 +14,7 @@ const $ = (id) => document.getElementById(id);
 const shown = {};
 const WORDS = {
   connecting: ["Connecting", "…"], connected: ["Connected", "…"], ready: ["Ready", "■"], asking: ["Your answer is needed", "?"],
-  moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], judging: ["Solving", "Σ"],
+  moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], by_hand: ["To do", "☞"], judging: ["Solving", "Σ"],
   passed: ["PASS", "✓"], failed: ["FAIL", "✗"], refused: ["Refused", "⊘"], fault: ["Fault", "⚠"], stopped: ["Stopped", "■"],
 };
 
@@ -35,17 +36,20 @@ const SHOW = {
   step(step) {
     if (!step) return;
     const over = ENDED.includes(shown.state?.kind);
-    const number = step.number ? `tep ${step.number} of ${step.count}` : `${step.count} steps`;
+    const counts = step.kind === "by_hand";
+    const number = counts ? step.name : step.number ? `tep ${step.number} of ${step.count}` : `${step.count} steps`;
     $("left").textContent = clock(step.remaining_s);
-    $("step-number").textContent = !step.number ? number : over ? `It ended in s${number}` : `S${number}`;
-    $("step-name").textContent = step.number && !["moving", "measuring", "resting"].includes(shown.state?.kind) ? step.name : "";
+    $("step-number").textContent = !step.number || counts ? number : over ? `It ended in s${number}` : `S${number}`;
+    $("step-name").textContent = step.number && !counts && !["moving", "measuring", "resting"].includes(shown.state?.kind) ? step.name : "";
     const done = step.count ? (Math.max(0, step.number - 1) + (step.number ? step.fraction : 0)) / step.count : 0;
     const bar = $("bar");
     bar.setAttribute("aria-valuenow", Math.round(100 * done));
-    bar.setAttribute("aria-valuetext", `step ${step.number} of ${step.count}, ${over ? "ended" : `${clock(step.remaining_s)} left`}`);
+    bar.setAttribute("aria-valuetext", counts ? step.name : `step ${step.number} of ${step.count}, ${over ? "ended" : `${clock(step.remaining_s)} left`}`);
     drawBar(step);
   },
   arm(arm) {
+    document.body.dataset.joints = arm.geometry.theta_rad.length; // a hand has none, and nothing of it is drawn
+    if (!arm.geometry.theta_rad.length) return;
     $("arm-name").textContent = [arm.model, arm.serial_number, arm.host].filter(Boolean).join(" · ");
     $("missed").textContent = arm.missed ?? "not recorded";
     $("missed").className = arm.missed ? "odd-number" : "";
@@ -68,6 +72,10 @@ const SHOW = {
   checks(rows) {
     tables.checks(rows);
     failed(rows.filter((check) => !check.passed));
+  },
+  hand(section) {
+    document.body.dataset.hand = section ? "yes" : "no";
+    hand(section);
   },
   prompt: (asked) => prompt(asked, shown.about.may_answer),
   certificate: light,
@@ -145,7 +153,7 @@ function tell() {
   const kind = shown.state?.kind;
   if (shown.state) {
     const [word, sign] = lost ? ["No news", "⚠"] : WORDS[kind] ?? [kind, ""];
-    const step = shown.step?.number && !over ? `, step ${shown.step.number} of ${shown.step.count}` : "";
+    const step = shown.step?.number && shown.step.kind !== "by_hand" && !over ? `, step ${shown.step.number} of ${shown.step.count}` : "";
     const text = lost ? `Heard last: ${WORDS[kind]?.[0] ?? kind}, ${shown.state.text}${step}` : shown.state.text;
     for (const [id, said] of [["state-word", word], ["sign", sign], ["state-text", text]]) if ($(id).textContent !== said) $(id).textContent = said;
     document.title = `${word} · ${shown.about?.procedure ?? "calibration rig"}`;

@@ -117,7 +117,7 @@ class Certificate:
     def arm(self) -> str:
         """What turned the items, by what was found of it."""
         found = self.provenance
-        if found.readings_file is not None and found.motion_file is None:
+        if self.by_hand or (found.readings_file is not None and found.motion_file is None):
             return "a hand, which turned the items on a table"
         if found.motion_file is not None:
             return f"whatever the file {_named(found.motion_file)} tells the motion of"

@@ -39,6 +39,9 @@ def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
                 result, role, in_attitudes=rates_in_attitudes(elsewhere), turned=turned(elsewhere)
             )
             continue
+        if outcome.settings.by_hand is not None:
+            made[name] = sensor_entry(result, role)
+            continue
         held, agreed = of_gyroscope(outcome.recordings, name), outcome.onboard.get(name)
         made[name] = sensor_entry(
             result,

@@ -1,0 +1,55 @@
+"""The section `world: hand:`: how the simulated operator handles an item, and by which mistakes."""
+
+from typing import Annotated, Literal, get_args
+
+from pydantic import Field
+
+from rig.config.section import Section
+
+Seconds = Annotated[float, Field(ge=0, le=60)]
+Probability = Annotated[float, Field(ge=0, le=1)]
+Mistaken = Literal[
+    "short", "two_turns", "other_way", "wrong_face", "skipped", "crumb", "table_pushed", "held", "dropped", "left",
+    "lifted", "too_fast",
+]  # fmt: skip
+
+
+class SimulatedHandSection(Section):
+    """The simulated operator, who does what the line of text and the drawing say, sooner or later, and errs."""
+
+    peak_deg_s: float = Field(default=250.0, ge=30, le=1500, description="peak rate of a push")
+    wobble_deg: float = Field(default=1.5, ge=0, le=20, description="how far the axis of a move swings")
+    tremor_deg: float = Field(default=0.15, ge=0, le=2, description="tremor of 6 to 12 Hz while it is touched")
+    tilt_mrad: float = Field(
+        default=0.3,
+        ge=0,
+        le=20,
+        description="by how much a face lies otherwise each time; 2 of a bare board",
+        json_schema_extra={"unit": "mrad"},
+    )
+    closure_mrad: float = Field(
+        default=3.0,
+        ge=0,
+        le=50,
+        description="by how much a whole turn misses the rule",
+        json_schema_extra={"unit": "mrad"},
+    )
+    faces_mrad: float = Field(
+        default=2.0,
+        ge=0,
+        le=50,
+        description="by how much the item's faces are off right angles",
+        json_schema_extra={"unit": "mrad"},
+    )
+    table_mrad: float = Field(
+        default=5.0, ge=0, le=50, description="by how much the table leans", json_schema_extra={"unit": "mrad"}
+    )
+    thinks_s: tuple[Seconds, Seconds] = Field(
+        default=(0.5, 2.0), description="how long, at least and at most, from an instruction to the first touch"
+    )
+    mistakes: dict[Mistaken, Probability] = Field(
+        default={},
+        description="with which probability an action is done with this mistake: "
+        + ", ".join(f"`{each}`" for each in get_args(Mistaken)),
+        json_schema_extra={"unit": "1", "allowed": "mistakes with a number 0 to 1 each", "usual": "`{}`"},
+    )

@@ -1,0 +1,70 @@
+"""What happens in a calibration by hand, as its recording keeps it. Times are the board's, in microseconds."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from rig.motion.by_hand import Face, Instruction
+
+Microseconds = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Reason = Annotated[str, Field(pattern=r"^[a-z_0-9]+$", max_length=40)]
+
+
+@dataclass(frozen=True, slots=True)
+class HandAsked:
+    """The operator is asked for something; `again` names what was wrong with the last move, `why` says it in words."""
+
+    instruction: Instruction
+    again: Reason | None = None
+    why: Annotated[str, Field(max_length=500)] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class HandRested:
+    """The item lay at rest with the side `face` up."""
+
+    begin_us: Microseconds
+    end_us: Microseconds
+    face: Face
+
+
+@dataclass(frozen=True, slots=True)
+class HandMoveTaken:
+    """A move between two rests counts: a flip, or whole turns on a face."""
+
+    begin_us: Microseconds
+    end_us: Microseconds
+    kind: Literal["flip", "turn"]
+    from_face: Face
+    to_face: Face
+    turns: Annotated[int, Field(ge=-1000, le=1000)]
+
+
+@dataclass(frozen=True, slots=True)
+class HandMoveRefused:
+    """A move between two rests does not count, by the error's name `again`; both rests do."""
+
+    begin_us: Microseconds
+    end_us: Microseconds
+    again: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class HandRestRefused:
+    """The item lay still and does not count as at rest, by the error's name `again`: it is a pause of a move."""
+
+    begin_us: Microseconds
+    end_us: Microseconds
+    again: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class HandBegunAnew:
+    """Nothing before `begin_us` counts any more, by the error's name `again`: the table, or the sensor, is another."""
+
+    begin_us: Microseconds
+    again: Reason
+
+
+OfTheHand = HandAsked | HandRested | HandMoveTaken | HandMoveRefused | HandRestRefused | HandBegunAnew

@@ -1,0 +1,43 @@
+"""What a hand is asked to do with an item on a table: which side comes up, or a whole turn as it lies. Pure.
+
+A face is named by the axis of the item that points upwards when that side is up: "+x", "-x", "+y", "-y", "+z", "-z".
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Face = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+FACES: tuple[Face, ...] = ("+z", "+x", "+y", "-z", "-x", "-y")
+Say = Literal["lay", "turn"]
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """One thing to do, as the line of text, the drawing and the simulated operator have it.
+
+    "lay": the side `face` comes up, the item is let go. "turn": it turns as it lies, the side `face` up, by whole
+    `turns` about the vertical, counterclockwise seen from above where they are positive, and is let go where it was.
+    """
+
+    say: Say
+    face: Face
+    turns: int = 0
+
+    @property
+    def words(self) -> str:
+        """It in one line."""
+        if self.say == "lay":
+            return f"Lay it down with the side {self.face} up, and let go"
+        count = "one whole turn" if abs(self.turns) == 1 else f"{abs(self.turns)} whole turns"
+        way = "counterclockwise" if self.turns > 0 else "clockwise"
+        return f"Leave the side {self.face} up and turn it {count} {way} on the table, back against the rule; let go"
+
+
+@dataclass(frozen=True, slots=True)
+class HandMove:
+    """A move that was made, as it was read: a flip from one face to another, or so many whole turns on one."""
+
+    kind: Literal["flip", "turn"]
+    from_face: Face
+    to_face: Face
+    turns: int = 0

@@ -1,0 +1,168 @@
+"""From recordings of a session by hand to its rests and moves: what was refused while it went on ties no rests."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.events import Event
+from rig.data.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
+from rig.data.provenance import Provenance
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
+from rig.data.settings import RunSettings
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session import Handled, Move, Rest, Told
+from rig.motion.by_hand import FACES, Face
+from rig.observation.handled import Segmenter
+from rig.observation.timebase import NOMINAL_DRIFT
+
+LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
+BETWEEN_S = 10.0  # of nothing between two recordings of a session, whose boards' clocks do not tell it
+MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
+
+Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accelerations (n, 3) where they are sent
+
+
+def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
+    """Samples (n,) by the crystal of the board, shifted by `from_s`, in SI units."""
+    time_s = from_s + MICROSECOND_S * samples["board_time_us"].astype(np.float64)
+    force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
+    return time_s, sensor.channel(RATE).values(samples), force
+
+
+def range_of(sensor: RecordedSensor) -> float | None:
+    """The largest rate that a sensor reads, rad/s, where its part says it."""
+    rate = sensor.channel(RATE)
+    return None if rate.full_scale_counts is None else rate.full_scale_counts * rate.unit_per_count
+
+
+@dataclass(slots=True)
+class NotCounted:
+    """What of a session does not count, in the session's seconds.
+
+    `moves` and `rests` from when to when each went on, `seams` in the middle between two recordings, and from when on
+    anything counts at all.
+    """
+
+    moves: list[tuple[float, float]] = field(default_factory=list)
+    rests: list[tuple[float, float]] = field(default_factory=list)
+    seams: list[float] = field(default_factory=list)
+    from_s: float = -inf
+
+    def take(self, event: Event, shift_s: float) -> None:
+        """An event of a recording whose board's clock is so much behind the session's."""
+        match event:
+            case HandMoveRefused(begin_us, end_us):
+                self.moves.append((shift_s + MICROSECOND_S * begin_us, shift_s + MICROSECOND_S * end_us))
+            case HandRestRefused(begin_us, end_us):
+                self.rests.append((shift_s + MICROSECOND_S * begin_us, shift_s + MICROSECOND_S * end_us))
+            case HandBegunAnew(begin_us):
+                self.from_s = shift_s + MICROSECOND_S * begin_us
+            case _:
+                pass
+
+    def without(self, session: Handled) -> Handled:
+        """The session without it: a rest that does not count is a pause of the move that goes on through it."""
+        rests, moves, through = list[Rest](), list[Move](), list[Move]()
+        for place, rest in enumerate(session.rests):
+            if _middle(rest) < self.from_s:
+                continue
+            if rests:
+                through.append(self._judged(session.moves[place - 1]))
+            if any(rest.start_s < end_s and start_s < rest.end_s for start_s, end_s in self.rests):
+                continue
+            if rests:
+                moves.append(_joined(through))
+                through.clear()
+            rests.append(rest)
+        return replace(session, rests=tuple(rests), moves=tuple(moves))
+
+    def _judged(self, move: Move) -> Move:
+        crosses = any(move.start_s <= seam_s <= move.end_s for seam_s in self.seams)
+        return replace(move, left_out=True) if crosses or _within(move, self.moves) else move
+
+
+def _middle(part: Rest | Move) -> float:
+    return (part.start_s + part.end_s) / 2
+
+
+def _within(part: Rest | Move, spans: Sequence[tuple[float, float]]) -> bool:
+    return any(start_s <= _middle(part) <= end_s for start_s, end_s in spans)
+
+
+def _joined(moves: Sequence[Move]) -> Move:
+    """Moves one after the other, with the pauses between them, as one; of a long one nothing is known well enough."""
+    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
+    return Move(
+        moves[0].start_s,
+        moves[-1].end_s,
+        max(each.peak_rad_s for each in moves),
+        any(each.lost for each in moves),
+        any(each.clipped for each in moves),
+        long or any(each.left_out for each in moves),
+    )
+
+
+def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
+    """A session's rests and moves so far by one sensor, what of them does not count, and when it may go on.
+
+    The item may have been anywhere between two recordings: the way from the last rest of one to the first of the next
+    ties nothing.
+    """
+    segmenter, refused, ends_s = Segmenter(range_of(runs[0].sensors[name])), NotCounted(), None
+    for run in runs:
+        samples = run.samples[name]
+        if not len(samples):
+            continue
+        board_s = MICROSECOND_S * samples["board_time_us"][[0, -1]].astype(np.float64)
+        shift_s = 0.0 if ends_s is None else ends_s + BETWEEN_S - board_s[0]
+        if ends_s is not None:
+            refused.seams.append(ends_s + BETWEEN_S / 2)
+        segmenter.feed(*readings_of(run.sensors[name], samples, shift_s))
+        ends_s = shift_s + board_s[1]
+        for recorded in run.events:
+            refused.take(recorded.event, shift_s)
+    return segmenter, refused, 0.0 if ends_s is None else float(ends_s)
+
+
+def session_of(runs: Sequence[RunData], name: str) -> Handled:
+    """A session's rests and moves by one sensor, as they are solved."""
+    segmenter, refused, _ = segmented(runs, name)
+    return refused.without(segmenter.handled)
+
+
+def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> Told:
+    """What the solution of a session needs to know besides a sensor's readings. Raises Refused `clock_unknown`.
+
+    The board's clock is the only measure of time there is, and no reading shows that it is wrong. Where no
+    accelerometer reads which side is up, it is the one that is asked for first.
+    """
+    said, known = settings.by_hand, settings.uncertainty
+    if said is None or known is None or not provenance.board_follows_crystal:
+        raise Refused(
+            "clock_unknown",
+            "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
+            "hand can show that",
+            "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
+        )
+    gravity = {} if settings.site is None else {"gravity_m_s2": settings.site.gravity_m_s2}
+    first = None if sensor.measures(ACCELERATION) else turned_face(FACES[0], np.array(sensor.mounting))
+    return Told(
+        clock_ppm=known.crystal_ppm,
+        clock_source="the board's crystal",
+        box_rad=said.box_rad,
+        first_face=first,
+        **gravity,
+    )
+
+
+def turned_face(face: str, rotation: Array) -> Face:
+    """The face whose axis is that of `face` after a `rotation` (3, 3) to other axes, as near as they have one."""
+    axis = (1.0 if face[0] == "+" else -1.0) * rotation[:, "xyz".index(face[1])]
+    name = ("+" if axis[np.argmax(np.abs(axis))] > 0 else "-") + "xyz"[int(np.argmax(np.abs(axis)))]
+    return next(each for each in FACES if each == name)

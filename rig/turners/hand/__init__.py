@@ -1,0 +1,1 @@
+"""An operator's hand as what turns the sensors."""
