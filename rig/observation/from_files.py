@@ -84,7 +84,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
 
 
 def _motion(files: Files) -> Columns:
-    """What is told of the motion, by column. Raises Refused as they do, and `bad_option` for a table's log of sweeps."""
+    """What the motion is, by column. Raises Refused as they do, and `bad_option` for a table's log of sweeps."""
     told = files.columns
     if not isinstance(files.motion, Path):
         return files.motion
