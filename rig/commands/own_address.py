@@ -28,12 +28,12 @@ def own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    host = config.turner.address
+    host = config.turner.simulated_at or ""
     with ExitStack() as held:
         own = next((each for each in (host, *_others()) if _take(each, held)), host)
         if own != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
-        yield [] if own == host else [f"{_turner_key(laboratory)}.host={own}", *_moved(config, own)]
+        yield [] if own == host else [*_turner_moved(config, laboratory, own), *_moved(config, own)]
 
 
 @contextmanager
@@ -66,11 +66,13 @@ def _take(host: str, held: ExitStack) -> bool:
     return True
 
 
-def _turner_key(text: str) -> str:
-    """The key under which a file says what turns."""
+def _turner_moved(config: RigConfig, text: str, host: str) -> Iterator[str]:
+    """What turns, under the key of the file that says it, at another host."""
     import yaml
 
-    return "turner" if "turner" in yaml.safe_load(text) else "arm"
+    section = "turner" if "turner" in yaml.safe_load(text) else "arm"
+    for key, value in config.turner.moved_to(host).items():
+        yield f"{section}.{key}={value}"
 
 
 def _moved(config: SensorsConfig, host: str) -> Iterator[str]:

@@ -17,6 +17,7 @@ from rig.config.as_written import take_text_as_written
 from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.servo_section import ServoSection
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
@@ -24,8 +25,9 @@ from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
-Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for an arm
-ARM = "ur"  # the kind of turner that `arm` is the section of
+Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for those in stock
+# The kinds of turners that the laboratory can simulate; `arm` is the section of the first.
+STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
 
@@ -196,7 +198,7 @@ def _validate_turner(
         if "arm" not in document:
             return None, ["arm: missing"]
         return _validate(ArmSection, document["arm"], ("arm",), layered)
-    known: dict[str, type[TurnerSection]] = {ARM: ArmSection, **(turners or {})}
+    known = {**STOCK_TURNERS, **(turners or {})}
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:
@@ -295,14 +297,19 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
-    if not isinstance(config.turner, ArmSection):
-        yield "world: simulates an arm, and turner says another kind"
+    if (host := config.turner.simulated_at) is None:
+        yield "world: simulates an arm, or a servo whose port is socket://host:port, and turner says otherwise"
         return
-    host = config.turner.host
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
     if not _is_loopback(host):
-        yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
+        key = (
+            "arm.host"
+            if isinstance(config.turner, ArmSection)
+            else f"turner.{next(iter(config.turner.moved_to(host)))}"
+        )
+        yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
+    yield from world.misfits(config.turner)
     for place, port in ports.items():
         if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):
             yield (

@@ -11,6 +11,7 @@ from rig.config.attitude_sets import SETS
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
+from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
 
 __all__ = [
@@ -340,6 +341,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
         "static_attitudes": StaticAttitudesSection,
         "imu": ImuSection,
         "bias_drift": BiasDriftSection,
+        "servo_six_observation": ServoSixObservationSection,
     }
 )
 

@@ -1,13 +1,16 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
+from rig.config.models import ArmSection, TurnerSection
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.stage_section import StageMountSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
+from rig.config.world_servo import SimulatedServoSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
 Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]
@@ -405,6 +408,7 @@ class WorldSection(Section):
     )
     site: SiteSection = SiteSection()
     arm: SimulatedArmSection = SimulatedArmSection()
+    servo: SimulatedServoSection = SimulatedServoSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})
@@ -413,3 +417,14 @@ class WorldSection(Section):
         max_length=12,
         description="how the simulated operator truly mounts the item for each of `procedure.stages`",
     )
+
+    def misfits(self, turner: TurnerSection) -> Iterator[str]:
+        """What of this does not go with what turns, a line each."""
+        other = "servo" if isinstance(turner, ArmSection) else "arm"
+        if other in self.model_fields_set:
+            yield f"world.{other}: there is none; another kind of turner turns the sensors"
+        if not isinstance(turner, ArmSection) and self.time_scale != 1.0:
+            yield (
+                f"world.time_scale: {self.time_scale:g}: must be 1 with a servo, whose driver measures time by this "
+                "computer's clock, as with a real one"
+            )

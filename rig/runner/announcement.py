@@ -51,7 +51,7 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
             "If the calibration passes, the board stores it in the place of what it had, and without another "
             f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
         )
-    lines += doubts(plan)
+    lines += [*doubts(plan), *filter(None, [words.beware])]
     lines.append(
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
     )

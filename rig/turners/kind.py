@@ -25,7 +25,8 @@ class Words:
     `name` is a noun without an article ("robot arm"), `short` what an operator calls it ("arm"), `turned` what a sweep
     turns of it ("the wrists"); `method` says in a clause how it turns the items, for the
     certificate; `briefly` the same in a few words, for the digital certificate; in both `{turns}`
-    stands for what sweeps turned through; `directions` whence its axes are known.
+    stands for what sweeps turned through; `directions` whence its axes are known; `beware` is what an operator must be
+    told of it before it moves.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Words:
     method: str
     briefly: str
     directions: str
+    beware: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,17 +1,15 @@
-"""The simulated laboratory without its sockets: arm, board and sensors on one clock, deterministic."""
+"""The simulated laboratory without its sockets: what turns, board and sensors on one clock, deterministic."""
 
 from collections.abc import Sequence
-from functools import partial
-from math import pi, radians
-from random import Random
 
 import numpy as np
 
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import Fault, SpiDevice
-from rig.config.models import RigConfig
+from rig.config.models import ArmSection, RigConfig
+from rig.config.servo_section import ServoSection
 from rig.config.stage_section import mount_matrix
-from rig.config.world_models import SimulatedArmSection, WorldSection
+from rig.config.world_models import WorldSection
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
@@ -19,16 +17,11 @@ from rig.world.board.sensing_element import ElementFault, MotionAt, SensingEleme
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
 from rig.world.magnetic_field import magnetic_field_of
-from rig.world.site import site_of
+from rig.world.servo.bench import ServoBench
+from rig.world.ur10e.bench import ArmBench
 from rig.world.ur10e.flange_motion import Felt
-from rig.world.ur10e.joint_motion import Motion
-from rig.world.ur10e.models import simulated_model
-from rig.world.ur10e.ripple import ripple
-from rig.world.ur10e.robot import Identity, Robot
-from rig.world.ur10e.true_arm import TrueArm, known_links
-from rig.world.ur10e.vibration import WRISTS, Vibration
-
-JOINTS = 6
+from rig.world.ur10e.robot import Robot
+from rig.world.ur10e.true_arm import TrueArm
 
 
 class Laboratory:
@@ -39,31 +32,8 @@ class Laboratory:
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         self._config, self._world = config, world
-        arm = world.arm
-        random = Random(world.seed)
-        model = simulated_model(arm, config.arm.model)
-        ripples = [ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
-        motion = Motion(
-            [radians(angle) for angle in config.arm.home_deg or model.home_deg],
-            ripples,
-            arm.encoder_step_rad,
-            memory_s=1e-3 * max(max(each.delay_ms, each.accelerometer.delay_ms) for each in world.sensors.values()),
-            lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
-            if arm.state_jitter_s
-            else None,
-            vibration=_seen_vibration(arm, world.seed),
-            speed_limit_rad_s=model.speed_rad_s,
-        )
-        self.arm = TrueArm(arm, site_of(world.site), motion, random, model.drawing)
-        about_x, about_y, about_z = arm.tcp_rotation_deg
-        self.robot = Robot(
-            Identity(arm.serial_number, model.polyscope),
-            motion,
-            arm.remote_control,
-            arm.speed_slider,
-            known_links(arm.calibration, drawing=model.drawing),
-            model=model,
-            tool_turn_rad=(radians(about_x), radians(about_y), radians(about_z)),
+        self.bench: ArmBench | ServoBench = (
+            ArmBench(config.arm, world) if isinstance(config.turner, ArmSection) else ServoBench(_servo(config), world)
         )
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
@@ -84,7 +54,23 @@ class Laboratory:
 
     @property
     def _time_s(self) -> float:
-        return self.arm.true_s(self.robot.time_s)
+        return self.bench.time_s
+
+    @property
+    def arm(self) -> TrueArm:
+        """The arm that turns the item. Raises TypeError where none does."""
+        return self._arm_bench.arm
+
+    @property
+    def robot(self) -> Robot:
+        """Its controller. Raises TypeError where no arm turns the item."""
+        return self._arm_bench.robot
+
+    @property
+    def _arm_bench(self) -> ArmBench:
+        if not isinstance(self.bench, ArmBench):
+            raise TypeError("no arm turns the item")
+        return self.bench
 
     def plug_in(self) -> None:
         """Give the board power, if there is one and it has none."""
@@ -136,9 +122,8 @@ class Laboratory:
         self.sense()
 
     def turn(self) -> None:
-        """One tick of the arm. While the robot is `waiting` another may follow before `sense`."""
-        self.robot.step()
-        self.arm.step(self.robot.time_s)
+        """One tick of what turns. While that is `waiting` another may follow before `sense`."""
+        self.bench.step()
 
     def sense(self) -> None:
         """Board and instruments live until the end of the last tick. Raises BoardError as `step`."""
@@ -151,8 +136,8 @@ class Laboratory:
 
     @property
     def tick_s(self) -> float:
-        """How long a tick lasts, which is 2 ms by the controller's clock."""
-        return self.arm.tick_s
+        """How long a tick lasts, which is 2 ms by an arm's controller's clock."""
+        return self.bench.tick_s
 
     def _element_of(self, name: str, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the board feels, which can be broken."""
@@ -161,15 +146,15 @@ class Laboratory:
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the flange feels at a virtual time inside the last tick."""
         self._on_the_item(sensor)
-        if self.arm.ideal and not sensor.feels_force:
-            return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
+        if self.bench.plain and not sensor.feels_force:
+            return lambda time_s: sensor.rate(self.bench.rate_at(time_s))
         last: Felt | None = None
         rows = sensor.rows
         motion: Sequence[float] = ()
 
         def motion_at(time_s: float) -> Sequence[float]:
             nonlocal last, rows, motion
-            felt = self.arm.felt_at(time_s)
+            felt = self.bench.felt_at(time_s)
             if felt is not last or rows is not sensor.rows:  # an arm that stands gives the same again
                 last, rows, motion = felt, sensor.rows, sensor.motion(felt)
             return motion
@@ -179,12 +164,11 @@ class Laboratory:
     def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
         """What a magnetometer on the flange feels at such a time."""
         self._on_the_item(sensor)
-        return lambda time_s: sensor.feels(self._field, self.arm.frames_at(time_s), time_s)
+        return lambda time_s: sensor.feels(self._field, self.bench.frames_at(time_s), time_s)
 
 
-def _seen_vibration(arm: SimulatedArmSection, seed: int) -> Vibration | None:
-    if not arm.vibration_seen_rms_rad_s:
-        return None
-    random = Random(f"vibration {seed}")
-    phases_rad = [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]
-    return Vibration(arm.vibration_seen_rms_rad_s, 2.0 * pi * arm.vibration_seen_hz, phases_rad)
+def _servo(config: RigConfig) -> ServoSection:
+    """The section of the servo. Raises TypeError where something else turns the sensors."""
+    if not isinstance(config.turner, ServoSection):
+        raise TypeError(f"no {type(config.turner).__name__} can be simulated")
+    return config.turner

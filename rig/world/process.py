@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -17,16 +17,19 @@ from urllib.parse import urlsplit
 
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
+from rig.config.models import ArmSection
 from rig.config.world_models import SimulatedArmSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
-from rig.world.clock import Clock
+from rig.world.clock import PATIENCE_S, Clock
 from rig.world.fault_channel import ControlSession
 from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
+from rig.world.servo.bench import BEHIND_S
 from rig.world.ur10e import dashboard_server, primary, robot_api, rtde, script_socket
+from rig.world.ur10e.bench import ArmBench
 from rig.world.ur10e.robot import Robot
 
 if TYPE_CHECKING:
@@ -59,21 +62,26 @@ class World:
             name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
             for name, mount in self.laboratory.kvhs.items()
         }
-        self.lines = (self.line, *self.kvh_lines.values())
-        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
+        bench = self.laboratory.bench
+        self.servo_line = None if isinstance(bench, ArmBench) else SerialLine(lambda: bench.bus, section.seed)
+        self.lines = (self.line, *self.kvh_lines.values(), *filter(None, [self.servo_line]))
+        patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
+        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False
-        host, board = loaded.config.arm.host, loaded.config.board
+        host, board = loaded.config.turner.simulated_at or "", loaded.config.board
         try:
-            self.arm_listeners = [
-                self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
-                for port, (new_session, lag_s) in ARM_PORTS.items()
-                if port not in _closed_ports(section.arm, self.laboratory.robot)
-            ]
-            if robot_api.offered(self.laboratory.robot):
-                new_session = partial(robot_api.RobotApiSession, self.laboratory.robot)
-                self.arm_listeners.append(self.network.listen(host, loaded.config.arm.robot_api_port, new_session))
+            self.arm_listeners = (
+                list(self._arm_listeners(loaded.config.arm, section.arm, bench.robot))
+                if (isinstance(bench, ArmBench))
+                else []
+            )
+            self.servo_listener = (
+                None
+                if self.servo_line is None
+                else self._listen("turner.port", loaded.config.turner.address, self.servo_line, gathers=False)
+            )
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
@@ -92,7 +100,7 @@ class World:
         self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
         self._description = {
             "ready": True,
-            "arm": host,
+            "arm": loaded.config.turner.address,
             "board": None if board is None else board.port,
             "pty": pty.path if pty else None,
             "kvh_ports": kvh_ports,
@@ -104,10 +112,18 @@ class World:
         """The line that says where everything listens."""
         return json.dumps(self._description)
 
-    def _listen(self, key: str, url: str, line: SerialLine) -> Listener:
+    def _arm_listeners(self, arm: ArmSection, section: SimulatedArmSection, robot: Robot) -> Iterator[Listener]:
+        """The ports of the arm's controller."""
+        for port, (new_session, lag_s) in ARM_PORTS.items():
+            if port not in _closed_ports(section, robot):
+                yield self.network.listen(arm.host, port, partial(new_session, robot), lag_s=lag_s)
+        if robot_api.offered(robot):
+            yield self.network.listen(arm.host, arm.robot_api_port, partial(robot_api.RobotApiSession, robot))
+
+    def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> Listener:
         """The far end of a serial line; a client who opens what another has open is hung up on."""
         return self.network.listen(
-            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=True
+            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )
 
     # -- faults that live in the wires -----------------------------------------------------------------------------
@@ -127,6 +143,12 @@ class World:
         for listener in self.arm_listeners:
             if listener.port == dashboard_server.PORT:
                 listener.close()
+
+    def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None:
+        """The servo's line carries nothing, or its port is gone."""
+        if self.servo_line is not None and self.servo_listener is not None:
+            self.servo_line.silent = bool(silent)
+            self.servo_listener.open() if listen else self.servo_listener.close()
 
     def unplug_board(self) -> None:
         """Pull the board's cable: no power, no port."""
@@ -175,7 +197,7 @@ class World:
         for left in reversed(range(LEAP if self.board_listener is None else 1)):
             self.clock.count()
             self.laboratory.turn()
-            last = not (left and self.laboratory.robot.waiting and self.clock.wait_s() <= 0.0)
+            last = not (left and self.laboratory.bench.waiting and self.clock.wait_s() <= 0.0)
             if last:
                 self._sense()
             for line in self.lines:

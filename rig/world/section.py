@@ -19,7 +19,7 @@ def world_section(loaded: Loaded) -> WorldSection:
             "Name a file with a world: section, for example configs/demo.yaml",
         )
     world = WorldSection.model_validate(yaml.safe_load(loaded.text)["world"])
-    there = {"offset_mm": loaded.config.arm.extension_mm}
+    there = {"offset_mm": tuple(1000 * each for each in loaded.config.turner.extension_m)}
     sensors = {
         name: each if "offset_mm" in each.model_fields_set else each.model_copy(update=there)
         for name, each in world.sensors.items()

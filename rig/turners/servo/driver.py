@@ -86,7 +86,7 @@ class Servo:
         except BaseException:
             self._bus.close()
             raise
-        self._link = Link(self._bus, self._report.model, self._period_s, self._take_state, self._fail)
+        self._link = Link(self._bus, self._report.servo, self._period_s, self._take_state, self._fail)
         stop = Stop(self._link, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
         self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()

@@ -57,7 +57,7 @@ def mount_magnetometers(
             config.magnetometers[name].mounting,
             simulated,
             simulated.mounting_error_deg,
-            config.arm.extension_mm if simulated.offset_mm is None else simulated.offset_mm,
+            _extension_mm(config) if simulated.offset_mm is None else simulated.offset_mm,
         )
         for name, simulated in sorted(world.magnetometers.items())
     }
@@ -67,6 +67,12 @@ def mount_magnetometers(
         )
         for index, (name, each) in enumerate(mounted.items())
     }
+
+
+def _extension_mm(config: RigConfig) -> tuple[float, float, float]:
+    """Where the extension ends on which the item sits."""
+    x, y, z = (1000 * each for each in config.turner.extension_m)
+    return x, y, z
 
 
 def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:

@@ -1,0 +1,97 @@
+"""A simulated arm as what turns the item: its controller, and the arm as it is."""
+
+from collections.abc import Sequence
+from functools import partial
+from math import pi, radians
+from random import Random
+
+from rig.config.models import ArmSection
+from rig.config.world_models import SimulatedArmSection, WorldSection
+from rig.world.site import site_of
+from rig.world.ur10e.flange_motion import Felt
+from rig.world.ur10e.forward_kinematics import Rotation, Vector
+from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.models import simulated_model
+from rig.world.ur10e.ripple import ripple
+from rig.world.ur10e.robot import Identity, Robot
+from rig.world.ur10e.true_arm import TrueArm, known_links
+from rig.world.ur10e.vibration import WRISTS, Vibration
+
+JOINTS = 6
+
+
+class ArmBench:
+    """The controller (`robot`) and the `arm` it drives."""
+
+    def __init__(self, configured: ArmSection, world: WorldSection) -> None:
+        arm = world.arm
+        random = Random(world.seed)
+        model = simulated_model(arm, configured.model)
+        ripples = [ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
+        motion = Motion(
+            [radians(angle) for angle in configured.home_deg or model.home_deg],
+            ripples,
+            arm.encoder_step_rad,
+            memory_s=1e-3 * max(max(each.delay_ms, each.accelerometer.delay_ms) for each in world.sensors.values()),
+            lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
+            if arm.state_jitter_s
+            else None,
+            vibration=_seen_vibration(arm, world.seed),
+            speed_limit_rad_s=model.speed_rad_s,
+        )
+        self.arm = TrueArm(arm, site_of(world.site), motion, random, model.drawing)
+        about_x, about_y, about_z = arm.tcp_rotation_deg
+        self.robot = Robot(
+            Identity(arm.serial_number, model.polyscope),
+            motion,
+            arm.remote_control,
+            arm.speed_slider,
+            known_links(arm.calibration, drawing=model.drawing),
+            model=model,
+            tool_turn_rad=(radians(about_x), radians(about_y), radians(about_z)),
+        )
+
+    @property
+    def time_s(self) -> float:
+        """The end of the last tick."""
+        return self.arm.true_s(self.robot.time_s)
+
+    @property
+    def tick_s(self) -> float:
+        """How long a tick lasts, which is 2 ms by the controller's clock."""
+        return self.arm.tick_s
+
+    @property
+    def waiting(self) -> bool:
+        """Whether nothing but a client can let it move."""
+        return self.robot.waiting
+
+    @property
+    def plain(self) -> bool:
+        """Whether its rate alone is what a body on it feels."""
+        return self.arm.ideal
+
+    def step(self) -> None:
+        """One tick."""
+        self.robot.step()
+        self.arm.step(self.robot.time_s)
+
+    def rate_at(self, time_s: float) -> Vector:
+        """The flange's rate in its own frame, rad/s."""
+        return self.arm.rate_at(time_s)
+
+    def felt_at(self, time_s: float) -> Felt:
+        """All that a body on the flange feels."""
+        return self.arm.felt_at(time_s)
+
+    def frames_at(self, time_s: float) -> Sequence[tuple[Rotation, Vector]]:
+        """Rotation and place of the base and of what each joint carries."""
+        return self.arm.frames_at(time_s)
+
+
+def _seen_vibration(arm: SimulatedArmSection, seed: int) -> Vibration | None:
+    if not arm.vibration_seen_rms_rad_s:
+        return None
+    random = Random(f"vibration {seed}")
+    phases_rad = [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]
+    return Vibration(arm.vibration_seen_rms_rad_s, 2.0 * pi * arm.vibration_seen_hz, phases_rad)
