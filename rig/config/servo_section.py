@@ -47,7 +47,7 @@ class ServoSection(TurnerSection):
     watchdog_s: float = Field(
         default=0.3,
         ge=0.1,
-        le=1.0,
+        le=2.0,
         description="the servo stops by itself if nobody has spoken to it for so long",
     )
 

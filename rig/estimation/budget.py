@@ -19,6 +19,7 @@ from rig.estimation.vector_fit import Explained, Seen
 
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
+AXES, REPEATABILITY, MOUNTING = "arm's axes", "arm's repeatability", "mounting anew"  # what directions may be off by
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -169,20 +170,20 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     source = "scatter of the joint angles"
     yield _found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
-    yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
+    yield assumed(AXES, float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if seen.return_errors_rad_s is not None:
         again, half_width = (
             np.sqrt(3) * seen.return_errors_rad_s @ matrix.T,
             float(np.degrees(unknown.repeatability_rad)),
         )
-        yield assumed("arm's repeatability", half_width, "°", "uncertainty.repeatability_deg", again)
+        yield assumed(REPEATABILITY, half_width, "°", "uncertainty.repeatability_deg", again)
     if seen.encoder_errors_rad_s is not None:
         spread = of(seen.encoder_errors_rad_s @ matrix.T)
         stated = 2 * float(np.degrees(unknown.angle_std_rad))
         yield Contributor(ENCODERS, "B", "normal", stated, "°", "uncertainty.angle_std_deg", np.inf, spread)
     if seen.mount_errors_rad_s is not None:
         off, half_width = np.sqrt(3) * seen.mount_errors_rad_s @ matrix.T, float(np.degrees(unknown.mount_rad))
-        yield assumed("mounting anew", half_width, "°", "uncertainty.mount_deg", off)
+        yield assumed(MOUNTING, half_width, "°", "uncertainty.mount_deg", off)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off

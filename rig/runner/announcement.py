@@ -12,18 +12,22 @@ from rig.station.plain_text import duration_words
 from rig.turners.kind import Words
 
 
-def mounting(plan: Plan, number: int) -> Prompt:
-    """The question before a stage of a plan, with its `number` from 0: whether the item is mounted for it."""
+def mounting(plan: Plan, number: int, words: Words) -> Prompt:
+    """The question before a stage of a plan, with its `number` from 0: whether the item is mounted for it.
+
+    `words` speak of what turns it.
+    """
     stages, stage = plan.stages, plan.stages[number]
     far = _farthest(plan)
     lines = (
         f"Stage {number + 1} of {len(stages)}: {stage.instruction}.",
-        "The arm stands still and its program has ended: it does not move until you answer.",
+        f"The {words.short} {words.stands}: it does not move until you answer.",
         "Then small turns try the mounting, before "
-        f"{len(stage.indices)} sweeps turn the wrists by more than {far} each.",
+        f"{len(stage.indices)} sweeps turn {words.turned} by more than {far} each.",
+        *filter(None, [words.beware]),
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
     )
-    ticked = "The item is mounted so, and nobody and nothing is within the arm's reach"
+    ticked = f"The item is mounted so, and nobody and nothing is within the {words.short}'s reach"
     return Prompt(lines, to_tick=ticked, for_a_person=True, mounts=number)
 
 

@@ -43,6 +43,7 @@ from rig.station.events import (
     VerdictReached,
 )
 from rig.station.station import Station
+from rig.turners.registry import kind_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ class Run:
 
     def _mounted(self, plan: Plan, number: int) -> None:
         """Let the operator mount the item for a stage. Raises Refused `not_mounted`."""
-        if not self.station.ask(mounting(plan, number)):
+        if not self.station.ask(mounting(plan, number, kind_of(self.loaded.config.turner).words)):
             raise Refused(
                 "not_mounted",
                 f"nobody has said that the item is mounted for stage {number + 1}",

@@ -26,7 +26,7 @@ class Words:
     turns of it ("the wrists"); `method` says in a clause how it turns the items, for the
     certificate; `briefly` the same in a few words, for the digital certificate; in both `{turns}`
     stands for what sweeps turned through; `directions` whence its axes are known; `beware` is what an operator must be
-    told of it before it moves.
+    told of it before it moves, `stands` says in a clause how it is left while somebody mounts the item anew.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Words:
     briefly: str
     directions: str
     beware: str = ""
+    stands: str = "stands still"
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,7 @@ SERVO = TurnerKind(
         briefly="{turns} and rests on the shaft of a servo",
         directions="how the item is mounted on the shaft",
         beware=driver.BEFORE_THE_FIRST_MOVE,
+        stands="stands still and holds its shaft as long as it has its supply",
     ),
     fields=SERVO_FIELDS,
 )
