@@ -25,9 +25,9 @@ def plan_servo_six_observation(
     """Three mountings or more, a small trial of each, then rest, turn, rest, turn back, rest.
 
     Each turn is a revolution and `beyond_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
-    winds by a turn's half and a little either way. `start_q_rad` is where the shaft stands (home when None); from there the
-    plan goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns to leave
-    out; a stage of which nothing is left has no steps.
+    winds by a turn's half and a little either way. `start_q_rad` is where the shaft stands (home when None); from
+    there the plan goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns
+    to leave out; a stage of which nothing is left has no steps.
     """
     home = (math.radians(servo.home_deg),)
     start = home if start_q_rad is None else start_q_rad

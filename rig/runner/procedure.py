@@ -144,7 +144,7 @@ class Rig:
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
-        self.recording.station.event(PreflightPassed(self.plan, report))
+        self.recording.station.event(PreflightPassed(self.plan, report, kind.words.short))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)), default=0.0)
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()

@@ -88,5 +88,3 @@ def test_a_plan_that_no_such_servo_can_drive_is_refused_by_name() -> None:
     problems = SERVO.problems([plan], loaded().config.turner, None)
     assert {problem.name for problem in problems} == {"servo_move_too_long"}
     assert SERVO.problems([planned()], loaded().config.turner, None) == []
-
-

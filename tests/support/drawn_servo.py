@@ -113,7 +113,7 @@ def drawn_servo(
         own = plan_servo_six_observation(config.turner, config.procedure, None, done)
         states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
         mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
-        samples = _sampled(far.servo, sits @ mount, (scale, bias - felt @ sits @ mount[:, 2]), end_s, drift, rng)
+        samples = _sampled(far.servo, sits @ mount, (scale, bias - felt @ sits @ mount[:, 2]), (end_s, drift), rng)
         runs.append(
             RunData(
                 configuration.rig_text,
@@ -193,10 +193,10 @@ def _driven(
 
 
 def _sampled(
-    servo: Servo, rows: Array, model: tuple[Array, Array], end_s: float, drift: float, rng: np.random.Generator
+    servo: Servo, rows: Array, model: tuple[Array, Array], until: tuple[float, float], rng: np.random.Generator
 ) -> np.ndarray:
-    """The samples of a gyroscope that sits by `rows` (3, 3) in the shaft's frame."""
-    scale, bias = model
+    """The samples of a gyroscope that sits by `rows` (3, 3) in the shaft's frame, `until` a time by a drifting clock."""
+    (scale, bias), (end_s, drift) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / SENSOR.rate_hz)
     rates = np.array([servo.rate_at(each) for each in time_s.tolist()])
     read = np.outer(rates, rows[:, 2]) / scale - bias + 0.035 * rng.normal(size=(len(time_s), 3))
@@ -207,5 +207,3 @@ def _sampled(
     samples["counts"] = np.round(read / SENSITIVITY)
     samples["temperature_counts"] = -48
     return samples
-
-

@@ -117,6 +117,9 @@ SERVO = TurnerKind(
         directions="how the item is mounted on the shaft",
         beware=driver.BEFORE_THE_FIRST_MOVE,
         stands="stands still and holds its shaft as long as it has its supply",
+        clock="this computer's oscillator, by a clock that nobody sets",
+        told="as the stages of the procedure say",
+        traced="not traceable; the six-observation solution knows speeds alone and does without them",
     ),
     fields=SERVO_FIELDS,
 )

@@ -140,7 +140,7 @@ class ServoReport:
     @property
     def serial_number(self) -> str:
         """What stands for one: such a servo has none that it could tell."""
-        return f"not told, ID {self.servo_id}"
+        return f"with ID {self.servo_id}"
 
     @property
     def software(self) -> str:
