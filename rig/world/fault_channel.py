@@ -33,7 +33,7 @@ from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
 from rig.world.servo.bench import ServoBench
-from rig.world.servo.servo import Faults
+from rig.world.servo.drive import Faults
 from rig.world.servo.wire_format import WRITE, Packet
 from rig.world.ur10e.bench import ArmBench
 from rig.world.ur10e.robot import Robot

@@ -195,7 +195,7 @@ def _driven(
 def _sampled(
     servo: Servo, rows: Array, model: tuple[Array, Array], until: tuple[float, float], rng: np.random.Generator
 ) -> np.ndarray:
-    """The samples of a gyroscope that sits by `rows` (3, 3) in the shaft's frame, `until` a time by a drifting clock."""
+    """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / SENSOR.rate_hz)
     rates = np.array([servo.rate_at(each) for each in time_s.tolist()])

@@ -12,6 +12,7 @@ from rig.data.silence import crowding
 from rig.errors import Fault, Problem, Refused, RigError, refuse
 from rig.motion.carried import Carried
 from rig.motion.steps import Motion
+from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, Denied
 from rig.turners.servo.instructions import disarm, go, make_ready
 from rig.turners.servo.link import Job, Link
@@ -156,8 +157,8 @@ class Servo:
             watch()
             self.check()
             self._doing = motion.name
-            if problems := move_problems([motion], self._report.velocity_limit_rad_s):
-                self._fail(problems[0])
+            if wrong := move_problems([motion], self._report.velocity_limit_rad_s):
+                self._fail(wrong[0])
                 self.check()
             move = move_of(motion)
             self._looked_s, self._moving = time.monotonic(), True
@@ -173,13 +174,7 @@ class Servo:
 
                 self._wait(lambda: arrived() or self.latest.time_s > began_s + takes_s, watch)
                 if not arrived():
-                    self._fail(
-                        Problem(
-                            "servo_slower_than_planned",
-                            f"{motion.name} did not end within {takes_s:.1f} s, planned were {motion.duration_s:.1f} s",
-                            "Look for what holds the shaft, and whether the servo's supply is strong enough",
-                        )
-                    )
+                    self._fail(problems.slower_than_planned(motion, takes_s))
                 self.check()
             finally:
                 self._moving = False
@@ -254,29 +249,15 @@ class Servo:
         except Denied as error:
             self._fail(self._why_denied(error))
         except BusError as error:
-            self._fail(
-                Problem(
-                    "servo_does_not_hear",
-                    f"the servo did not acknowledge an instruction ({error})",
-                    "Look at its supply and its cable, then start again",
-                )
-            )
+            self._fail(problems.does_not_hear(error))
         self.check()
 
     def _why_denied(self, error: Denied) -> Problem:
         """The reason of a no: mostly that the watchdog has stopped the servo."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
-                return Problem(
-                    "servo_watchdog_tripped",
-                    "the servo's watchdog has stopped it: no instruction came in time",
-                    "Look at the load of the computer and at the cable, then start again",
-                )
-        return Problem(
-            "servo_refuses",
-            f"the servo refuses an instruction: {error}",
-            "Switch it off and on; look its registers up in the maker's Dynamixel Wizard 2.0",
-        )
+                return problems.tripped()
+        return problems.refuses(error)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
         """Block until `done`, looking at the servo's faults and the caller's watch all the time."""
@@ -294,11 +275,7 @@ class Servo:
         silent_s = time.monotonic() - link.turned_s
         if not link.alive or silent_s < HUNG_S * crowding():
             return None
-        return Problem(
-            "servo_driver_hung",
-            f"the thread that has the servo's line has not come round for {silent_s:.1f} s",
-            "Look at the adapter and its cable, then start again",
-        )
+        return problems.driver_hung(silent_s)
 
     def _take_state(self, state: ServoState) -> None:
         """Take a state as it comes, on the link's thread."""
@@ -310,15 +287,9 @@ class Servo:
         except RigError as error:
             self._fail(error.problem)
         except Exception as error:
-            self._fail(Problem("servo_state_not_taken", f"a state could not be passed on ({error})", "See the log"))
+            self._fail(problems.state_not_taken(error))
         if self._moving and time.monotonic() - self._looked_s > UNWATCHED_S * crowding():
-            self._fail(
-                Problem(
-                    "servo_unwatched",
-                    f"nobody has looked at the servo for {UNWATCHED_S:.0f} s during {self._doing}",
-                    "See the log for what held the program up, then start again",
-                )
-            )
+            self._fail(problems.unwatched(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()
 
