@@ -127,7 +127,7 @@ class ArmSection(TurnerSection):
         return self.host
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Its controller at another host."""
+        """The controller at another host."""
         return {"host": host}
 
     @property

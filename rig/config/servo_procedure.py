@@ -43,7 +43,7 @@ THREE_MOUNTINGS = (
 
 
 class ServoSixObservationSection(ProcedureSection):
-    """In each of three mountings the shaft turns the item once each way; the speeds alone tell scale and bias."""
+    """Three mountings, and a turn each way of the shaft in each: the speeds alone tell scale and bias."""
 
     name: Literal["servo_six_observation"] = Field(default="servo_six_observation", description="this procedure")
     stages: tuple[ServoStageSection, ...] = Field(

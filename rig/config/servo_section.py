@@ -59,7 +59,7 @@ class ServoSection(TurnerSection):
 
     @property
     def address(self) -> str:
-        """Its port."""
+        """The servo's port."""
         return self.port
 
     @property
@@ -68,5 +68,5 @@ class ServoSection(TurnerSection):
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """Its port at another host."""
+        """The servo's port at another host."""
         return {"port": f"socket://{host}:{urlsplit(self.port).port}"}

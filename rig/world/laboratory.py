@@ -63,7 +63,7 @@ class Laboratory:
 
     @property
     def robot(self) -> Robot:
-        """Its controller. Raises TypeError where no arm turns the item."""
+        """The controller. Raises TypeError where no arm turns the item."""
         return self._arm_bench.robot
 
     @property

@@ -3,8 +3,8 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -23,7 +23,7 @@ from rig.turners.servo.preflight import servo_problems
 from rig.turners.servo.registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, WATCHDOG_S
 from rig.turners.servo.state import ServoReport, ServoState, stands
 from rig.turners.servo.stopping import SURE, Stop
-from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
+from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: where a servo without an integral gain comes to rest beside its goal
@@ -142,7 +142,7 @@ class Servo:
         self._wait(lambda: stands(list(self._states)) or time.monotonic() > ends_s)
         if not stands(list(self._states)):
             raise Refused("servo_moves", "the servo's shaft is moving", "Hold the board still, then start again")
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             self._holds = True
             self._call(lambda bus: make_ready(bus, self._watchdog))
             self._linked.supervising = True
@@ -153,7 +153,7 @@ class Servo:
         `watch` is called before and then at least every 20 ms; what it raises stops the shaft and goes on to the
         caller. What the servo is really asked for is `moves.move_of(motion)`.
         """
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             watch()
             self.check()
             self._doing = motion.name
@@ -181,7 +181,7 @@ class Servo:
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
         """Stand still for a time of the states' clock; `watch` as in `move`."""
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
@@ -231,14 +231,6 @@ class Servo:
         if self._link is None:
             raise RuntimeError("start() comes first")
         return self._link
-
-    @contextmanager
-    def _stopping_on_error(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException:
-            self.stop()
-            raise
 
     def _call(self, job: Job) -> None:
         """Have the servo told something; what goes wrong with it is a problem of the servo's."""

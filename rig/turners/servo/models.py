@@ -35,7 +35,7 @@ class ServoModel:
 
     @property
     def title(self) -> str:
-        """Its name in the maker's writing."""
+        """The name in the maker's writing."""
         return self.name.upper().replace("_", "-")
 
     @property

@@ -134,7 +134,7 @@ class ServoReport:
 
     @property
     def host(self) -> str:
-        """Its port."""
+        """The servo's port."""
         return self.port
 
     @property
@@ -149,12 +149,12 @@ class ServoReport:
 
     @property
     def model(self) -> str | None:
-        """Its model, in the maker's writing."""
+        """The model, in the maker's writing."""
         return self.servo.title
 
     @property
     def kinematics(self) -> DenavitHartenberg | None:
-        """It tells none."""
+        """No geometry: a servo tells none."""
         return None
 
     @property

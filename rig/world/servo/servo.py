@@ -57,7 +57,7 @@ class Servo:
 
     @property
     def shaft(self) -> Shaft:
-        """Its shaft."""
+        """The shaft."""
         return self.drive.shaft
 
     @property
