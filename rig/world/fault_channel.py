@@ -133,7 +133,7 @@ class ControlSession:
                 "board_baud": world.line.baud,
             },
             "servo_power": lambda on: servo.switch(bool(on), now_s()),
-            "servo_torque": lambda on: servo.obey(Packet(servo.memory["ID"], WRITE, bytes([64, 0, on]), True), now_s()),
+            "servo_torque": partial(_servo_torque, bench),
             "servo_fault": partial(_servo_fault, bench),
             "servo_line": world.servo_at_fault,
         }
@@ -268,6 +268,11 @@ class ControlSession:
     def _host_baud(self, baud: float | None) -> None:
         """The host reads and writes at another baud rate than the board: what TCP would not show."""
         self._world.line.host_baud = baud
+
+
+def _servo_torque(bench: ServoBench, on: bool) -> None:
+    """Switch torque on or off as another program does."""
+    bench.servo.obey(Packet(bench.servo.memory["ID"], WRITE, bytes([64, 0, bool(on)]), True), bench.now_s())
 
 
 def _servo_fault(bench: ServoBench, *, lose: int = 0, spoil: int = 0, **given: float) -> None:

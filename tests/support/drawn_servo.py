@@ -24,7 +24,7 @@ from rig.turners.servo.kind import SERVO
 from rig.turners.servo.models import named
 from rig.turners.servo.moves import move_of
 from rig.turners.servo.registers import DRIVE_MODE, GOAL, OPERATING_MODE, PROFILE, STATE, TORQUE, Register
-from rig.turners.servo.state import JOINTS, decode
+from rig.turners.servo.state import JOINTS, SERVO_STATE_DTYPE, decode
 from rig.world.servo.servo import Servo
 from rig.world.servo.shaft import Shaft
 from rig.world.servo.truth import ServoTruth
@@ -188,8 +188,7 @@ def _driven(
         if isinstance(step, Sweep):
             note(SweepFinished(step))
     poll(next_s + 1.0)
-    turner = RecordedTurner.of("servo", SERVO.meant(loaded().config.turner), JOINTS, SERVO.fields)
-    return np.array(rows, turner.dtype), tuple(events), next_s
+    return np.array(rows, SERVO_STATE_DTYPE), tuple(events), next_s
 
 
 def _sampled(
