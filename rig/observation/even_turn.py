@@ -16,7 +16,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep
 from rig.observation.revolution import MAX_STATE_GAP_S, Ends, arm_states_lost, describe, not_constant
-from rig.observation.turn_speed import turn_speed
+from rig.observation.turn_speed import FEWEST_PLACES, turn_speed
 
 SMOOTHED_S = 0.12  # a window in which a straight line stands for the angle: the gear's ripple is longer
 FEWEST = 5
@@ -62,6 +62,8 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
     gap = float(np.diff(time_s).max())
     if gap > MAX_STATE_GAP_S:
         raise arm_states_lost(where, f"for {gap:.2f} s")
+    if np.sum(gone < gone[-1] - TURN_RAD) < FEWEST_PLACES or np.sum(gone > gone[0] + TURN_RAD) < FEWEST_PLACES:
+        raise arm_states_lost(where, "where the turn begins or where it ends")
     _check_speed(time_s, gone, where, settings)
     found = turn_speed(time_s, gone)
     start_s = float(time_s[0] + time_s[-1] - found.period_s) / 2
