@@ -21,7 +21,7 @@ from rig.motion.geometry import (
 )
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
-from rig.observation.even_turn import find_even_turn, smoothed
+from rig.observation.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
 from rig.observation.known_motion import check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.windows import Window
@@ -55,6 +55,7 @@ class ArmMotion:
 
         self.kinematics, self._names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
+        states = well_timed(states) if self._scatters else states
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
         if len(self.time_s) < 4 or not names:
@@ -75,7 +76,7 @@ class ArmMotion:
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(times_s, rates @ self.mount.T)
-        close = np.diff(self.time_s) <= MAX_STATE_STEP_S
+        close = np.diff(self.time_s) <= (SMOOTHED_S / 3 if self._scatters else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
     @property

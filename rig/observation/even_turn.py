@@ -20,8 +20,19 @@ from rig.observation.turn_speed import FEWEST_PLACES, turn_speed
 
 SMOOTHED_S = 0.12  # a window in which a straight line stands for the angle: the gear's ripple is longer
 FEWEST = 5
+USUAL, HELD_UP = 0.25, 4.0  # the quartile of how long asking takes when nothing holds it up; and so many times that
 KNOTS = 3  # every so many of the smoothed angles is a knot of a spline: neighbours share nearly all readings
 GUARD_RAD = float(np.radians(1.5))  # away from the ramps: how late a shaft follows, and what its encoder is out
+
+
+def well_timed(states: NDArray[Any]) -> NDArray[Any]:
+    """The states that were measured when they say: of those that tell how long asking took, not the held-up ones.
+
+    The moment of the measurement lies somewhere within that time.
+    """
+    if "took_s" not in (states.dtype.names or ()) or not len(states):
+        return states
+    return states[states["took_s"] <= HELD_UP * np.quantile(states["took_s"], USUAL)]
 
 
 def smoothed(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
