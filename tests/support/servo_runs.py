@@ -94,7 +94,10 @@ def carried_out(*command: str | Path, config: Path, when: str = "", times: int =
             time.sleep(after_s)
             seen.acted_s = time.monotonic()
             act(seen)
+    process.stdout.close()
     process.wait(60)
+    if seen.acted_s:
+        watching.join(10.0)
     return seen
 
 
