@@ -32,7 +32,8 @@ def well_timed(states: NDArray[Any]) -> NDArray[Any]:
     """
     if "took_s" not in (states.dtype.names or ()) or not len(states):
         return states
-    return states[states["took_s"] <= HELD_UP * np.quantile(states["took_s"], USUAL)]
+    in_time: NDArray[Any] = states[states["took_s"] <= HELD_UP * np.quantile(states["took_s"], USUAL)]
+    return in_time
 
 
 def smoothed(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:

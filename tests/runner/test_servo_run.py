@@ -29,7 +29,7 @@ def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> Non
     assert seen.process.returncode == 3 and "servo_link_lost" in said and "rig resume" in said
     assert seen.at_rest_after_s < 1.0 and seen.stood
     begun = [read_run(out / name) for name in ("run.h5", "run-2.h5")]
-    assert [len(run.samples["gyro"]) > 1000 for run in begun] == [True, True] and len(begun[1].states) > 500
+    assert [len(run.samples["gyro"]) > 1000 for run in begun] == [True, True] and len(begun[1].states) > 100
 
     rest = carried_out("resume", out, config=config)
     assert rest.process.returncode == 0, "".join(rest.said)
