@@ -21,6 +21,8 @@ from rig.config.procedure_sections import (
     StaticAttitudesSection,
     VerifySection,
 )
+from rig.config.servo_procedure import ServoSixObservationSection
+from rig.config.servo_section import ServoSection
 from rig.data.run_file import RunData
 from rig.errors import Refused
 from rig.motion.state import Joints
@@ -28,6 +30,7 @@ from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid
 from rig.plans.by_hand import plan_by_hand
 from rig.plans.imu import plan_imu
 from rig.plans.registry import Procedure
+from rig.plans.servo_sweeps import plan_servo_six_observation
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import plan_static_attitudes
 from rig.plans.verbs import Verbs
@@ -35,8 +38,8 @@ from rig.plans.verbs import Verbs
 __all__ = [
     "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Dwell", "HandSection", "ImuSection",
     "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
-    "SixObservationSection", "SixSweepsSection", "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection",
-    "Verbs", "VerifySection", "calibrated", "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu",
-    "plan_six_observation", "plan_static_attitudes", "run_script", "trapezoid_duration", "travel", "verified",
-    "verified_alone",
+    "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
+    "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection", "Verbs", "VerifySection", "calibrated",
+    "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu", "plan_servo_six_observation", "plan_six_observation",
+    "plan_static_attitudes", "run_script", "trapezoid_duration", "travel", "verified", "verified_alone",
 ]  # fmt: skip

@@ -17,13 +17,14 @@ from rig.data.run_file import RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Budget, budget
+from rig.estimation.budget import Budget, Unknown, budget
 from rig.estimation.by_hand import HandSolution
 from rig.estimation.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
+from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Explained, Seen, explain
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
@@ -40,8 +41,8 @@ class SensorResult:
     """One sensor's calibration and what it rests on.
 
     `explained` is the vector model with gravity and a wandering bias, None for recordings of before there was a site
-    and where the vector model has no solution. The `uncertainty` is its; there is none of another
-    estimator.
+    and where the vector model has no solution. The `uncertainty` is that of the chosen solution, where it is the vector
+    model's or `newton`'s; there is none of another estimator.
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
@@ -171,10 +172,14 @@ def _solve_sensor(
         solution=solution,
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
-        uncertainty=(
-            budget(explained, unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate)))
-            if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
-            else None
+        uncertainty=None
+        if surroundings is None or not isinstance(explained, Explained)
+        else _budget_of(
+            solution,
+            explained,
+            surroundings,
+            unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate)),
+            (name, sensor.part),
         ),
         six_observation=six_observation,
         algorithm_1=algorithm_1,
@@ -184,6 +189,18 @@ def _solve_sensor(
         corrected_by=_correction(solution, whole_matrix=whole_matrix),
         earth=earth_rate,
     )
+
+
+def _budget_of(
+    solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, of: tuple[str, str]
+) -> Budget | None:
+    """The budget of the chosen solution, of a sensor of that name and part; there is one of two estimators."""
+    if isinstance(solution, VectorSolution):
+        return budget(explained, unknown)
+    if isinstance(solution, Solution) and solution.estimator == "newton":
+        axes_rad = float(np.radians(surroundings.uncertainty.of("non_orthogonality_deg", *of)))
+        return six_observation_budget(explained, solution, unknown, axes_rad)
+    return None
 
 
 def found_earth_rate(earth_rate: EarthRate | Fault | None) -> EarthRate | None:

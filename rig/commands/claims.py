@@ -40,7 +40,9 @@ def claimed(config: RigConfig) -> Iterator[None]:
 
 
 def claimed_arm(host: str) -> AbstractContextManager[None]:
-    """The arm, by whatever name it is called. Raises Refused `arm_claimed`."""
+    """The arm, or what turns at a serial port, by whatever name it is called. Raises Refused `arm_claimed`."""
+    if "/" in host:
+        return _claimed("arm_claimed", f"port {_place(host)}", f"the turner at {host}")
     return _claimed("arm_claimed", f"arm {_address(host)}", f"the arm at {host}")
 
 

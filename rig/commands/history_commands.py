@@ -232,13 +232,12 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
                 f"{folder} has a {RESULT} but no recording from which it can be computed",
                 "Import the folder with its recordings",
             )
-    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.history.integrity import MOST_TOLD
     from rig.history.recomputed import not_given
     from rig.plans.recorded import judged, open_run
     from rig.report.document import document_of
 
-    given = document_of(judged(open_run(folder), DEFAULT_ESTIMATOR))
+    given = document_of(judged(open_run(folder)))
     differing = [] if claimed is None else not_given(claimed.document, given)
     if claimed is not None and not differing:
         return claimed

@@ -28,14 +28,12 @@ def own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[
     if laboratory is None or not isinstance(config, RigConfig):
         yield []
         return
-    key = f"{_turner_key(laboratory)}.host" if config.turner.address else None
-    host = config.turner.address or _board_host(config)
+    host = config.turner.simulated_at or _board_host(config)
     with ExitStack() as held:
         own = next((each for each in (host, *_others()) if _take(each, held)), host)
         if own != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
-        moved = [] if key is None else [f"{key}={own}"]
-        yield [] if own == host else [*moved, *_moved(config, own)]
+        yield [] if own == host else [*_turner_moved(config, laboratory, own), *_moved(config, own)]
 
 
 @contextmanager
@@ -73,11 +71,13 @@ def _board_host(config: SensorsConfig) -> str:
     return "" if config.board is None else urlsplit(config.board.port).hostname or ""
 
 
-def _turner_key(text: str) -> str:
-    """The key under which a file says what turns."""
+def _turner_moved(config: RigConfig, text: str, host: str) -> Iterator[str]:
+    """What turns, under the key of the file that says it, at another host."""
     import yaml
 
-    return "turner" if "turner" in yaml.safe_load(text) else "arm"
+    section = "turner" if "turner" in yaml.safe_load(text) else "arm"
+    for key, value in config.turner.moved_to(host).items():
+        yield f"{section}.{key}={value}"
 
 
 def _moved(config: SensorsConfig, host: str) -> Iterator[str]:

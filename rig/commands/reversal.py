@@ -20,7 +20,6 @@ def run(options: Namespace) -> int:
     Raises Refused `report_folder`, and Refused and Fault as `open_run`, `refuse_elsewhere`, `judged` and
     `reversals` do.
     """
-    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.analysis.reversal import reversals
     from rig.config.written_file import write_new
     from rig.observation.arm_motion import refuse_elsewhere
@@ -30,7 +29,7 @@ def run(options: Namespace) -> int:
     opened = [(str(each), open_run(each)) for each in options.runs]
     for _, run in opened:
         refuse_elsewhere(run.movement[0])
-    document = reversal_document(reversals([(each, judged(run, DEFAULT_ESTIMATOR)) for each, run in opened]))
+    document = reversal_document(reversals([(each, judged(run)) for each, run in opened]))
     print_reversal(document, as_json=options.json)
     if options.out is not None:
         try:

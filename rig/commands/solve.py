@@ -64,14 +64,13 @@ def _recording(options: Namespace) -> int:
     `--set` changes what it is judged by, see `RunSettings.with_overrides`. `--script` is the one it was recorded by,
     where that is another's.
     """
-    from rig.analysis.estimators import DEFAULT_ESTIMATOR
     from rig.plans.recorded import judged, left_out, open_run
     from rig.report.document import document_of
     from rig.report.table import print_outcome
 
     run = open_run(options.run, options.script).judged_by(options.overrides)
     say_on_terminal("solving")
-    outcome = judged(run, options.estimator or DEFAULT_ESTIMATOR)
+    outcome = judged(run, options.estimator)
     if (said := left_out(run)) is not None:
         say(said, sys.stderr)
     folder = options.run if options.run.is_dir() else options.run.parent

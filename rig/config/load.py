@@ -18,6 +18,7 @@ from rig.config.hand_sections import HandSection
 from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.servo_section import ServoSection
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
@@ -25,8 +26,9 @@ from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
-Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for what can be simulated
-ARM, HAND = "ur", "hand"  # the kinds of turners that the simulated laboratory knows; `arm` is the section of the first
+Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for those in stock
+# The kinds of turners that the laboratory can simulate; `arm` is the section of the first.
+STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
 
@@ -206,7 +208,7 @@ def _validate_turner(
         if "arm" not in document:
             return None, ["arm: missing"]
         return _validate(ArmSection, document["arm"], ("arm",), layered)
-    known: dict[str, type[TurnerSection]] = {ARM: ArmSection, HAND: HandSection, **(turners or {})}
+    known = {**STOCK_TURNERS, **(turners or {})}
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:
@@ -306,16 +308,17 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
     turner = config.turner
-    if not isinstance(turner, ArmSection | HandSection):
-        yield "world: simulates an arm or a hand, and turner says another kind"
+    if (host := turner.simulated_at) is None and not isinstance(turner, HandSection):
+        yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
         return
-    host = turner.address
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
     if isinstance(turner, HandSection) and config.board is None:
         yield "board: missing; the simulated hand turns sensors on a board"
-    if isinstance(turner, ArmSection) and not _is_loopback(host):
-        yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
+    if host is not None and not _is_loopback(host):
+        key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.moved_to(host)))}"
+        yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
+    yield from world.misfits(turner)
     for place, port in ports.items():
         if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):
             yield (

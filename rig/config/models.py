@@ -50,6 +50,15 @@ class TurnerSection(Section):
         """Where the extension ends on which the sensors sit, x y z in the frame of what it turns, m."""
         return (0.0, 0.0, 0.0)
 
+    @property
+    def simulated_at(self) -> str | None:
+        """The host at which a simulated one would answer; None where none can be simulated."""
+        return None
+
+    def moved_to(self, host: str) -> Mapping[str, str]:
+        """The keys, with their values, that put a simulated one at another host."""
+        return {}
+
 
 class ArmSection(TurnerSection):
     """The robot arm and what it carries."""
@@ -111,6 +120,15 @@ class ArmSection(TurnerSection):
     def address(self) -> str:
         """The controller's name or address."""
         return self.host
+
+    @property
+    def simulated_at(self) -> str | None:
+        """The controller's name or address."""
+        return self.host
+
+    def moved_to(self, host: str) -> Mapping[str, str]:
+        """The controller at another host."""
+        return {"host": host}
 
     @property
     def extension_m(self) -> Vector3:

@@ -12,6 +12,7 @@ from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
+from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
 
 __all__ = [
@@ -357,6 +358,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
         "imu": ImuSection,
         "bias_drift": BiasDriftSection,
         "by_hand": ByHandSection,
+        "servo_six_observation": ServoSixObservationSection,
     }
 )
 

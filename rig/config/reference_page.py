@@ -8,6 +8,7 @@ from rig.config import layers, yaml_text
 from rig.config.models import ArmSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.sensor_catalogue import PARTS
+from rig.config.servo_section import ServoSection
 from rig.config.world_models import WorldSection
 
 Schema = Mapping[str, Any]
@@ -113,10 +114,12 @@ def _turners() -> Iterator[str]:
         "",
         "What turns the sensors, said by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
         "`arm`; a file has one of the two. `turner: {kind: hand}` is an operator's hand, and has no keys",
-        "([by hand](how-to/by-hand.md)). A package may bring another kind, which brings its own keys",
-        "([another turner](how-to/other-hardware.md)).",
+        "([by hand](how-to/by-hand.md)). `kind: servo` has the keys below. A package may bring another kind, which",
+        "brings its own keys ([another turner](how-to/other-hardware.md)).",
         "",
     )
+    servo = ServoSection.model_json_schema()
+    yield from _section("turner", servo, servo.get("$defs", {}), "### `turner` with `kind: servo`")
 
 
 def _procedures() -> Iterator[str]:

@@ -1,14 +1,19 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
+from rig.config.hand_sections import HandSection
+from rig.config.models import ArmSection, TurnerSection
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
+from rig.config.servo_section import ServoSection
 from rig.config.stage_section import StageMountSection
 from rig.config.world_hand import SimulatedHandSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
+from rig.config.world_servo import SimulatedServoSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
 Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]
@@ -409,6 +414,7 @@ class WorldSection(Section):
     hand: SimulatedHandSection = Field(
         default=SimulatedHandSection(), description="the simulated operator, where a hand turns the item"
     )
+    servo: SimulatedServoSection = SimulatedServoSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})
@@ -417,3 +423,15 @@ class WorldSection(Section):
         max_length=12,
         description="how the simulated operator truly mounts the item for each of `procedure.stages`",
     )
+
+    def misfits(self, turner: TurnerSection) -> Iterator[str]:
+        """What of this does not go with what turns, a line each."""
+        kinds: dict[str, type[TurnerSection]] = {"arm": ArmSection, "servo": ServoSection, "hand": HandSection}
+        for name, kind in kinds.items():
+            if name in self.model_fields_set and not isinstance(turner, kind):
+                yield f"world.{name}: there is none; another kind of turner turns the sensors"
+        if isinstance(turner, ServoSection) and self.time_scale != 1.0:
+            yield (
+                f"world.time_scale: {self.time_scale:g}: must be 1 with a servo, whose driver measures time by this "
+                "computer's clock, as with a real one"
+            )

@@ -27,7 +27,8 @@ class RecordedTurner:
     """A turner: its `kind`, by which it is registered, who made it and which model it is (None where not told).
 
     `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
-    angles are to be read with; `fields` are what its states tell beyond times and joints.
+    angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
+    `Made`, zero in recordings of before.
     """
 
     kind: Kind
@@ -36,11 +37,13 @@ class RecordedTurner:
     joints: Annotated[tuple[JointName, ...], Field(max_length=MAX_JOINTS)]
     geometry: DenavitHartenberg
     fields: Annotated[tuple[StateField, ...], Field(max_length=MAX_FIELDS)] = ()
+    reading_std_rad: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
 
     @classmethod
     def of(cls, kind: str, made: Made, joints: Sequence[str], fields: Sequence[StateField]) -> "RecordedTurner":
         """A turner of that kind, made so, whose states tell these fields. Raises ValueError as `described`."""
-        return described(asdict(cls(kind, made.maker, made.model, tuple(joints), made.kinematics, tuple(fields))))
+        turned = tuple(joints), made.kinematics, tuple(fields), made.reading_std_rad
+        return described(asdict(cls(kind, made.maker, made.model, *turned)))
 
     @cached_property
     def dtype(self) -> np.dtype[Any]:
@@ -49,7 +52,10 @@ class RecordedTurner:
 
     def to_json(self) -> str:
         """The description as it stands in a run file."""
-        return json.dumps(asdict(self), allow_nan=False)
+        document = asdict(self)
+        if not self.reading_std_rad:
+            del document["reading_std_rad"]
+        return json.dumps(document, allow_nan=False)
 
 
 def described(document: Any) -> RecordedTurner:

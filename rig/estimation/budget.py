@@ -20,7 +20,7 @@ from rig.estimation.vector_fit import Explained, Seen
 
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
-MOUNTS = "mounting anew"
+AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "mounting anew"  # what directions may be off by
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -171,13 +171,13 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     source = "scatter of the joint angles"
     yield _found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
-    yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
+    yield assumed(AXES, float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if seen.return_errors_rad_s is not None:
         again, half_width = (
             np.sqrt(3) * seen.return_errors_rad_s @ matrix.T,
             float(np.degrees(unknown.repeatability_rad)),
         )
-        yield assumed("arm's repeatability", half_width, "°", "uncertainty.repeatability_deg", again)
+        yield assumed(REPEATABILITY, half_width, "°", "uncertainty.repeatability_deg", again)
     yield from _of_marks_and_mounts(explained, unknown, of)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)

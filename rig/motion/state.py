@@ -197,12 +197,15 @@ class Made:
     """Who made what turns, which model it is (None where it does not tell), and the geometry reckoned with.
 
     `tcp_offset` is where an arm's tool centre point stands in the flange's frame, which nothing is reckoned with.
+    `reading_std_rad` is how much one reading of a joint's angle scatters, where that is too much for an angle at one
+    moment: then a turn is known by the same reading one turn later.
     """
 
     maker: str
     model: str | None
     kinematics: DenavitHartenberg
     tcp_offset: Pose | None = None
+    reading_std_rad: float = 0.0
 
 
 class Report(Protocol):

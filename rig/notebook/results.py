@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, rows
@@ -89,8 +88,8 @@ class Result(Mapping[str, Calibration]):
         return calibrated + checks
 
 
-def solve(run: Run, estimator: str = DEFAULT_ESTIMATOR, **changes: float) -> Result:
-    """Solve and judge a run, as `rig solve` does.
+def solve(run: Run, estimator: str | None = None, **changes: float) -> Result:
+    """Solve and judge a run, as `rig solve` does, by its procedure's own estimator unless another is named.
 
     `changes` are thresholds or limits to judge it by instead of the recorded ones: `max_lost_fraction=0.01`. Raises
     Fault and Refused by name as `rig solve` does; `unknown_setting` says what can be changed.

@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings
@@ -51,7 +50,7 @@ class Run(Mapping[str, Readings]):
     @cached_property
     def calibration(self) -> Outcome | None:
         """What the raw readings amount to by themselves; None where none were recorded."""
-        return judged(self.recorded.only_raw(), DEFAULT_ESTIMATOR) if self.recorded.raw else None
+        return judged(self.recorded.only_raw()) if self.recorded.raw else None
 
     @cached_property
     def corrected(self) -> tuple[ObservedRun, ...]:

@@ -21,12 +21,14 @@ from rig.motion.geometry import (
 )
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
+from rig.observation.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
 from rig.observation.known_motion import check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.windows import Window
 
 MIN_RATE_RAD_S = 0.01
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
+PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
 
 
@@ -36,7 +38,8 @@ class ArmMotion:
     Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
     counts is when the joint was where. `states` (m,) are rows as `state_dtype` has them, of joints of that `kinematics`
     and of those `names`. All that stands in the flange's frame is given in the item's, to which `mount` (3, 3) takes
-    it: they are one where the item is not mounted anew.
+    it: they are one where the item is not mounted anew. Where one reading of an angle scatters (`reading_std_rad`),
+    angles and rates are those of a window, and a turn is known by the same reading one turn later.
     Raises Fault `no_motion`, `not_finite`, `impossible_times`.
     """
 
@@ -46,11 +49,13 @@ class ArmMotion:
         kinematics: DenavitHartenberg = NOMINAL,
         names: Sequence[str] = JOINT_NAMES,
         mount: Array | None = None,
+        reading_std_rad: float = 0.0,
     ) -> None:
         from scipy.interpolate import CubicSpline
 
-        self.kinematics, self._names = kinematics, names
+        self.kinematics, self._names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
+        states = well_timed(states) if self._scatters else states
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
         if len(self.time_s) < 4 or not names:
@@ -59,14 +64,19 @@ class ArmMotion:
         if not (np.isfinite(self.time_s).all() and np.isfinite(self._states["q_rad"]).all()):
             raise not_finite("an arm state")
         check_span(self.time_s, "the arm's states")
-        self.angles = CubicSpline(self.time_s, self._states["q_rad"])
-        every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
-        times_s, angles = self.time_s[:: max(every, 1)], self._states["q_rad"][:: max(every, 1)]
-        rates = flange_rate(angles, CubicSpline(times_s, angles)(times_s, 1), kinematics)
+        if self._scatters:
+            times_s, angles, joint_rates = smoothed(self.time_s, self._states["q_rad"])
+            self.angles = CubicSpline(times_s, angles)
+        else:
+            self.angles = CubicSpline(self.time_s, self._states["q_rad"])
+            every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
+            times_s, angles = self.time_s[:: max(every, 1)], self._states["q_rad"][:: max(every, 1)]
+            joint_rates = CubicSpline(times_s, angles)(times_s, 1)
+        rates = flange_rate(angles, joint_rates, kinematics)
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(times_s, rates @ self.mount.T)
-        close = np.diff(self.time_s) <= MAX_STATE_STEP_S
+        close = np.diff(self.time_s) <= (SMOOTHED_S / 3 if self._scatters else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
     @property
@@ -98,6 +108,8 @@ class ArmMotion:
     def moved_rad(self, window: Window) -> float | None:
         """How far the joint that moved most was moved in a window; None where no two states tell."""
         q_rad = self._q_rad(window)
+        if self._scatters and len(q_rad) >= PARTS:
+            q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, PARTS)])
         return float(np.ptp(q_rad, axis=0).max()) if len(q_rad) > 1 else None
 
     def away_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
@@ -117,7 +129,8 @@ class ArmMotion:
         `other_joint_moved`.
         """
         begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])
-        found = find_revolution(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
+        find = find_even_turn if self._scatters else find_revolution
+        found = find(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
         began = self.angles(found.start_s)
         rate = self.rate(found.time_s).mean(axis=0)
         growing = 1 if sweep.direction == "ccw" else -1
@@ -153,7 +166,8 @@ def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:
     turner = run.turner
     assert turner is not None, "of what was not recorded elsewhere"
     mount = np.array(run.settings.mount)
-    return ArmMotion(run.states, turner.geometry, turner.joints, mount if turned is None else turned @ mount)
+    mount = mount if turned is None else turned @ mount
+    return ArmMotion(run.states, turner.geometry, turner.joints, mount, turner.reading_std_rad)
 
 
 def refuse_elsewhere(run: RunData) -> None:

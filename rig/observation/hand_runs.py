@@ -17,6 +17,7 @@ from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled, Move, Rest, Told
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT
@@ -150,14 +151,13 @@ def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSenso
             "hand can show that",
             "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
         )
-    gravity = {} if settings.site is None else {"gravity_m_s2": settings.site.gravity_m_s2}
     first = None if sensor.measures(ACCELERATION) else turned_face(FACES[0], np.array(sensor.mounting))
     return Told(
         clock_ppm=known.crystal_ppm,
         clock_source="the board's crystal",
         box_rad=said.box_rad,
         first_face=first,
-        **gravity,
+        gravity_m_s2=STANDARD_GRAVITY_M_S2 if settings.site is None else settings.site.gravity_m_s2,
     )
 
 

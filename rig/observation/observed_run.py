@@ -106,15 +106,16 @@ def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATE
     for run in runs:
         refuse_elsewhere(run)
     return tuple(
-        observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]), turned.get(run.settings.stage))
+        observe_run(run, runs[0].settings.observation, _repeated(runs, place), turned.get(run.settings.stage))
         for place, run in enumerate(runs)
-        if _finished(run) - _repeated(runs[place + 1 :])
+        if _finished(run) - _repeated(runs, place)
     )
 
 
-def _repeated(later: Sequence[RunData]) -> frozenset[int]:
-    """The sweeps and dwells that later recordings of a run hold as well."""
-    return frozenset[int]().union(*map(_finished, later))
+def _repeated(runs: Sequence[RunData], place: int) -> frozenset[int]:
+    """The sweeps and dwells that recordings after the one at a place may hold as well: those of the same stage."""
+    stage = runs[place].settings.stage
+    return frozenset[int]().union(*(_finished(run) for run in runs[place + 1 :] if run.settings.stage == stage))
 
 
 def _finished(run: RunData) -> frozenset[int]:

@@ -25,6 +25,7 @@ def revolution_on_the_board(
     first: int,
     settings: ObservationThresholds,
     kinematics: DenavitHartenberg,
+    reading_std_rad: float = 0.0,
 ) -> tuple[int, int, float]:
     """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
@@ -32,7 +33,8 @@ def revolution_on_the_board(
     the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
     a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
-    motion = ArmMotion(states, kinematics)
+    names = [f"joint {number}" for number in range(kinematics.joints)]
+    motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)
     clock = on_the_arms_clock(samples, sensor, motion).clock
     window = Window(float(states["time_s"][min(first, len(states) - 1)]), float(states["time_s"][-1]))
     revolution = motion.turn(sweep, window, settings)

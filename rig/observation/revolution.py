@@ -167,12 +167,17 @@ def _check_speed(time_s: Array, travelled: Array, where: str, settings: Observat
     mean = (travelled[-1] - travelled[0]) / (time_s[-1] - time_s[0])
     deviation = float(np.max(np.abs((ahead - behind) / SMOOTHING_S / mean - 1), initial=0.0))
     if deviation > settings.max_speed_deviation:
-        raise Fault(
-            "speed_not_constant",
-            f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
-            f"{100 * settings.max_speed_deviation:.0f} % is allowed",
-            "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
-        )
+        raise not_constant(where, deviation, settings)
+
+
+def not_constant(where: str, deviation: float, settings: ObservationThresholds) -> Fault:
+    """The error for a sweep whose speed strayed by a fraction from its mean."""
+    return Fault(
+        "speed_not_constant",
+        f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
+        f"{100 * settings.max_speed_deviation:.0f} % is allowed",
+        "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
+    )
 
 
 def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:

@@ -61,13 +61,16 @@ def open_run(path: Path, script: Path | None = None) -> RecordedRun:
     return RecordedRun(path, raw, repeated, script=named)
 
 
-def judged(run: RecordedRun, estimator: str) -> Outcome:
+def judged(run: RecordedRun, estimator: str | None = None) -> Outcome:
     """What a run says, phase after phase; one that was to follow and is missing has not passed.
+
+    By the procedure's own estimator where none is asked for.
 
     Of a recording that stands alone it is what that recording says. Raises Fault and Refused by name as the
     procedure's analysis does.
     """
     procedure = _procedure_of(run, run.movement[0])
+    estimator = estimator or procedure.estimator
     outcome = procedure.analyse(run.movement, None, estimator)
     if run.raw and run.corrected:
         return _procedure_of(run, run.corrected[0]).analyse(run.corrected, outcome, estimator)

@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from rig.analysis.analyses import calibrated
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator
 from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.data.run_file import RunData
@@ -58,8 +59,8 @@ class Procedure(Generic[SectionT]):
 
     `readings` is what the sensors to calibrate stream: raw counts, which the board averages as well, or what the board
     has corrected by the calibration it has stored. `turner` is the section of the kind of turner that it plans for.
-    `then` names the procedure that follows with the same movement when
-    the section says `then_verify`.
+    `then` names the procedure that follows with the same movement when the section says `then_verify`. `estimator` is
+    the one whose solution is the answer, where nobody asks for another.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Procedure(Generic[SectionT]):
     readings: Readings = "raw"
     then: str | None = None
     turner: type[TurnerSection] = ArmSection
+    estimator: Estimator = DEFAULT_ESTIMATOR
 
     @property
     def reads_corrected(self) -> bool:

@@ -21,9 +21,10 @@ def mounting(plan: Plan, number: int, words: Words) -> Prompt:
     far = _farthest(plan)
     lines = (
         f"Stage {number + 1} of {len(stages)}: {stage.instruction}.",
-        f"The {words.short} stands still and nothing commands it: it does not move until you answer.",
+        f"The {words.short} {words.stands}: it does not move until you answer.",
         "Then small turns try the mounting, before "
         f"{len(stage.indices)} sweeps turn {words.turned} by more than {far} each.",
+        *filter(None, [words.beware]),
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
     )
     ticked = f"The item is mounted so, and nobody and nothing is within the {words.short}'s reach"
@@ -54,7 +55,7 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
             "If the calibration passes, the board stores it in the place of what it had, and without another "
             f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
         )
-    lines += doubts(plan)
+    lines += [*doubts(plan), *filter(None, [words.beware])]
     lines.append(
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
     )

@@ -148,7 +148,7 @@ class Connector:
         turner = stack.enter_context(kind.connect(section, acquisition.on_state, log))
         let_go.callback(self._last_seen, turner)
         report = turner.report()
-        self.station.event(ArmConnected(report))
+        self.station.event(ArmConnected(report, kind.words.short))
         return turner, report, kind.made(section, report)
 
     def _last_seen(self, turner: Turner) -> None:

@@ -91,6 +91,7 @@ class BoardCalibration:
             first=len(turned) - new,
             settings=self.settings,
             kinematics=self.turner.geometry,
+            reading_std_rad=self.turner.reading_std_rad,
         )
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 

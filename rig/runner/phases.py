@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rig.analysis.calibration import SensorResult
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.analysis.onboard_check import check_observed
 from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
@@ -158,7 +157,7 @@ class Run:
 
     def _judged(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
         with self.reported(self._repeating, moved=True):
-            outcome = phase.procedure.analyse(runs, before, DEFAULT_ESTIMATOR)
+            outcome = phase.procedure.analyse(runs, before, phase.procedure.estimator)
             if runs and phase.procedure.calibrates_along:
                 check_observed(runs[-1], self.loaded.config.to_calibrate)
         if before is None:

@@ -146,7 +146,7 @@ class Rig:
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
-        self.recording.station.event(PreflightPassed(self.plan, report))
+        self.recording.station.event(PreflightPassed(self.plan, report, kind.words.short))
         if self.hand is not None:
             self._motions = iter(())
             return  # nothing moves by itself, so nothing is asked before

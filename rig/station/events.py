@@ -41,9 +41,10 @@ class SensorConnected:
 
 @dataclass(frozen=True, slots=True)
 class ArmConnected:
-    """The arm answered and said how it stands; nothing has moved."""
+    """What turns answered and said how it stands; nothing has moved. `called` is its kind's name among operators."""
 
     report: Report
+    called: str = "arm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +67,11 @@ class PhaseStarted:
 
 @dataclass(frozen=True, slots=True)
 class PreflightPassed:
-    """All that can be known beforehand is right with the plan and the arm."""
+    """All that can be known beforehand is right with the plan and what turns, `called` as its kind is."""
 
     plan: Plan
     report: Report
+    called: str = "arm"
 
 
 @dataclass(frozen=True, slots=True)

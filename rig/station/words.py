@@ -50,13 +50,13 @@ def line(event: RunEvent) -> str | None:
             text = f"{sensor}: {part} {serial_number} at {port}" + "".join(
                 f"; {name} was {before}, corrected" for name, before in corrected.items()
             )
-        case ArmConnected(report):
-            text = f"arm: {report.words} at {report.host}"
-        case PreflightPassed(plan, report) if not plan.motions:
+        case ArmConnected(report, called):
+            text = f"{called}: {report.words} at {report.host}"
+        case PreflightPassed(plan) if not plan.motions:
             text = "pre-flight: nothing moves by itself; the board's clock follows its crystal"
-        case PreflightPassed(plan, report):
+        case PreflightPassed(plan, report, called):
             text = (
-                f"pre-flight: arm {report.serial_number} at {report.host} is ready; "
+                f"pre-flight: {called} {report.serial_number} at {report.host} is ready; "
                 f"{len(plan.motions)} motions within limits, {plan.duration_s:.0f} s"
             ) + "".join(f"; {doubt}" for doubt in doubts(plan))
         case SamplingStarted():

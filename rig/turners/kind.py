@@ -25,7 +25,9 @@ class Words:
     `name` is a noun without an article ("robot arm"), `short` what an operator calls it ("arm"), `turned` what a sweep
     turns of it ("the wrists"); `method` says in a clause how it turns the items, for the
     certificate; `briefly` the same in a few words, for the digital certificate; in both `{turns}`
-    stands for what sweeps turned through; `directions` whence its axes are known.
+    stands for what sweeps turned through; `directions` whence its axes are known; `beware` is what an operator must be
+    told of it before it moves, `stands` says in a clause how it is left while somebody mounts the item anew; `clock` is
+    what its states are timed by, `told` by whose word its axes are known, `traced` what that means for a certificate.
     """
 
     name: str
@@ -34,6 +36,11 @@ class Words:
     method: str
     briefly: str
     directions: str
+    beware: str = ""
+    stands: str = "stands still"
+    clock: str = "the arm controller's clock"
+    told: str = "as its controller or the nominal model tells them"
+    traced: str = "not traceable, a contributor of the uncertainty"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """A stop that is made once, in a thread of its own: what every turner's stop has, however it is made."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 
@@ -61,6 +62,16 @@ class StopOnce:
             self._outcome = self._stopped()
         finally:
             self._ended.set()
+
+
+@contextmanager
+def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
+    """Stop before whatever ends the block early goes on to the caller."""
+    try:
+        yield
+    except BaseException:
+        stop()
+        raise
 
 
 def tell_of_stop(error: BaseException, stop: Callable[[], StopOutcome]) -> None:

@@ -11,15 +11,18 @@ DIALOGUE_S = 0.1  # wall time after a client's question in which the clock goes 
 class Clock:
     """Says how many ticks are due. Virtual time runs at most `time_scale` times as fast as wall time.
 
-    When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
+    When the machine cannot keep up by more than `patience_s`, the lost wall time is forgotten: virtual time slows down
+    instead of jumping.
     While a client asks and is answered (`dialogue`) it goes no faster than wall time.
     `tick_s`: how long a tick of 2 ms of the controller's clock really lasts.
     `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
     """
 
-    def __init__(self, time_scale: float, wall: Callable[[], float], tick_s: float = TICK_S) -> None:
+    def __init__(
+        self, time_scale: float, wall: Callable[[], float], tick_s: float = TICK_S, patience_s: float = PATIENCE_S
+    ) -> None:
         self.time_scale = time_scale
-        self._tick_s = tick_s
+        self._tick_s, self._patience_s = tick_s, patience_s
         self.tick = 0
         self._wall = wall
         self._stop_at: int | None = None
@@ -70,7 +73,7 @@ class Clock:
         period_s = self._tick_s / self.time_scale
         due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * period_s
         now_s = self._wall()
-        if now_s - due_s > PATIENCE_S:
+        if now_s - due_s > self._patience_s:
             self._anchor()
             return 0.0
         if now_s < self._dialogue_until_s:

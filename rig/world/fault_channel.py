@@ -17,20 +17,37 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_power sensor on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
     instruct say face turns again               what the operator reads, where a hand turns the sensors
+    servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
+    servo_fault held_fast dumb voltage_v temperature_c lose spoil   what is given holds; `lose`, `spoil`: replies
+    servo_line silent listen                    a line that carries nothing; its port, that closes
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import partial
 from typing import Any, Protocol
 
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
+from rig.world.servo.bench import ServoBench
+from rig.world.servo.drive import Faults
+from rig.world.servo.wire_format import WRITE, Packet
 from rig.world.ur10e.on_arm import OnArm
 
 Reply = dict[str, Any]
+SHOWN = (
+    "Torque Enable",
+    "Goal Position",
+    "Bus Watchdog",
+    "Hardware Error Status",
+    "Operating Mode",
+    "Profile Velocity",
+)
+FAULTS = tuple(each.name for each in fields(Faults))
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
 
 
@@ -47,6 +64,7 @@ class World(Protocol):
     def close_arm(self, *, listen: bool) -> None: ...
     def close_dashboard(self) -> None: ...
     def silence_arm(self, duration_s: float) -> None: ...
+    def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None: ...
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
 
@@ -62,10 +80,6 @@ class ControlSession:
         self._buffer = bytearray()
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
         self._orders: dict[str, Callable[..., Reply | None]] = {
-            "hold": self._hold,
-            "run": self._run,
-            "advance": self._advance,
-            "pace": lambda time_scale: world.clock.pace(float(time_scale)),
             "kvh_fault": self._kvh_fault,
             "kvh_power": self._kvh_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
@@ -75,7 +89,24 @@ class ControlSession:
             "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
-            **(self._of_the_arm() if isinstance(world.laboratory.turning, OnArm) else self._of_the_hand()),
+            **self._of_what_turns(),
+        }
+
+    def _of_what_turns(self) -> dict[str, Callable[..., Reply | None]]:
+        match self._world.laboratory.turning:
+            case OnArm():
+                return {**self._of_the_clock(), **self._of_the_arm()}
+            case ServoBench() as bench:  # its driver measures time by the clock on the wall, which nobody holds
+                return self._of_servo(self._world, bench)
+            case _:
+                return {**self._of_the_clock(), **self._of_the_hand()}
+
+    def _of_the_clock(self) -> dict[str, Callable[..., Reply | None]]:
+        return {
+            "hold": self._hold,
+            "run": self._run,
+            "advance": self._advance,
+            "pace": lambda time_scale: self._world.clock.pace(float(time_scale)),
         }
 
     def _of_the_arm(self) -> dict[str, Callable[..., Reply | None]]:
@@ -99,6 +130,23 @@ class ControlSession:
             "close_arm": self._close_arm,
             "close_dashboard": self._world.close_dashboard,
             "silence_arm": self._silence_arm,
+        }
+
+    def _of_servo(self, world: World, bench: ServoBench) -> dict[str, Callable[..., Reply | None]]:
+        """What is asked of a servo."""
+        servo, now_s = bench.servo, bench.now_s
+        return {
+            "state": lambda: {
+                "angle_rad": servo.angle_at(now_s()),
+                "rate_rad_s": servo.rate_at(now_s()),
+                "registers": {name: servo.memory[name] for name in SHOWN},
+                "board_powered": world.laboratory.board is not None,
+                "board_baud": world.line.baud,
+            },
+            "servo_power": lambda on: servo.switch(bool(on), now_s()),
+            "servo_torque": partial(_servo_torque, bench),
+            "servo_fault": partial(_servo_fault, bench),
+            "servo_line": world.servo_at_fault,
         }
 
     def _of_the_hand(self) -> dict[str, Callable[..., Reply | None]]:
@@ -235,6 +283,21 @@ class ControlSession:
     def _host_baud(self, baud: float | None) -> None:
         """The host reads and writes at another baud rate than the board: what TCP would not show."""
         self._world.line.host_baud = baud
+
+
+def _servo_torque(bench: ServoBench, on: bool) -> None:
+    """Switch torque on or off as another program does."""
+    bench.servo.obey(Packet(bench.servo.memory["ID"], WRITE, bytes([64, 0, bool(on)]), True), bench.now_s())
+
+
+def _servo_fault(bench: ServoBench, *, lose: int = 0, spoil: int = 0, **given: float) -> None:
+    """Make a servo misbehave. Raises ValueError for what it cannot do."""
+    for name, value in given.items():
+        if name not in FAULTS:
+            raise ValueError(f"no fault {name!r}; there are {', '.join(FAULTS)}")
+        setattr(bench.servo.faults, name, value)
+    bench.bus.lose += int(lose)
+    bench.bus.spoil += int(spoil)
 
 
 def _line(reply: Reply) -> bytes:

@@ -7,6 +7,7 @@ import numpy as np
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import ArmSection, RigConfig
+from rig.config.servo_section import ServoSection
 from rig.config.stage_section import mount_matrix
 from rig.config.world_models import WorldSection
 from rig.world.board.flash_file import flash_of
@@ -17,6 +18,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.operator import Operator
+from rig.world.servo.bench import ServoBench
 from rig.world.turning import Turning
 from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.on_arm import OnArm
@@ -32,7 +34,7 @@ class Laboratory:
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         self._config, self._world = config, world
-        self.turning: Turning = OnArm(config, world) if isinstance(config.turner, ArmSection) else Operator(world)
+        self.turning = _turning(config, world)
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
@@ -52,14 +54,21 @@ class Laboratory:
 
     @property
     def on_arm(self) -> OnArm:
-        """The arm that turns the sensors. Raises TypeError where a hand does."""
+        """The arm that turns the sensors. Raises TypeError where something else does."""
         if not isinstance(self.turning, OnArm):
             raise TypeError("no arm turns the sensors in this laboratory")
         return self.turning
 
     @property
+    def servo(self) -> ServoBench:
+        """The servo that turns the sensors. Raises TypeError where something else does."""
+        if not isinstance(self.turning, ServoBench):
+            raise TypeError("no servo turns the sensors in this laboratory")
+        return self.turning
+
+    @property
     def operator(self) -> Operator:
-        """Whose hand turns the sensors. Raises TypeError where an arm does."""
+        """Whose hand turns the sensors. Raises TypeError where something else does."""
         if not isinstance(self.turning, Operator):
             raise TypeError("no hand turns the sensors in this laboratory")
         return self.turning
@@ -171,3 +180,14 @@ class Laboratory:
         """What a magnetometer on the flange feels at such a time."""
         self._on_the_item(sensor)
         return lambda time_s: sensor.feels(self._field, self.turning.frames_at(time_s), time_s)
+
+
+def _turning(config: RigConfig, world: WorldSection) -> Turning:
+    """What turns the sensors."""
+    match config.turner:
+        case ArmSection():
+            return OnArm(config, world)
+        case ServoSection() as section:
+            return ServoBench(section, world)
+        case _:
+            return Operator(world)

@@ -121,5 +121,5 @@ class Operator:
 
     def frames_at(self, time_s: float) -> Frames:
         """The table, and the item on it."""
-        attitude = self._hand.felt_at(np.array([time_s])).attitude[0]
-        return [(UNMOVED, ORIGIN), (tuple(map(tuple, attitude.tolist())), ORIGIN)]
+        x, y, z = map(tuple, self._hand.felt_at(np.array([time_s])).attitude[0].tolist())
+        return [(UNMOVED, ORIGIN), ((x, y, z), ORIGIN)]

@@ -21,12 +21,13 @@ from rig.config.models import ArmSection, RigConfig, TurnerSection
 from rig.config.world_models import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
-from rig.world.clock import Clock
+from rig.world.clock import PATIENCE_S, Clock
 from rig.world.fault_channel import ControlSession
 from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
+from rig.world.servo.bench import BEHIND_S, ServoBench
 from rig.world.ur10e import dashboard_server, primary, robot_api, rtde, script_socket
 from rig.world.ur10e.robot import Robot
 
@@ -60,14 +61,22 @@ class World:
             name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
             for name, mount in self.laboratory.kvhs.items()
         }
-        self.lines = (self.line, *self.kvh_lines.values())
-        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
+        turning = self.laboratory.turning
+        self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
+        self.lines = (self.line, *self.kvh_lines.values(), *filter(None, [self.servo_line]))
+        patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
+        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False
         host, board = _host_of(loaded.config), loaded.config.board
         try:
             self.arm_listeners = self._listen_as_arm(loaded.config.turner, section)
+            self.servo_listener = (
+                None
+                if self.servo_line is None
+                else self._listen("turner.port", loaded.config.turner.address, self.servo_line, gathers=False)
+            )
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
@@ -86,7 +95,7 @@ class World:
         self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
         self._description = {
             "ready": True,
-            "arm": host if self.arm_listeners else None,
+            "arm": loaded.config.turner.address or None,
             "board": None if board is None else board.port,
             "pty": pty.path if pty else None,
             "kvh_ports": kvh_ports,
@@ -113,10 +122,10 @@ class World:
             listeners.append(self.network.listen(turner.host, turner.robot_api_port, new_session))
         return listeners
 
-    def _listen(self, key: str, url: str, line: SerialLine) -> Listener:
+    def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> Listener:
         """The far end of a serial line; a client who opens what another has open is hung up on."""
         return self.network.listen(
-            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=True
+            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )
 
     # -- faults that live in the wires -----------------------------------------------------------------------------
@@ -136,6 +145,12 @@ class World:
         for listener in self.arm_listeners:
             if listener.port == dashboard_server.PORT:
                 listener.close()
+
+    def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None:
+        """The servo's line carries nothing, or its port is gone."""
+        if self.servo_line is not None and self.servo_listener is not None:
+            self.servo_line.silent = bool(silent)
+            self.servo_listener.open() if listen else self.servo_listener.close()
 
     def unplug_board(self) -> None:
         """Pull the board's cable: no power, no port."""
@@ -210,9 +225,9 @@ class World:
 
 
 def _host_of(config: RigConfig) -> str:
-    """The address of the laboratory: the arm's, or the board's where a hand turns it."""
-    if config.turner.address or config.board is None:
-        return config.turner.address
+    """The address of the laboratory: that of what turns, or the board's where a hand does."""
+    if config.turner.simulated_at is not None or config.board is None:
+        return config.turner.simulated_at or ""
     return _address("board.port", config.board.port)[0]
 
 

@@ -3,7 +3,6 @@
 import yaml
 
 from rig.config.load import Loaded
-from rig.config.models import ArmSection
 from rig.config.world_models import WorldSection
 from rig.errors import Refused
 
@@ -20,8 +19,7 @@ def world_section(loaded: Loaded) -> WorldSection:
             "Name a file with a world: section, for example configs/demo.yaml",
         )
     world = WorldSection.model_validate(yaml.safe_load(loaded.text)["world"])
-    turner = loaded.config.turner
-    there = {"offset_mm": turner.extension_mm if isinstance(turner, ArmSection) else (0.0, 0.0, 0.0)}
+    there = {"offset_mm": tuple(1000 * each for each in loaded.config.turner.extension_m)}
     sensors = {
         name: each if "offset_mm" in each.model_fields_set else each.model_copy(update=there)
         for name, each in world.sensors.items()

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.layout import TEXTS
 from rig.data.quantity import ACCELERATION, FIELD
@@ -49,7 +48,7 @@ def named(folder: Path) -> str:
 
 @pytest.mark.parametrize("folder", frozen(), ids=named)
 def test_a_frozen_recording_solves_to_its_numbers(folder: Path) -> None:
-    found = document_of(judged(opened(folder), DEFAULT_ESTIMATOR))
+    found = document_of(judged(opened(folder)))
     assert differences(read_result(folder), found) == []
 
 

@@ -13,8 +13,9 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import ByHand
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandSolution, Told, solve_by_hand
+from rig.estimation.by_hand.session import Handled
 from rig.observation.hand_runs import NotCounted, range_of, readings_of
-from rig.observation.handled import Handled, Segmenter
+from rig.observation.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import Acquisition
 from rig.runner.by_hand import HandSession

@@ -61,7 +61,7 @@ class _FarEnd:
 
     def trip(self) -> None:
         """Let the watchdog run out."""
-        self.servo._trip(time.monotonic())
+        self.servo.drive.trip(time.monotonic())
 
     def reboot(self) -> None:
         """Somebody else starts it anew."""

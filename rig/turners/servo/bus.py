@@ -189,5 +189,5 @@ def _no_port(path: str, baud: int, error: Exception) -> Problem:
     return Problem(
         "no_servo_port",
         f"the servo's port {path} does not open at {baud} baud: {error}",
-        "Check servo.port, the adapter and its cable, and whether you may use serial ports (group dialout)",
+        "Check turner.port, the adapter and its cable, and whether you may use serial ports (group dialout)",
     )

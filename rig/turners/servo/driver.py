@@ -3,8 +3,8 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -12,6 +12,7 @@ from rig.data.silence import crowding
 from rig.errors import Fault, Problem, Refused, RigError, refuse
 from rig.motion.carried import Carried
 from rig.motion.steps import Motion
+from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, Denied
 from rig.turners.servo.instructions import disarm, go, make_ready
 from rig.turners.servo.link import Job, Link
@@ -22,7 +23,7 @@ from rig.turners.servo.preflight import servo_problems
 from rig.turners.servo.registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, WATCHDOG_S
 from rig.turners.servo.state import ServoReport, ServoState, stands
 from rig.turners.servo.stopping import SURE, Stop
-from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
+from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: where a servo without an integral gain comes to rest beside its goal
@@ -86,7 +87,7 @@ class Servo:
         except BaseException:
             self._bus.close()
             raise
-        self._link = Link(self._bus, self._report.model, self._period_s, self._take_state, self._fail)
+        self._link = Link(self._bus, self._report.servo, self._period_s, self._take_state, self._fail)
         stop = Stop(self._link, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
         self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()
@@ -141,7 +142,7 @@ class Servo:
         self._wait(lambda: stands(list(self._states)) or time.monotonic() > ends_s)
         if not stands(list(self._states)):
             raise Refused("servo_moves", "the servo's shaft is moving", "Hold the board still, then start again")
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             self._holds = True
             self._call(lambda bus: make_ready(bus, self._watchdog))
             self._linked.supervising = True
@@ -152,12 +153,12 @@ class Servo:
         `watch` is called before and then at least every 20 ms; what it raises stops the shaft and goes on to the
         caller. What the servo is really asked for is `moves.move_of(motion)`.
         """
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             watch()
             self.check()
             self._doing = motion.name
-            if problems := move_problems([motion], self._report.velocity_limit_rad_s):
-                self._fail(problems[0])
+            if wrong := move_problems([motion], self._report.velocity_limit_rad_s):
+                self._fail(wrong[0])
                 self.check()
             move = move_of(motion)
             self._looked_s, self._moving = time.monotonic(), True
@@ -173,20 +174,14 @@ class Servo:
 
                 self._wait(lambda: arrived() or self.latest.time_s > began_s + takes_s, watch)
                 if not arrived():
-                    self._fail(
-                        Problem(
-                            "servo_slower_than_planned",
-                            f"{motion.name} did not end within {takes_s:.1f} s; planned were {motion.duration_s:.1f} s",
-                            "Look for what holds the shaft, and whether the servo's supply is strong enough",
-                        )
-                    )
+                    self._fail(problems.slower_than_planned(motion, takes_s))
                 self.check()
             finally:
                 self._moving = False
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
         """Stand still for a time of the states' clock; `watch` as in `move`."""
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
@@ -237,14 +232,6 @@ class Servo:
             raise RuntimeError("start() comes first")
         return self._link
 
-    @contextmanager
-    def _stopping_on_error(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException:
-            self.stop()
-            raise
-
     def _call(self, job: Job) -> None:
         """Have the servo told something; what goes wrong with it is a problem of the servo's."""
         try:
@@ -254,29 +241,15 @@ class Servo:
         except Denied as error:
             self._fail(self._why_denied(error))
         except BusError as error:
-            self._fail(
-                Problem(
-                    "servo_does_not_hear",
-                    f"the servo did not acknowledge an instruction ({error})",
-                    "Look at its supply and its cable, then start again",
-                )
-            )
+            self._fail(problems.does_not_hear(error))
         self.check()
 
     def _why_denied(self, error: Denied) -> Problem:
         """The reason of a no: mostly that the watchdog has stopped the servo."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
-                return Problem(
-                    "servo_watchdog_tripped",
-                    "the servo's watchdog has stopped it: no instruction came in time",
-                    "Look at the load of the computer and at the cable, then start again",
-                )
-        return Problem(
-            "servo_refuses",
-            f"the servo refuses an instruction: {error}",
-            "Switch it off and on; look its registers up in the maker's Dynamixel Wizard 2.0",
-        )
+                return problems.tripped()
+        return problems.refuses(error)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
         """Block until `done`, looking at the servo's faults and the caller's watch all the time."""
@@ -294,11 +267,7 @@ class Servo:
         silent_s = time.monotonic() - link.turned_s
         if not link.alive or silent_s < HUNG_S * crowding():
             return None
-        return Problem(
-            "servo_driver_hung",
-            f"the thread that uses the servo's line has not answered for {silent_s:.1f} s",
-            "Look at the adapter and its cable, then start again",
-        )
+        return problems.driver_hung(silent_s)
 
     def _take_state(self, state: ServoState) -> None:
         """Take a state as it comes, on the link's thread."""
@@ -310,15 +279,9 @@ class Servo:
         except RigError as error:
             self._fail(error.problem)
         except Exception as error:
-            self._fail(Problem("servo_state_not_taken", f"a state could not be passed on ({error})", "See the log"))
+            self._fail(problems.state_not_taken(error))
         if self._moving and time.monotonic() - self._looked_s > UNWATCHED_S * crowding():
-            self._fail(
-                Problem(
-                    "servo_unwatched",
-                    f"the program has not looked at the servo for {UNWATCHED_S:.0f} s during {self._doing}",
-                    "See the log for what delayed the program, then start again",
-                )
-            )
+            self._fail(problems.unwatched(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from rig.data.silence import crowding
 from rig.errors import Problem
+from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, Denied, Lost, PortGone
 from rig.turners.servo.models import TICKS, ServoModel
 from rig.turners.servo.preflight import hardware_problem
@@ -127,9 +128,7 @@ class Link:
                 if not self._jobs:
                     self._woken.wait(max(0.0, due_s - time.monotonic()))
         except Exception as error:
-            self._on_problem(
-                Problem("servo_driver_died", f"the servo's driver has failed ({error!r})", "Report it, with the log")
-            )
+            self._on_problem(problems.driver_died(error))
 
     def _poll(self) -> None:
         try:
@@ -143,7 +142,7 @@ class Link:
             self._count_lost(damaged=not isinstance(error, Lost) or error.damaged)
             return
         except PortGone as error:
-            self._fail(_port_lost(error))
+            self._fail(problems.port_lost(error))
             self._closing.wait(self._period_s)
             return
         self._heard_s, self._lost, self._damaged = time.monotonic(), 0, 0
@@ -173,7 +172,7 @@ class Link:
         if self._unlike > UNLIKE_MOST:
             self._unlike = 0
             if self.supervising:
-                self._fail(_restarted())
+                self._fail(problems.restarted())
             return True
         return False
 
@@ -191,69 +190,23 @@ class Link:
         except (Lost, Denied):
             return  # the states count what is lost
         except PortGone as error:
-            self._fail(_port_lost(error))
+            self._fail(problems.port_lost(error))
             return
         if register is TORQUE and not value:
-            self._fail(hardware_problem(self._error_bits) if self._error_bits else _torque_lost())
+            self._fail(hardware_problem(self._error_bits) if self._error_bits else problems.torque_lost())
         elif register is WATCHDOG and value == TRIPPED:
-            self._fail(_tripped())
+            self._fail(problems.tripped())
 
     def _count_lost(self, damaged: bool) -> None:
         self._lost += 1
         self._damaged += damaged
         silent_s = time.monotonic() - self._heard_s
         if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * crowding():
-            self._fail(_silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
+            self._fail(problems.silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
         try:
             self._bus.settle()
         except PortGone as error:
-            self._fail(_port_lost(error))
+            self._fail(problems.port_lost(error))
 
     def _fail(self, problem: Problem) -> None:
         self._on_problem(problem)
-
-
-def _port_lost(error: PortGone) -> Problem:
-    return Problem(
-        "servo_port_lost",
-        f"the servo's port has failed ({error})",
-        "Look at the adapter and its cable, then start again",
-    )
-
-
-def _silent(silent_s: float, mostly_damaged: bool) -> Problem:
-    if mostly_damaged:
-        return Problem(
-            "servo_replies_damaged",
-            f"only damaged replies have come from the servo for {silent_s:.1f} s",
-            "Look for a second servo with its ID, and at the cable and the adapter's ground",
-        )
-    return Problem(
-        "servo_link_lost",
-        f"no reply has come from the servo for {silent_s:.1f} s",
-        "Look at its supply and its cable, then start again",
-    )
-
-
-def _restarted() -> Problem:
-    return Problem(
-        "servo_restarted",
-        "the servo's clock began anew: it was switched off, or started again, and has forgotten its goal and its turns",
-        "Look at its supply; hold the board, and start again",
-    )
-
-
-def _torque_lost() -> Problem:
-    return Problem(
-        "servo_torque_lost",
-        "the servo's torque is off, and the rig did not switch it off",
-        "End other programs that use the servo; hold the board, and start again",
-    )
-
-
-def _tripped() -> Problem:
-    return Problem(
-        "servo_watchdog_tripped",
-        "the servo's watchdog has stopped it: no instruction came in time",
-        "Look at the load of the computer and at the cable, then start again",
-    )

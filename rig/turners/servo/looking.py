@@ -68,7 +68,7 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
         raise Refused(
             "no_servo",
             f"no servo with ID {servo_id} answers at {port}",
-            "Check its supply and cable, and servo.id and servo.baud (57600 as delivered; protocol 2.0)",
+            "Check its supply and cable, and turner.id and turner.baud (57600 as delivered; protocol 2.0)",
         )
 
 
@@ -110,7 +110,7 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
     return ServoReport(
         port=port,
         servo_id=servo_id,
-        model=model,
+        servo=model,
         firmware=firmware,
         drive_mode=bus.look_up(DRIVE_MODE)[0],
         operating_mode=bus.look_up(OPERATING_MODE)[0],

@@ -7,6 +7,7 @@ Table" (numbers, units).
 import math
 from dataclasses import dataclass
 
+MAKER = "ROBOTIS"
 PULSES = 4096  # a turn; 12 bits, 0.088°
 PULSE_RAD = 2 * math.pi / PULSES
 FARTHEST = 1_048_575  # pulses either way in extended position mode: 256 turns
@@ -33,6 +34,11 @@ class ServoModel:
     senses_current: bool
 
     @property
+    def title(self) -> str:
+        """The name in the maker's writing."""
+        return self.name.upper().replace("_", "-")
+
+    @property
     def load_unit(self) -> float:
         """One count of register 126."""
         return 2.69e-3 if self.senses_current else 1e-3
@@ -48,3 +54,8 @@ MODELS = (
 def model_of(number: int) -> ServoModel | None:
     """The model with that number in its register 0."""
     return next((model for model in MODELS if model.number == number), None)
+
+
+def named(name: str) -> ServoModel:
+    """The model of that name. Raises StopIteration where there is none."""
+    return next(model for model in MODELS if model.name == name)

@@ -19,14 +19,16 @@ BITS = 10  # of a byte on the line: start, eight, stop
 
 
 class Port:
-    """The port at a path, locked for this process. Raises `serial.SerialException` where it cannot be had.
+    """The port at a path or at socket://host:port. Raises `serial.SerialException` where it cannot be had.
 
+    That at a path is locked for this process; at the other end of a socket whoever listens takes one at a time.
     The lock is seen by programs that ask for one. TIOCEXCL would be seen by all, but it outlasts a program that is
     killed wherever something else holds the port open. `slack_s`: how much later than its bytes need a reply may come.
     """
 
     def __init__(self, path: str, baud: int, slack_s: float) -> None:
-        self.serial = serial.Serial(path, baud, timeout=WAIT_S, write_timeout=WRITE_S, exclusive=True)
+        locked = True if "://" not in path else None
+        self.serial = serial.serial_for_url(path, baud, timeout=WAIT_S, write_timeout=WRITE_S, exclusive=locked)
         self.is_using = False
         self._baud, self._slack_s = baud, slack_s
         self._deadline_s = 0.0

@@ -35,7 +35,7 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, per
                 "servo_line_slow",
                 f"a state of the servo takes {1e3 * report.round_trip_s:.1f} ms, and one is needed "
                 f"every {1e3 * period_s:.1f} ms",
-                "Set Baud Rate (8) to 3, which is 1 Mbit/s, and Return Delay Time (9) to 0, and servo.baud to match; "
+                "Set Baud Rate (8) to 3, which is 1 Mbit/s, and Return Delay Time (9) to 0, and turner.baud to match; "
                 "an FTDI adapter needs a latency timer of 1 ms",
             )
         )
@@ -44,12 +44,12 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, per
 
 def _identity(report: ServoReport, wanted_model: str) -> list[Problem]:
     problems = []
-    if report.model.name != wanted_model:
+    if report.servo.name != wanted_model:
         problems.append(
             Problem(
                 "other_servo",
-                f"the servo at {report.port} is an {report.model.name}, and the configuration names {wanted_model}",
-                "Correct servo.model, or connect the servo that is meant",
+                f"the servo at {report.port} is an {report.servo.name}, and the configuration names {wanted_model}",
+                "Correct turner.model, or connect the servo that is meant",
             )
         )
     if report.firmware < TIMED_FIRMWARE:
@@ -140,13 +140,13 @@ def _load(report: ServoReport, carried: Carried) -> list[Problem]:
     """The torque of what it carries, as if the shaft were horizontal: which way it points nobody says."""
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m
-    most_nm = LOAD_SHARE * report.model.stall_torque_nm
+    most_nm = LOAD_SHARE * report.servo.stall_torque_nm
     if torque_nm <= most_nm:
         return []
     return [
         Problem(
             "servo_load",
-            f"the load of the servo pulls with {torque_nm:.2f} N·m, and an {report.model.name} turns smoothly with "
+            f"the load of the servo pulls with {torque_nm:.2f} N·m, and an {report.servo.name} turns smoothly with "
             f"{most_nm:.2f} N·m at most",
             "Balance the board about the shaft, or take a stronger servo",
         )

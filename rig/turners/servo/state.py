@@ -5,31 +5,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from operator import attrgetter
 
-import numpy as np
-
-from rig.turners.servo.models import PULSE_RAD, SPEED_RAD_S, ServoModel
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.state import Row, StateField, state_dtype
+from rig.turners.servo.models import MAKER, PULSE_RAD, SPEED_RAD_S, ServoModel
 from rig.turners.servo.registers import STATE
 
-SERVO_STATE_DTYPE = np.dtype(
-    [
-        ("time_s", "f8"),
-        ("host_time_s", "f8"),
-        ("q_rad", "f8", (1,)),
-        ("qd_rad_s", "f8", (1,)),
-        ("took_s", "f8"),
-        ("tick", "u2"),
-        ("moving", "u1"),
-        ("moving_status", "u1"),
-        ("hardware_error", "u1"),
-        ("load", "f8"),
-        ("voltage_v", "f8"),
-        ("temperature_c", "f8"),
-    ]
+SERVO_FIELDS = (
+    StateField("took_s", "f8"),
+    StateField("tick", "u2"),
+    StateField("moving", "u1"),
+    StateField("moving_status", "u1"),
+    StateField("hardware_error", "u1"),
+    StateField("load", "f8"),
+    StateField("voltage_v", "f8"),
+    StateField("temperature_c", "f8"),
 )
+SERVO_STATE_DTYPE = state_dtype(1, SERVO_FIELDS)
+JOINTS = ("shaft",)
 STILL_S, STILL_STATES = 0.15, 5  # so long, and in so many states, a shaft must stand to stand still
 STILL_RAD = 6.5 * PULSE_RAD  # … within this: a shaft at rest is seen to dither by ±3 pulses (forum.robotis.com 7582)
-
-Value = float | int | tuple[float, ...]
+AT_REST_RAD_S = 2.5 * SPEED_RAD_S  # of Present Velocity, which is coarse and dithers as the position does
 
 
 def now_s() -> float:
@@ -65,12 +60,17 @@ class ServoState:
     voltage_v: float
     temperature_c: float
 
-    def to_record(self) -> tuple[Value, ...]:
+    @property
+    def at_rest(self) -> bool:
+        """Whether the shaft stands, as far as one state tells; `stands` has several."""
+        return not self.moving and abs(self.qd_rad_s[0]) < AT_REST_RAD_S
+
+    def to_record(self) -> Row:
         """The values in the order of `SERVO_STATE_DTYPE`."""
         return _IN_ORDER(self)
 
 
-_IN_ORDER: Callable[[ServoState], tuple[Value, ...]] = attrgetter(*(each.name for each in fields(ServoState)))
+_IN_ORDER: Callable[[ServoState], Row] = attrgetter(*(each.name for each in fields(ServoState)))
 
 
 def decode(
@@ -109,14 +109,14 @@ def stands(states: Sequence[ServoState]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """What a look at the servo shows, for pre-flight; None where its firmware has no such register.
+    """What a look at the servo shows, for pre-flight; None where its firmware has no such register. A `Report`.
 
     `round_trip_s` is how long a state takes on the line.
     """
 
     port: str
     servo_id: int
-    model: ServoModel
+    servo: ServoModel
     firmware: int
     drive_mode: int
     operating_mode: int
@@ -131,3 +131,38 @@ class ServoReport:
     watchdog: int | None
     round_trip_s: float
     state: ServoState
+
+    @property
+    def host(self) -> str:
+        """The servo's port."""
+        return self.port
+
+    @property
+    def serial_number(self) -> str:
+        """What stands for one: such a servo has none that it could tell."""
+        return f"with ID {self.servo_id}"
+
+    @property
+    def software(self) -> str:
+        """The version of its firmware."""
+        return f"firmware {self.firmware}"
+
+    @property
+    def model(self) -> str | None:
+        """The model, in the maker's writing."""
+        return self.servo.title
+
+    @property
+    def kinematics(self) -> DenavitHartenberg | None:
+        """No geometry: a servo tells none."""
+        return None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The name of its one joint."""
+        return JOINTS
+
+    @property
+    def words(self) -> str:
+        """The servo as a line of text names it."""
+        return f"{MAKER} {self.servo.title}, ID {self.servo_id}, firmware {self.firmware}"

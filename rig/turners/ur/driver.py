@@ -2,8 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,7 +11,7 @@ from rig.errors import Fault, Problem, Refused, RigError
 from rig.motion.carried import Carried
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
-from rig.turners.stop_once import StopOnce, StopOutcome, tell_of_stop
+from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 from rig.turners.ur.asking import ANSWER_S, reported, stop_problem
 from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
@@ -128,7 +127,7 @@ class Arm:
         if problem is not None:
             raise Refused.of(problem)
         self._way_to_stop.descriptors.keep()
-        with self._stopping_on_error(), self._link.patience():
+        with stopping_on_error(self.stop), self._link.patience():
             self._holds_arm = True
             if is_polyscope_x(self._controller.version):
                 self._prove_the_stop()
@@ -146,7 +145,7 @@ class Arm:
 
         `watch` is called before and then at least every 20 ms; what it raises stops the arm and goes on to the caller.
         """
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             watch()
             self._doing = motion.name
             self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
@@ -179,7 +178,7 @@ class Arm:
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
         """Stand still for a time of the controller's clock; `watch` as in `move`."""
-        with self._stopping_on_error():
+        with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
@@ -231,14 +230,6 @@ class Arm:
 
     def _ways(self) -> Ways:
         return independent_ways(self._controller.version)
-
-    @contextmanager
-    def _stopping_on_error(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException:
-            self.stop()
-            raise
 
     def _prove_the_stop(self) -> None:
         """Raises `Refused` where the arm could not be stopped without the client."""

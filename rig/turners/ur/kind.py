@@ -66,6 +66,7 @@ UR = TurnerKind(
         method="A robot arm turns the items through {turns} at constant rate about its wrists' axes, both ways",
         briefly="{turns} and attitudes at rest on a robot arm",
         directions="the arm's kinematics",
+        stands="stands still and its program has ended",
     ),
     fields=ARM_FIELDS,
 )

@@ -1,6 +1,6 @@
 """The emulated board as the laboratory mounts it: the firmware image, and sensors that feel the flange turn."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from functools import cache, partial
 from importlib import resources
 from typing import assert_never
@@ -14,7 +14,7 @@ from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
-from rig.config.models import ArmSection, RigConfig
+from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -57,7 +57,7 @@ def mount_magnetometers(
             config.magnetometers[name].mounting,
             simulated,
             simulated.mounting_error_deg,
-            _end_of_extension(config) if simulated.offset_mm is None else simulated.offset_mm,
+            _extension_mm(config) if simulated.offset_mm is None else simulated.offset_mm,
         )
         for name, simulated in sorted(world.magnetometers.items())
     }
@@ -69,9 +69,10 @@ def mount_magnetometers(
     }
 
 
-def _end_of_extension(config: RigConfig) -> Sequence[float]:
-    """Where the extension ends, mm; there is none but on an arm."""
-    return config.turner.extension_mm if isinstance(config.turner, ArmSection) else (0.0, 0.0, 0.0)
+def _extension_mm(config: RigConfig) -> tuple[float, float, float]:
+    """Where the extension ends on which the item sits."""
+    x, y, z = (1000 * each for each in config.turner.extension_m)
+    return x, y, z
 
 
 def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:

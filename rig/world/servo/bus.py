@@ -10,6 +10,7 @@ from rig.world.servo.truth import LineTruth
 from rig.world.servo.wire_format import BROADCAST, PING, SYNC_READ, Packet, Receiver
 
 BITS = 10  # of a byte on the wire: start, eight, stop
+HELD_UP_S = 0.02  # far longer than it takes to come round
 PING_SLOT_S = 0.003  # between two answers to a ping of everybody, times the ID; the maker's client waits so long
 
 
@@ -25,6 +26,7 @@ class Bus:
         self.lose = self.spoil = 0
         self._now = now
         self._receiver = Receiver()
+        self._lived_s = now()
         self._random = np.random.default_rng(seed)
         self._under_way: list[tuple[float, bytes]] = []  # when the host gets it, and what
 
@@ -43,9 +45,15 @@ class Bus:
             self._answer(packet, now_s)
 
     def advance(self) -> None:
-        """Let every servo live until now."""
+        """Let every servo live until now.
+
+        Where this process was held up, what the host sent meanwhile has not been heard yet: no watchdog counts that.
+        """
         now_s = self._now()
+        held_up_s, self._lived_s = now_s - self._lived_s, now_s
         for servo in self.servos:
+            if held_up_s > HELD_UP_S:
+                servo.hear_later(held_up_s)
             servo.advance(now_s)
 
     def due_s(self) -> float:

@@ -1,7 +1,9 @@
 """The control tables of three Dynamixel X servos, and the memory behind them.
 
 Source: ROBOTIS e-Manual, pages of XL430-W250, XM430-W350 and XM430-W210, "Control Table of EEPROM/RAM Area": addresses,
-sizes, initial values, ranges. Where the manual gives no range, all values of the size are let through.
+sizes, initial values, ranges. Where the manual gives no range, all values of the size are let through. The XM430-W350's
+Velocity Limit is 200 in the manual of the firmware that the rig drives; 350 stood there in that of before 38, which had
+an Acceleration Limit too.
 """
 
 from collections.abc import Mapping

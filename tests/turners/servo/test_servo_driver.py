@@ -22,7 +22,7 @@ def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
         before_rad = wire.angle_rad
         with Servo(wire.port, MODEL) as servo:
             report = servo.report()
-            assert (report.model.name, report.firmware) == (MODEL, 48)
+            assert (report.servo.name, report.firmware) == (MODEL, 48)
             assert report.voltage_limits_v == (9.5, 16.0)
             assert not report.torque_on
             assert servo.problems(BOARD) == []

@@ -1,0 +1,125 @@
+"""Dynamixel X servos, as a kind of turner."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from math import degrees, pi, radians
+from pathlib import Path
+
+from rig.config.servo_section import ServoSection
+from rig.errors import Problem
+from rig.motion.carried import Carried
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.preflight import step_problems
+from rig.motion.state import Made
+from rig.motion.steps import Plan
+from rig.turners.kind import OnState, TurnerKind, Words
+from rig.turners.servo import driver
+from rig.turners.servo.bus import Bus
+from rig.turners.servo.looking import look_at
+from rig.turners.servo.models import MAKER, named
+from rig.turners.servo.moves import move_problems
+from rig.turners.servo.preflight import servo_problems
+from rig.turners.servo.state import SERVO_FIELDS, ServoReport
+from rig.turners.turner import Turner
+
+# The shaft is z of its own frame and of the housing's, and where it is screwed on both have one origin.
+SHAFT = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.0,), alpha_rad=(0.0,))
+# One reading of its encoder: steps of 0.088° and a noise of 0.06° (AS5045, data sheet: "transition noise").
+READING_STD_RAD = radians(0.065)
+FARTHEST_RAD = 2 * pi
+
+
+def _connect(section: ServoSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
+    return driver.Servo(
+        section.port,
+        section.model,
+        on_state,
+        servo_id=section.id,
+        baud=section.baud,
+        rate_hz=section.state_rate_hz,
+        watchdog_s=section.watchdog_s,
+    )
+
+
+def _look(section: ServoSection) -> ServoReport:
+    bus = Bus(section.port, section.baud, section.id)
+    try:
+        return look_at(bus, section.port, section.id)
+    finally:
+        bus.close()
+
+
+def _stance(report: ServoReport) -> str:
+    state = report.state
+    torque = "on" if report.torque_on else "off"
+    warm = f"{state.voltage_v:.1f} V, {state.temperature_c:.0f} °C"
+    return f"shaft: {degrees(state.q_rad[0]):.1f} °, torque {torque}, {warm}"
+
+
+def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport | None) -> list[Problem]:
+    problems = [problem for plan in plans for problem in step_problems(plan)]
+    motions = plans[-1].motions if plans else ()
+    if report is None:
+        return [*problems, *move_problems(motions, named(section.model).no_load_rad_s)]
+    return [
+        *problems,
+        *servo_problems(report, section.model, _carried(section), 1 / section.state_rate_hz),
+        *move_problems(motions, min(report.velocity_limit_rad_s, report.servo.no_load_rad_s)),
+        *_wound(plans, report),
+    ]
+
+
+def _wound(plans: Sequence[Plan], report: ServoReport) -> list[Problem]:
+    """A shaft that has been turned by more than a turn from home: the cable may be, and goes back with it."""
+    (angle_rad,) = report.state.q_rad
+    away_rad = max((abs(angle_rad - plan.home_q_rad[0]) for plan in plans), default=0.0)
+    if away_rad <= FARTHEST_RAD:
+        return []
+    return [
+        Problem(
+            "servo_wound_up",
+            f"the servo counts {degrees(angle_rad):.0f}°, which is {away_rad / FARTHEST_RAD:.1f} turns from home",
+            "Unwind the cable by hand, with the supply off, and switch it on: the servo forgets its turns then",
+        )
+    ]
+
+
+def _meant(section: ServoSection) -> Made:
+    return Made(MAKER, named(section.model).title, SHAFT, reading_std_rad=READING_STD_RAD)
+
+
+def _made(section: ServoSection, report: ServoReport) -> Made:
+    return Made(MAKER, report.model, SHAFT, reading_std_rad=READING_STD_RAD)
+
+
+def _carried(section: ServoSection) -> Carried:
+    x, y, z = (each / 1000 for each in section.payload_centre_mm)
+    return Carried(section.payload_kg, (x, y, z))
+
+
+SERVO = TurnerKind(
+    name="servo",
+    section=ServoSection,
+    connect=_connect,
+    look=_look,
+    stance=_stance,
+    problems=_problems,
+    meant=_meant,
+    made=_made,
+    carried=_carried,
+    words=Words(
+        name="servo",
+        short="servo",
+        turned="the shaft",
+        method="A servo turns the items through {turns} at constant rate about its shaft, both ways, mounted anew for "
+        "each axis",
+        briefly="{turns} and rests on the shaft of a servo",
+        directions="how the item is mounted on the shaft",
+        beware=driver.BEFORE_THE_FIRST_MOVE,
+        stands="stands still and holds its shaft as long as it has its supply",
+        clock="this computer's oscillator, by a clock that nobody sets",
+        told="as the stages of the procedure say",
+        traced="not traceable; the six-observation solution knows speeds alone and does without them",
+    ),
+    fields=SERVO_FIELDS,
+)

@@ -1,0 +1,111 @@
+"""What goes wrong with a servo under way, as it is told: name, what, what to do."""
+
+from rig.errors import Problem
+from rig.motion.steps import Motion
+from rig.turners.servo.bus import BusError, Denied, PortGone
+
+
+def port_lost(error: PortGone) -> Problem:
+    """A port that has failed."""
+    return Problem(
+        "servo_port_lost",
+        f"the servo's port has failed ({error})",
+        "Look at the adapter and its cable, then start again",
+    )
+
+
+def silent(silent_s: float, mostly_damaged: bool) -> Problem:
+    """A servo from which no usable reply has come for so long."""
+    if mostly_damaged:
+        return Problem(
+            "servo_replies_damaged",
+            f"only damaged replies have come from the servo for {silent_s:.1f} s",
+            "Look for a second servo with its ID, and at the cable and the adapter's ground",
+        )
+    return Problem(
+        "servo_link_lost",
+        f"no reply has come from the servo for {silent_s:.1f} s",
+        "Look at its supply and its cable, then start again",
+    )
+
+
+def restarted() -> Problem:
+    """A servo that was without power meanwhile."""
+    return Problem(
+        "servo_restarted",
+        "the servo's clock began anew: it was switched off, or started again, and has forgotten its goal and its turns",
+        "Look at its supply; hold the board, and start again",
+    )
+
+
+def torque_lost() -> Problem:
+    """Torque that somebody else has switched off."""
+    return Problem(
+        "servo_torque_lost",
+        "the servo's torque is off, and the rig did not switch it off",
+        "End other programs that use the servo; hold the board, and start again",
+    )
+
+
+def tripped() -> Problem:
+    """A servo that its watchdog has stopped."""
+    return Problem(
+        "servo_watchdog_tripped",
+        "the servo's watchdog has stopped it: no instruction came in time",
+        "Look at the load of the computer and at the cable, then start again",
+    )
+
+
+def driver_died(error: Exception) -> Problem:
+    """A thread that has failed."""
+    return Problem("servo_driver_died", f"the servo's driver has failed ({error!r})", "Report it, with the log")
+
+
+def driver_hung(silent_s: float) -> Problem:
+    """A thread that does not come round."""
+    return Problem(
+        "servo_driver_hung",
+        f"the thread that has the servo's line has not come round for {silent_s:.1f} s",
+        "Look at the adapter and its cable, then start again",
+    )
+
+
+def state_not_taken(error: Exception) -> Problem:
+    """A state that whoever records them did not take."""
+    return Problem("servo_state_not_taken", f"a state could not be passed on ({error})", "See the log")
+
+
+def unwatched(for_s: float, doing: str) -> Problem:
+    """A move that nobody has looked at for so long."""
+    return Problem(
+        "servo_unwatched",
+        f"nobody has looked at the servo for {for_s:.0f} s during {doing}",
+        "See the log for what held the program up, then start again",
+    )
+
+
+def slower_than_planned(motion: Motion, within_s: float) -> Problem:
+    """A move that has not ended in time."""
+    return Problem(
+        "servo_slower_than_planned",
+        f"{motion.name} did not end within {within_s:.1f} s, planned were {motion.duration_s:.1f} s",
+        "Look for what holds the shaft, and whether the servo's supply is strong enough",
+    )
+
+
+def does_not_hear(error: BusError) -> Problem:
+    """An instruction that is not acknowledged."""
+    return Problem(
+        "servo_does_not_hear",
+        f"the servo did not acknowledge an instruction ({error})",
+        "Look at its supply and its cable, then start again",
+    )
+
+
+def refuses(error: Denied) -> Problem:
+    """An instruction that the servo says no to."""
+    return Problem(
+        "servo_refuses",
+        f"the servo refuses an instruction: {error}",
+        "Switch it off and on; look its registers up in the maker's Dynamixel Wizard 2.0",
+    )
