@@ -1,7 +1,8 @@
 """The parts that the board has drivers for: one table for Python and, through `parts_header.py`, for C.
 
-A new part is one entry here, of at most eight: the messages name sensors by a mask of as many bits. What its data sheet says of its errors stands in the rig's catalogue
-(`rig/config/sensor_catalogue.py`), how it behaves at its registers in the model that the entry names.
+A new part is one entry here, of at most eight: the messages name sensors by a mask of as many bits. What its data sheet
+says of its errors stands in the rig's catalogue (`rig/config/sensor_catalogue.py`), how it behaves at its registers in
+the model that the entry names.
 """
 
 from collections.abc import Callable, Mapping
@@ -107,6 +108,22 @@ GYROSCOPES: Mapping[str, BoardPart] = MappingProxyType(
                 0x5C: "an ICM-42631",
                 0x70: "an MPU-6500",
                 0x71: "an MPU-9250",
+            },
+        ),
+        "lsm6dsv16x": BoardPart(
+            name="LSM6DSV16X",
+            driver="lsm6dsv16x_gyro",
+            who_am_i=0x70,
+            select="PA7",
+            data_ready="PB7",
+            model="lsm6dsv16x:Lsm6dsv16x",
+            in_its_place={
+                0x68: "an LSM9DS1",
+                0x69: "an LSM6DS3",
+                0x6A: "an LSM6DSL or its like",
+                0x6B: "an LSM6DSR or its like",
+                0x6C: "an LSM6DSO or its like",
+                0x71: "an LSM6DSV16B",
             },
         ),
     }

@@ -71,9 +71,9 @@ class Icm42688P:
     part's own oscillator makes its data rate; the data sheet allows a percent (section 4.10).
 
     It converts while both sensors are in low-noise mode at one data rate and the data-ready interrupt is routed to
-    INT1; otherwise it converts nothing, and reading its outputs fails the run. The data sheet does not say that outputs stand still while they are read:
-    here a conversion in the middle of a reading shows in what is left of it. The motion comes in linearly while the
-    gyroscope starts.
+    INT1; otherwise it converts nothing, and reading its outputs fails the run. The data sheet does not say that outputs
+    stand still while they are read: here a conversion in the middle of a reading shows in what is left of it. The
+    motion comes in linearly while the gyroscope starts.
     """
 
     name = "ICM-42688-P"

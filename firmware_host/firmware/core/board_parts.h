@@ -2,8 +2,8 @@
 #ifndef BOARD_PARTS_H
 #define BOARD_PARTS_H
 
-#define GYROSCOPE_COUNT 4u /* which come first */
-#define SENSOR_COUNT 5u
+#define GYROSCOPE_COUNT 5u /* which come first */
+#define SENSOR_COUNT 6u
 
 /* Of each sensor: its driver, port and pin of its select, port and pin of its data-ready line. */
 #define SENSORS(X) \
@@ -11,6 +11,7 @@
     X(mpu9250_gyro, B, 0, A, 12) \
     X(adis16465_gyro, A, 4, A, 1) \
     X(icm42688p_gyro, A, 10, A, 9) \
+    X(lsm6dsv16x_gyro, A, 7, B, 7) \
     X(lsm9ds1_magnetometer, B, 1, A, 3)
 
 #endif

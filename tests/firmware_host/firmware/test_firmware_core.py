@@ -67,7 +67,9 @@ def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> No
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     assert error_of(board.ask("start", sensors=1)) == "not_configured"
     assert (
-        error_of(board.ask("configure", sensor=len(BOARD_PARTS), rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0))
+        error_of(
+            board.ask("configure", sensor=len(BOARD_PARTS), rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
+        )
         == "no_such_sensor"
     )
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"
