@@ -1,6 +1,7 @@
 """The driver of the LSM6DSV16X against its registers, and what its register model alone does."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.frames import encode
+from support import emulated_session
 from support.emulated_session import TRUTH, Session, samples
 from support.host_board import HostBoard, configured, convert, first_samples
 from support.parts import NUMBER
@@ -118,20 +120,23 @@ def test_it_has_90_ms_to_start_up_and_settle(board: HostBoard, rate_hz: float, s
     assert (first.values["sequence"], int(first.items["counts"][0][0])) == (0, settling)
 
 
-def test_a_conversion_in_the_middle_of_a_reading_is_no_sample() -> None:
-    """The model tears what is being read; whatever the board lets through is of one conversion."""
+def test_a_conversion_in_the_middle_of_a_reading_is_no_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The model tears what is being read, and another part delays the readings; what comes through is whole."""
     counting = iter(range(1, 10**6))
 
     def rate_at(_time_s: float) -> tuple[float, float, float]:
         step = next(counting) % 100
         return (step * 0.01, step * 0.01, step * 0.01)
 
-    session = Session(parts=("lsm6dsv16x",), rate_at=rate_at, noise_rad_s=0.0)
+    fast = partial(emulated_session.PARTS["lsm6dsv16x"], oscillator_ppm=7000.0)  # so that each delay comes
+    monkeypatch.setitem(emulated_session.PARTS, "lsm6dsv16x", fast)
+    session = Session(parts=("adis16465", "lsm6dsv16x"), rate_at=rate_at, noise_rad_s=0.0)
     session.run(0.2)
+    session.configure("adis16465", 1000.0, range_g=8.0)  # 0.56 ms of the bus for each of its readings
     setup = session.configure("lsm6dsv16x", 2000.0, 500.0).values
     session.board.receive(encode("start", 7, {"sensors": 0}))
-    found = samples(session.run(1.0), SENSOR)
-    assert len(found) > 1500
+    found = samples(session.run(0.6), SENSOR)
+    assert len(found) > 100
     rates = setup["sensitivity_rad_s"] * found["counts"]
     true = np.array(TRUTH.scale) * (rates + np.array(TRUTH.bias_rad_s))
     assert abs(true - true[:, :1]).max() < 2e-3, "all three are of one conversion"
