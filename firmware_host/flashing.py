@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 TARGET = "stm32l432kc"
 FLASH_START = 0x0800_0000
 FLASH_BYTES = 256 * 1024
-CALIBRATION_BYTES = 6 * 2048  # the last pages: an image that reached into them would erase the calibrations
+CALIBRATION_BYTES = 16 * 2048  # the last pages: an image that reached into them would erase the calibrations
 RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
 DEVICE_ID_REGISTER, DEVICE_ID = 0xE004_2000, 0x435  # DBGMCU_IDCODE of all STM32L43x and L44x (RM0394)
 # What tells an STM32L432KC from the others of that code (RM0394, chapter 47): kilobytes of flash, and package.

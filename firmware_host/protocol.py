@@ -22,7 +22,7 @@ import numpy as np
 from firmware_host.problem import Problem
 
 PROTOCOL_VERSION = 5
-FIRMWARE_VERSION = "0.5.0"  # of the shipped image
+FIRMWARE_VERSION = "0.7.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter

@@ -5,7 +5,7 @@ from svg import Drawing
 BLUE, GREEN = "#1565c0", "#2e7d32"
 WAYS = (  # question, answer if yes in two lines, the page
     (
-        "Is it an LSM9DS1, MPU-9250 or ADIS16465,",
+        "Is it a part that our board reads,",
         "and do you have the arm?",
         "wire it to our board",
         "how-to/first-calibration.md",

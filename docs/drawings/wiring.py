@@ -18,7 +18,7 @@ MEANING = (
     (SELECT, "select"),
     (READY, "data ready"),
 )
-SELECTS, CLOCKS, DATAS = ("D10", "D6", "D3", "A3"), ("D13",), ("D11", "D12")
+CLOCKS, DATAS = ("D13",), ("D11", "D12")
 
 
 def table() -> tuple[list[str], list[list[str]]]:
@@ -34,11 +34,13 @@ def table() -> tuple[list[str], list[list[str]]]:
     return heading[2:], body[:end]
 
 
-def colour_of(pin: str) -> str:
+def colour_of(pin: str, label: str) -> str:
+    """The colour of a wire from a pin of the Nucleo to the one of the part that is called `label`."""
     if pin in ("3V3", "GND"):
         return SUPPLY if pin == "3V3" else GROUND
-    kinds = ((SELECTS, SELECT), (CLOCKS, CLOCK), (DATAS, DATA))
-    return next((colour for pins, colour in kinds if pin in pins), READY)
+    if pin in CLOCKS or pin in DATAS:
+        return CLOCK if pin in CLOCKS else DATA
+    return SELECT if "CS" in label else READY
 
 
 def wiring(part: str) -> Drawing:
@@ -57,16 +59,16 @@ def wiring(part: str) -> Drawing:
             y = TOP + (row + 0.5) * PITCH
             to = wired.get(pin, "") if not (pin == "GND" and side < 0) else ""
             anchor = "start" if side < 0 else "end"
-            drawing.dot((at, y), 4, colour_of(pin) if to else "#999999")
+            drawing.dot((at, y), 4, colour_of(pin, to) if to else "#999999")
             drawing.words((at - side * 10, y + 5), pin, "#222222" if to else "#999999", anchor=anchor, bold=bool(to))
             if not to:
                 continue
-            end, colour, name = at + side * WIRE, colour_of(pin), to.replace(", ", " + ")
+            end, colour, name = at + side * WIRE, colour_of(pin, to), to.replace(", ", " + ")
             width = 22 + 9.2 * len(name)
             drawing.line([(at, y), (end, y)], colour, 3)
             drawing.box(end if side > 0 else end - width, y - 12, width, 24, "#ffffff", colour=colour)
             drawing.words((end + side * width / 2, y + 5), name, colour, anchor="middle", bold=True)
-            if pin in SELECTS:
+            if colour == SELECT:
                 drawing.words((at + side * WIRE / 2, y - 5), "10 kΩ to 3V3", SELECT, 11, "middle")
     x = 60.0
     for colour, meaning in MEANING:

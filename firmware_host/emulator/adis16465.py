@@ -16,7 +16,9 @@ from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, 
 from firmware_host.emulator.part_registers import PartRegisters
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.emulator.triad import Remembered
+from firmware_host.parts import GYROSCOPES
 
+WIRED = GYROSCOPES["adis16465"]
 PROD_ID = 0x4051
 _ADIS16470 = 0x4056
 _DIAG_STAT, _X_GYRO_LOW, _TEMP_OUT, _DATA_CNTR = 0x02, 0x04, 0x1C, 0x22
@@ -78,8 +80,8 @@ class Adis16465:
         seed: int | np.random.SeedSequence,
         acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
-        chip_select: str = "PA4",
-        interrupt: str = "PA1",
+        chip_select: str = WIRED.select,
+        interrupt: str = WIRED.data_ready,
         range_deg_s: int = 500,
         ready_s: float = 0.0,
     ) -> None:

@@ -7,7 +7,7 @@ from firmware_host.errors import BoardError
 FLASH_BYTES = 256 * 1024
 PAGE_BYTES = 2048
 DOUBLEWORD_BYTES = 8
-STORE_PAGES = 6  # at the end: they belong to the calibrations, the others to the program
+STORE_PAGES = 16  # at the end: they belong to the calibrations, the others to the program
 STORE_OFFSET = FLASH_BYTES - STORE_PAGES * PAGE_BYTES
 
 

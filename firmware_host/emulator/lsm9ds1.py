@@ -13,7 +13,9 @@ from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, 
 from firmware_host.emulator.part_registers import Conversions, OutputRegisters, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.emulator.triad import Remembered
+from firmware_host.parts import GYROSCOPES
 
+WIRED = GYROSCOPES["lsm9ds1"]
 WHO_AM_I = 0x68
 _LSM6DS3 = 0x69  # what another part of the maker answers
 _INT1_CTRL, _WHO_AM_I, _CTRL_REG1_G = 0x0C, 0x0F, 0x10
@@ -79,8 +81,8 @@ class Lsm9ds1:
         seed: int | np.random.SeedSequence,
         acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
-        chip_select: str = "PA11",
-        interrupt: str = "PA8",
+        chip_select: str = WIRED.select,
+        interrupt: str = WIRED.data_ready,
     ) -> None:
         self.chip_select = chip_select
         self.interrupt = interrupt

@@ -8,7 +8,9 @@ from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
 from firmware_host.emulator.part_registers import Conversions, OutputRegisters, PartRegisters
 from firmware_host.emulator.spi_device import Fault
+from firmware_host.parts import MAGNETOMETERS
 
+WIRED = MAGNETOMETERS["lsm9ds1_magnetometer"]
 WHO_AM_I = 0x3D
 _LIS2MDL = 0x40  # what another magnetometer of the maker answers, at another address
 _WHO_AM_I, _STATUS_REG_M, _OUT_X_L_M, _OUT_Z_H_M = 0x0F, 0x27, 0x28, 0x2D
@@ -49,8 +51,8 @@ class Lsm9ds1Magnetometer:
         *,
         seed: int | np.random.SeedSequence,
         oscillator_ppm: float = 0.0,
-        chip_select: str = "PB1",
-        interrupt: str = "PA3",
+        chip_select: str = WIRED.select,
+        interrupt: str = WIRED.data_ready,
     ) -> None:
         self.chip_select = chip_select
         self.interrupt = interrupt

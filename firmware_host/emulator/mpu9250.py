@@ -14,7 +14,9 @@ from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, 
 from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.emulator.triad import Remembered
+from firmware_host.parts import GYROSCOPES
 
+WIRED = GYROSCOPES["mpu9250"]
 WHO_AM_I = 0x71
 _MPU6500 = 0x70  # what the part without magnetometer answers
 _SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _ACCEL_CONFIG = 0x19, 0x1A, 0x1B, 0x1C
@@ -78,8 +80,8 @@ class Mpu9250:
         seed: int | np.random.SeedSequence,
         acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
-        chip_select: str = "PB0",
-        interrupt: str = "PA12",
+        chip_select: str = WIRED.select,
+        interrupt: str = WIRED.data_ready,
     ) -> None:
         self.chip_select = chip_select
         self.interrupt = interrupt

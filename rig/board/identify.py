@@ -4,6 +4,7 @@ from functools import partial
 from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
+from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import BoardSection, SensorsConfig
 from rig.config.sensor_sections import MagnetometerSection, SensorSection
@@ -12,28 +13,6 @@ from rig.errors import Fault, Refused, raised_as
 Configured = SensorSection | MagnetometerSection
 
 NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
-
-# What answers in the place of another part, by the identity register where the firmware looks for that part.
-# Sources: the identities in Linux' drivers st_gyro_core.c and st_lsm6dsx_core.c (0x0F) and inv_mpu_iio.h (0x75).
-IMPOSTORS = {
-    "lsm9ds1": {
-        0x69: "an LSM6DS3",
-        0x6A: "an LSM6DSL or its like",
-        0x6C: "an LSM6DSO or its like",
-        0xD4: "an L3GD20 or LSM9DS0",
-        0xD7: "an L3GD20H",
-    },
-    "mpu9250": {
-        0x68: "an MPU-6050, MPU-6000 or MPU-9150",
-        0x70: "an MPU-6500",
-        0x73: "an MPU-9255",
-        0x74: "an MPU-6515",
-        0xAF: "an ICM-20608",
-    },
-}
-
-# A die of a part is no part of its maker's.
-DIES = {"lsm9ds1m": "lsm9ds1_magnetometer"}
 
 
 refusing = partial(raised_as, Refused)  # before anything has moved
@@ -79,7 +58,8 @@ def find_sensor(identity: BoardIdentity, name: str, section: Configured) -> Sens
         raise _missing(name, section, f"nothing answers: its identity reads 0x{info.who_am_i:02x}")
     raise Refused(
         "sensor_mismatch",
-        f"sensors.{name}: in the place of the {section.part} answers {impostor(section.part, info.who_am_i)}",
+        f"sensors.{name}: in the place of the {section.part} answers "
+        f"{BOARD_PARTS[section.part].another(info.who_am_i)}",
         "Check which part is fitted, its chip select, and sensors.*.part in the configuration",
     )
 
@@ -138,14 +118,5 @@ def refuse_other_sensor(
 
 def configured_part(part: str) -> str:
     """A part as the configuration spells it; the board names parts as their makers do."""
-    spelt = part.lower().replace("-", "")
-    return DIES.get(spelt, spelt)
-
-
-def impostor(part: str, who_am_i: int) -> str:
-    """What an unexpected identity would be."""
-    if part == "adis16465" and 16000 < who_am_i < 17000:  # this family's register holds the part's number
-        known: str | None = f"an ADIS{who_am_i}"
-    else:
-        known = IMPOSTORS.get(part, {}).get(who_am_i)
-    return f"{known or 'an unknown part'}, identity 0x{who_am_i:02x}"
+    spelt = {on_board.name: name for name, on_board in BOARD_PARTS.items()}
+    return spelt.get(part, part.lower())

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
 
 RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two rates of a part are 5e-4 apart
 
@@ -24,6 +25,20 @@ class AccelerometerSheet:
 
 
 @dataclass(frozen=True, slots=True)
+class Delivered:
+    """How far a part may be off as it is delivered: half-widths, None where its data sheet has no figure.
+
+    `rate_percent` is of its own data rate, with all temperatures.
+    """
+
+    bias_deg_s: float | None = None
+    scale_percent: float | None = None
+    acceleration_bias_mg: float | None = None
+    acceleration_scale_percent: float | None = None
+    rate_percent: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
@@ -33,7 +48,8 @@ class Part:
     noise, `bias_instability_deg_h` the least Allan deviation of its bias, `non_orthogonality_deg` how far from 90° two
     of its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
     `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what else is known of
-    it. A part with a port of its own stands beside the board, with a clock of its own.
+    it; `delivered` is what calibrating finds. A part with a port of its own stands beside the board, with a clock
+    of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -52,6 +68,7 @@ class Part:
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
     accelerometer: AccelerometerSheet
+    delivered: Delivered = Delivered()
     own_port: bool = False
 
     @property
@@ -140,6 +157,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
                 nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260, bias_instability_ug=30
             ),
+            delivered=Delivered(bias_deg_s=30),  # at ±2000 °/s
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -163,6 +181,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
                 scale_ppm_k=260,
                 bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             ),
+            delivered=Delivered(bias_deg_s=5, scale_percent=3, rate_percent=1),  # PS-MPU-9250A-01, table 1
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -187,6 +206,65 @@ PARTS: Mapping[str, Part] = MappingProxyType(
                 scale_ppm_k=20,
                 bias_instability_ug=3.6,  # data sheet, features
             ),
+        ),
+        "icm42688p": Part(  # DS-000347 rev. 1.8, section 14.37; slower rates let through more than half of themselves
+            rates_hz=(25, 50, 100, 200, 500, 1000, 2000),
+            rates_rule="25, 50, 100, 200, 500, 1000, 2000",
+            ranges_deg_s=(15.625, 31.25, 62.5, 125, 250, 500, 1000, 2000),
+            default_rate_hz=200,
+            default_range_deg_s=250,
+            g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
+            nonlinearity_percent=0.1,  # table 1
+            asymmetry_percent=0.02,  # not stated; assumed, as of the MPU-9250
+            bias_deg_s_k=0.005,  # table 1, 0 to 70 °C
+            scale_ppm_k=50,  # table 1, ±0.005 %/°C
+            angle_random_walk_deg_sqrt_h=0.119,  # 0.0028 °/s/√Hz, of one side (table 1): 60 / √2 times that
+            bias_instability_deg_h=10,  # not stated; assumed, as of the MPU-9250
+            non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 % (table 1)
+            ranges_g=(2, 4, 8, 16),
+            acceleration_noise_ug_sqrt_hz=70,  # table 2: of z; x and y have 65
+            accelerometer=AccelerometerSheet(  # table 2
+                nonlinearity_percent=0.1,
+                nonlinear_over_g=2,
+                bias_mg_k=0.15,
+                scale_ppm_k=50,
+                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
+            ),
+            delivered=Delivered(
+                bias_deg_s=0.5,  # table 1
+                scale_percent=0.5,
+                acceleration_bias_mg=20,  # table 2
+                acceleration_scale_percent=0.5,
+                rate_percent=3.5,  # table 4: ±1.5 % at 25 °C and ±2 % with temperature, the gyroscope's clock
+            ),
+        ),
+        "lsm6dsv16x": Part(  # DS13510 rev. 4, table 20: three sets of rates of the high-accuracy mode
+            rates_hz=tuple(
+                sorted(fastest / 2**n for fastest in (1600, 1920, 2000) for n in range(8)),
+            ),
+            rates_rule="1600/2ⁿ, 1920/2ⁿ, 2000/2ⁿ with n = 0 … 7",
+            ranges_deg_s=(125, 250, 500, 1000, 2000),
+            default_rate_hz=240,
+            default_range_deg_s=250,
+            g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
+            nonlinearity_percent=0.1,  # not stated; assumed, as of the ICM-42688-P
+            asymmetry_percent=0.02,  # not stated; assumed, as of the MPU-9250
+            bias_deg_s_k=0.006,  # table 3
+            scale_ppm_k=70,  # table 3, ±0.007 %/°C
+            angle_random_walk_deg_sqrt_h=0.119,  # 2.8 mdps/√Hz, of one side (table 3): 60 / √2 times that
+            bias_instability_deg_h=10,  # not stated; assumed, as of the MPU-9250
+            non_orthogonality_deg=0.72,  # not stated; assumed, as of the ICM-42688-P
+            ranges_g=(2, 4, 8, 16),
+            acceleration_noise_ug_sqrt_hz=60,  # table 3, high-performance mode, whose noise this mode has (section 6.5)
+            accelerometer=AccelerometerSheet(
+                nonlinearity_percent=0.1,  # not stated; assumed, as of the ICM-42688-P
+                nonlinear_over_g=2,
+                bias_mg_k=0.07,  # table 3
+                scale_ppm_k=100,  # table 3, ±0.01 %/°C
+                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
+            ),
+            # Table 3; the accelerometer's scale factor has no figure there
+            delivered=Delivered(bias_deg_s=1, scale_percent=0.3, acceleration_bias_mg=12, rate_percent=1),
         ),
         "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
@@ -219,3 +297,10 @@ MAGNETOMETERS: Mapping[str, MagnetometerPart] = MappingProxyType(
         ),
     }
 )
+
+if TYPE_CHECKING:
+    PartName = str
+    MagnetometerName = str
+else:  # what a configuration may name: a misspelt one is told with these
+    PartName = Literal[tuple(PARTS)]
+    MagnetometerName = Literal[tuple(MAGNETOMETERS)]

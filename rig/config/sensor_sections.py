@@ -14,7 +14,15 @@ from rig.config.section import (
     Vector3,
     checked_port,
 )
-from rig.config.sensor_catalogue import MAGNETOMETERS, PARTS, in_words, nearest_rate, one_of
+from rig.config.sensor_catalogue import (
+    MAGNETOMETERS,
+    PARTS,
+    MagnetometerName,
+    PartName,
+    in_words,
+    nearest_rate,
+    one_of,
+)
 
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
@@ -104,7 +112,7 @@ class AccelerationSection(Section):
 class SensorSection(Section):
     """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
-    part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775"] = Field(description="which gyroscope it is")
+    part: PartName = Field(description="which gyroscope it is")
     serial_number: str = Field(
         description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
         "its own, and another number is refused",
@@ -220,7 +228,7 @@ def checked_serial_number(value: str) -> str:
 class MagnetometerSection(Section):
     """One magnetometer on the board, under a name that no gyroscope has: recorded, and calibrated in attitudes."""
 
-    part: Literal["lsm9ds1_magnetometer"] = Field(description="which magnetometer it is")
+    part: MagnetometerName = Field(description="which magnetometer it is")
     serial_number: str = Field(
         description="serial number of this sensor; in every result",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},

@@ -381,6 +381,12 @@ class SimulatedSensorSection(Section):
     )
     bandwidth_hz: Bandwidth = None
     delay_ms: Delay = 0.0
+    data_rate_ppm: float = Field(
+        default=0.0,
+        ge=-100_000,
+        le=100_000,
+        description="by how much too fast its own oscillator makes its data rate, of a part on the board",
+    )
     accelerometer: SimulatedAccelerometerSection = Field(
         default=SimulatedAccelerometerSection(),
         description="the accelerometer beside it, of a sensor that has `acceleration`",

@@ -18,6 +18,7 @@ from firmware_host import protocol
 from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
 from firmware_host.frames import decode, encode
+from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from firmware_host.serial_port import SerialPort
 from rig.config.link_budget import Stream
@@ -127,10 +128,8 @@ def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, s
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         assert board.identity.unique_id == "0123456789abcdef01234567"
         assert [(s.part, s.who_am_i, s.present, s.quantity) for s in board.identity.sensors] == [
-            ("LSM9DS1", 0x68, True, "rate"),
-            ("MPU-9250", 0x71, True, "rate"),
-            ("ADIS16465", 0x4051, True, "rate"),
-            ("LSM9DS1-M", 0x3D, True, "field"),
+            (part.name, part.who_am_i, True, "field" if name in MAGNETOMETERS else "rate")
+            for name, part in BOARD_PARTS.items()
         ]
         setup = board.configure(0, rate_hz=200, range_deg_s=245)
         assert (setup.rate_hz, setup.range_deg_s) == (238.0, 245.0)

@@ -1,14 +1,10 @@
 """The documents about the board say what the tables and the board do."""
 
-import inspect
-
 import pytest
 
 from firmware_host import protocol
-from firmware_host.emulator.adis16465 import Adis16465
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
-from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.frames import encode
+from firmware_host.parts import GYROSCOPES, BoardPart
 from firmware_host.protocol_page import reference
 from firmware_host.stuffing import unstuff
 from support.paths import DOCS
@@ -52,17 +48,15 @@ def wiring() -> dict[str, dict[str, str]]:
     return {row[1]: dict(zip(heading[2:], row[2:], strict=True)) for row in rows if len(row) == len(heading)}
 
 
-@pytest.mark.parametrize("model", [Lsm9ds1, Mpu9250, Adis16465])
-def test_the_wiring_table_is_how_the_board_is_wired(model: type) -> None:
-    """The register models sit on the pins that the firmware drives, or no test of theirs would pass."""
-    pins = inspect.signature(model).parameters
-    part = model.name  # type: ignore[attr-defined]
+@pytest.mark.parametrize("wired", GYROSCOPES.values(), ids=lambda wired: wired.name)
+def test_the_wiring_table_is_how_the_board_is_wired(wired: BoardPart) -> None:
+    """The firmware drives these pins, and the register models sit on them."""
     table = wiring()
-    assert "CS" in table[pins["chip_select"].default][part]
-    assert table[pins["interrupt"].default][part] in ("INT1_A/G", "INT", "DR")
-    for others in (pins["chip_select"].default, pins["interrupt"].default):
-        assert [name for name, pin in table[others].items() if pin] == [part]
-    assert all(table[bus][part] for bus in ("PB3", "PB4", "PB5"))
+    assert "CS" in table[wired.select][wired.name]
+    assert table[wired.data_ready][wired.name] in ("INT1_A/G", "INT", "INT1", "DR")
+    for pin in (wired.select, wired.data_ready):
+        assert [name for name, label in table[pin].items() if label] == [wired.name]
+    assert all(table[bus][wired.name] for bus in ("PB3", "PB4", "PB5"))
 
 
 def test_the_batches_age_is_the_firmware_s() -> None:

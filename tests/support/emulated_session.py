@@ -7,20 +7,19 @@ from typing import Any
 import numpy as np
 
 from firmware_host.emulator.accelerometer import AccelerometerTruth
-from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
-from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.magnetometer import MagnetometerTruth
-from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
 from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
+from rig.config import sensor_catalogue
 from support.paths import IMAGE
 
 CRYSTAL_PPM = 35.0
 UNIQUE_ID = bytes(range(12))
+FIRST_RECORD = 0x3D000  # in the flash: the first sensor's pages have been there since firmware 0.1
 
 
 FIELD_T = (20e-6, -5e-6, 43e-6)
@@ -34,17 +33,18 @@ def magnetometer(motion_at: Callable[[float], Sequence[float]], *_truth: Any, se
         motion_at(time_s)
         return FIELD_T
 
-    return Lsm9ds1Magnetometer(field_at, MAGNETIC, seed=seed)
+    return MAGNETOMETERS["lsm9ds1_magnetometer"].register_model(field_at, MAGNETIC, seed=seed)
 
 
-PARTS: dict[str, Callable[..., SpiDevice]] = {
-    "lsm9ds1": Lsm9ds1,
-    "mpu9250": Mpu9250,
-    "adis16465": Adis16465,
-}  # the gyroscopes, in the order of the board's sensor table
+# The gyroscopes, in the order of the board's sensor table
+PARTS: dict[str, Callable[..., SpiDevice]] = {name: part.register_model for name, part in GYROSCOPES.items()}
 BESIDE = {"lsm9ds1_magnetometer": magnetometer}
 RANGE_G = 8.0  # which every part has
-RATES_AND_RANGES = {"lsm9ds1": (238.0, 245.0), "mpu9250": (200.0, 250.0), "adis16465": (200.0, 500.0)}
+RATES_AND_RANGES = {
+    name: (usual.default_rate_hz, usual.default_range_deg_s)
+    for name, usual in sensor_catalogue.PARTS.items()
+    if name in GYROSCOPES
+}
 TRUTH = GyroTruth((1.1771, 1.1554, 1.1440), (0.0077, -0.0100, -0.0051))
 ACCELERATION = AccelerometerTruth((1.02, 0.99, 1.01), (0.2, -0.1, 0.3))
 
@@ -141,7 +141,8 @@ class Session:
     def configure_magnetometer(self, rate_hz: float = 80.0, range_gauss: float = 4.0) -> Frame:
         """The same of the magnetometer."""
         ranges = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": range_gauss}
-        return self.ask("configure", sensor=3, rate_hz=rate_hz, **ranges)
+        number = list(BOARD_PARTS).index("lsm9ds1_magnetometer")
+        return self.ask("configure", sensor=number, rate_hz=rate_hz, **ranges)
 
     def stream(self, duration_s: float, rate_hz: float = 238.0, range_deg_s: float = 245.0) -> np.ndarray:
         """Configure and start the LSM9DS1, then run. Returns what `samples` does."""

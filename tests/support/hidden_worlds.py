@@ -30,9 +30,14 @@ QUIET_RAD_S, NOISY_RAD_S = 0.002, 0.035
 STATED = UncertaintySection()
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
-PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"]}
+BY_SHEET = tuple(name for name, part in PARTS.items() if part.delivered.acceleration_bias_mg is not None)
+PART_WANDERS = {**PART_ERRORS, **dict.fromkeys(("mpu9250", *BY_SHEET), PART_ERRORS["lsm9ds1"])}
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
+    **{
+        name: (1e-2 * (off.acceleration_scale_percent or 1.0), 1e-3 * off.acceleration_bias_mg * STANDARD_GRAVITY_M_S2)
+        for name, off in ((name, PARTS[name].delivered) for name in BY_SHEET)
+    },
 }  # fmt: skip
 TIMEOUT_S = 3000.0
 UNLIMITED = {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": None, "verification_mean_rad_s": None}
@@ -95,6 +100,41 @@ def kvh(seed: int) -> dict[str, Any]:
     return changed
 
 
+def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
+    """A part with its accelerometer, as far off as its data sheet says that a delivered one may be."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document(part), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
+    site = document["site"]
+    expanded = site["gravity_uncertainty_m_s2"]
+    document["world"]["site"]["gravity_m_s2"] = float(rng.normal(site["gravity_m_s2"], expanded / 2))
+    document["sensors"] = {name: each for name, each in document["sensors"].items() if each is not None}
+    ((name, section),) = document["sensors"].items()
+    sheet, off = PARTS[part], PARTS[part].delivered
+    half_band_hz = section["rate_hz"] / 2
+    noise_rad_s = np.radians(sheet.angle_random_walk_deg_sqrt_h / 60) * np.sqrt(2 * half_band_hz)
+    noise_m_s2 = 1e-6 * sheet.acceleration_noise_ug_sqrt_hz * np.sqrt(half_band_hz) * STANDARD_GRAVITY_M_S2
+    bias_rad_s, bias_per_k = np.radians([off.bias_deg_s, sheet.bias_deg_s_k])
+    drawn = {
+        **_sensor(rng, section, float(noise_rad_s)),
+        "scale": rng.uniform(-1, 1, 3) * 1e-2 * off.scale_percent + 1,
+        "bias_rad_s": rng.uniform(-1, 1, 3) * bias_rad_s,
+        "bias_rad_s_per_k": rng.uniform(-1, 1, 3) * bias_per_k,
+        "scale_per_k": rng.uniform(-1, 1, 3) * 1e-6 * sheet.scale_ppm_k,
+    }
+    drawn = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in drawn.items()}
+    drawn["data_rate_ppm"] = float(rng.uniform(-1, 1) * 1e4 * off.rate_percent)
+    drawn["accelerometer"]["noise_m_s2"] = float(noise_m_s2)
+    document["world"]["sensors"] = {name: drawn}
+    return _with_mountings(document, rng)
+
+
+def _with_mountings(document: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    mounted: dict[str, Any] = merge(
+        document, {"sensors": {name: {"mounting": _mounting(rng)} for name in document["sensors"]}}
+    )
+    return mounted
+
+
 def on_another_arm(model: str, seed: int) -> dict[str, Any]:
     """As `quiet`, on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
@@ -111,9 +151,12 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         "imu": imu,
         "kvh": kvh,
         **{model: partial(on_another_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
+        **{part: partial(by_its_sheet, part) for part in BY_SHEET},
     }
 )
-WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys(OTHER_ARMS, 6)})
+WORLDS = MappingProxyType(
+    {"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys((*OTHER_ARMS, *BY_SHEET), 6)}
+)
 
 
 def _document(name: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The firmware's core built for this machine, with the four sensors on its bus; tests play the chip."""
+"""The firmware's core built for this machine, with the sensors on its bus; tests play the chip."""
 
 import ctypes
 import fcntl
@@ -12,7 +12,12 @@ from typing import Any
 
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.protocol import ERRORS
-from support.host_sensors import Adis16465Registers, Lsm9ds1Registers, MagnetometerRegisters, Mpu9250Registers, Part
+from support.host_sensors import Part
+from support.parts import REGISTERS
+from support.parts.adis16465 import Adis16465Registers
+from support.parts.lsm9ds1 import Lsm9ds1Registers
+from support.parts.lsm9ds1_magnetometer import Lsm9ds1MagnetometerRegisters
+from support.parts.mpu9250 import Mpu9250Registers
 from support.paths import FIRMWARE
 
 PERIOD_US = 4202  # 238 Hz
@@ -49,12 +54,12 @@ class HostBoard:
 
     def __init__(self) -> None:
         self.core = core()
-        self.gyro = Lsm9ds1Registers()
-        self.mpu9250 = Mpu9250Registers()
-        self.adis16465 = Adis16465Registers()
-        self.magnetometer = MagnetometerRegisters()  # the LSM9DS1's
-        # By the bus's device numbers
-        self.sensors: list[Part] = [self.gyro, self.mpu9250, self.adis16465, self.magnetometer]
+        self.parts: dict[str, Any] = {part: new() for part, new in REGISTERS.items()}
+        self.gyro: Lsm9ds1Registers = self.parts["lsm9ds1"]
+        self.mpu9250: Mpu9250Registers = self.parts["mpu9250"]
+        self.adis16465: Adis16465Registers = self.parts["adis16465"]
+        self.magnetometer: Lsm9ds1MagnetometerRegisters = self.parts["lsm9ds1_magnetometer"]
+        self.sensors: list[Part] = list(self.parts.values())  # what is really there, by the board's numbers
         self.line_is_free = True  # False: the transmitter is busy until `sent()`
         self.restarts = 0
         self.wire = bytearray()
@@ -72,8 +77,7 @@ class HostBoard:
         ctypes.memmove(pointer, answer, size)
 
     def _line(self, sensor: int) -> bool:
-        """Only the LSM9DS1's two dies hold their lines until they are read."""
-        return (sensor == 0 and self.gyro.fresh) or (sensor == 3 and self.magnetometer.fresh)
+        return self.sensors[sensor].line_is_high
 
     def _transmit(self, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
         self.wire += ctypes.string_at(pointer, size)
@@ -153,7 +157,7 @@ def convert(
     acceleration: Sequence[int] = (0, 0, 0),
 ) -> None:
     """One conversion: the interrupt at `time_us`, the main loop `late_us` after."""
-    (board.gyro, board.mpu9250, board.adis16465, board.magnetometer)[sensor].convert(counts, -48, acceleration)
+    list(board.parts.values())[sensor].convert(counts, -48, acceleration)
     board.data_ready(time_us, sensor)
     board.wait_until(time_us + late_us)
     board.run()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from support.host_board import core
 
-PAGES, PAGE_BYTES, DOUBLEWORD = 6, 2048, 8
+PAGES, PAGE_BYTES, DOUBLEWORD = 16, 2048, 8
 _WATCH = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint, ctypes.c_size_t, ctypes.POINTER(ctypes.c_uint64))
 
 

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.parts import GYROSCOPES
 from rig.config.load import Loaded
 from rig.world.board.serial_line import SerialLine
 from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
 
-SENSORS = ("lsm9ds1", "mpu9250", "adis16465")  # the board's table
+SENSORS = tuple(GYROSCOPES)  # the board's table
 
 
 @dataclass

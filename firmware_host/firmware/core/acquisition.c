@@ -60,7 +60,7 @@ void acquisition_data_ready(unsigned sensor, uint32_t captured_us)
 
 void acquisition_set_rate(unsigned sensor, double rate_hz)
 {
-    const struct sensor_driver *driver = sensors[sensor].driver;
+    const struct sensor_driver *driver = drivers[sensor];
     struct stream *stream = &streams[sensor];
     stream->period_us = rate_hz > 0.0 ? (uint32_t)(1e6f / (float)rate_hz) : 0;
     stream->settling = driver->settling;
@@ -70,7 +70,7 @@ void acquisition_set_rate(unsigned sensor, double rate_hz)
 
 static enum read_result read_sensor(unsigned sensor, struct reading *reading)
 {
-    return sensors[sensor].driver->read(sensors[sensor].device, setups_of(sensor), reading);
+    return drivers[sensor]->read(sensor, setups_of(sensor), reading);
 }
 
 #define TRIES 3u /* a line that only rattles is left alone */
@@ -79,7 +79,7 @@ static enum read_result read_sensor(unsigned sensor, struct reading *reading)
    is read once and no more: an ADIS16465 bears only so many words from one conversion to the next. */
 static void rearm(unsigned sensor)
 {
-    const struct sensor_driver *driver = sensors[sensor].driver;
+    const struct sensor_driver *driver = drivers[sensor];
     struct stream *stream = &streams[sensor];
     struct reading discarded;
     unsigned tries = driver->holds_line ? TRIES : 1;
@@ -221,7 +221,7 @@ static void acquire(unsigned sensor)
     stream->edges_seen = edges;
     stream->last_us = stream->watched_us = time_us;
 
-    const struct sensor_driver *driver = sensors[sensor].driver;
+    const struct sensor_driver *driver = drivers[sensor];
     struct reading reading;
     uint32_t began_us = port_time_us();
     enum read_result result = read_sensor(sensor, &reading);

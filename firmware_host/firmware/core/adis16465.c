@@ -1,8 +1,7 @@
 /* ADIS16465 data sheet; the same registers, times and checksum in Linux's drivers/iio/imu/adis16475.c, which serves this
    part, in PX4's src/drivers/imu/analog_devices/adis16470 and in ArduPilot's AP_InertialSensor_ADIS1647x.cpp. */
-#include "adis16465.h"
-
 #include "port.h"
+#include "sensors.h"
 #include "settings.h"
 
 #define WRITE 0x80u /* first bit of a frame of 16 bits, the high byte first */
@@ -60,7 +59,7 @@ static uint16_t word_at(const uint8_t *bytes)
 static struct {
     uint32_t idle_since_us; /* the latest frame's end */
     uint16_t counter;       /* of conversions, at the latest reading */
-} states[BUS_DEVICES];
+} states[SENSOR_COUNT];
 
 static void reset(unsigned device)
 {

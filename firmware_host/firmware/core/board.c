@@ -47,8 +47,8 @@ static void send_identity(uint8_t reply_to)
         uint16_t who_am_i;
         identity.items[i].present = sensors_identify(i, &who_am_i) == 0;
         identity.items[i].who_am_i = who_am_i;
-        identity.items[i].quantity = sensors[i].driver->quantity;
-        memcpy(identity.items[i].part, sensors[i].driver->part, sizeof identity.items[i].part);
+        identity.items[i].quantity = drivers[i]->quantity;
+        memcpy(identity.items[i].part, drivers[i]->part, sizeof identity.items[i].part);
     }
     link_send(MESSAGE_IDENTITY, &identity, sizeof identity);
 }

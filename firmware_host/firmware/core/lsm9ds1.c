@@ -1,9 +1,7 @@
 /* LSM9DS1 datasheet (DocID025715): register map section 6, registers section 7, SPI section 5. */
-#include "lsm9ds1.h"
-
 #include "byte_registers.h"
-#include "lsm9ds1_magnetometer.h"
 #include "port.h"
+#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x68u
@@ -75,7 +73,7 @@ static uint16_t identify(unsigned device)
 static void keep_to_spi(unsigned device)
 {
     byte_register_write(device, BUS_HZ, CTRL_REG9, CTRL_REG9_I2C_DISABLE);
-    lsm9ds1_magnetometer.keep_to_spi(BUS_LSM9DS1_MAGNETOMETER);
+    lsm9ds1_magnetometer.keep_to_spi(SENSOR_lsm9ds1_magnetometer);
 }
 
 static size_t nearest_rate(float hz)

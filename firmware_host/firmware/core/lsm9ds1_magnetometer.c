@@ -1,10 +1,9 @@
 /* LSM9DS1 datasheet (DocID025715): register map section 6, the magnetometer's registers section 8, SPI section 5. */
-#include "lsm9ds1_magnetometer.h"
-
 #include <stddef.h>
 
 #include "byte_registers.h"
 #include "port.h"
+#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x3Du

@@ -12,12 +12,8 @@ uint32_t port_time_us(void);
 /* Lets at least so much time pass, busily: for pauses a part needs within one conversation. */
 void port_wait_us(uint32_t duration_us);
 
-/* Parts the bus leads to, by their selects. */
-#define BUS_DEVICES 4u
-#define BUS_LSM9DS1_MAGNETOMETER 3u /* a die of its own, which the gyroscope's driver too keeps off the wires */
-
-/* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI
-   FIFO takes two bytes an access. */
+/* Selects the device, which has the number of its sensor, exchanges `size` bytes in place at `max_hz` or the next slower
+   clock, deselects. `size` is even: the SPI FIFO takes two bytes an access. */
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
 /* From now on only these sensors' data-ready lines interrupt: bit i is sensor i. What they did before is forgotten. */
@@ -34,7 +30,7 @@ void port_restart(void);
 
 /* Pages of flash for what must survive a power loss. What an erase leaves reads as 0xFF. A doubleword can be programmed once
    after an erase. Each returns false when the flash refuses; a read also when a doubleword is torn, cut off in its writing. */
-#define FLASH_PAGES 6u
+#define FLASH_PAGES 16u /* two for each of the most sensors that messages can name */
 #define FLASH_PAGE_BYTES 2048u
 bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size);
 bool port_flash_erase(unsigned page);

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 5u
-#define FIRMWARE_VERSION "0.5.0"
+#define FIRMWARE_VERSION "0.7.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */

@@ -2,22 +2,16 @@
 
 #include <stddef.h>
 
-#include "adis16465.h"
-#include "lsm9ds1.h"
-#include "lsm9ds1_magnetometer.h"
-#include "mpu9250.h"
-#include "port.h"
+_Static_assert(SENSOR_COUNT <= 8, "a message's mask has a bit for every sensor");
 
-_Static_assert(SENSOR_COUNT <= BUS_DEVICES, "every sensor has its select");
-
-const struct sensor sensors[SENSOR_COUNT] = {
-    {&lsm9ds1_gyro, 0}, {&mpu9250_gyro, 1}, {&adis16465_gyro, 2}, {&lsm9ds1_magnetometer, BUS_LSM9DS1_MAGNETOMETER}};
+#define POINTER(driver, ...) &driver,
+const struct sensor_driver *const drivers[SENSOR_COUNT] = {SENSORS(POINTER)};
 
 void sensors_reset(void)
 {
     for (unsigned i = 0; i < SENSOR_COUNT; i++)
-        if (sensors[i].driver->reset != NULL)
-            sensors[i].driver->reset(sensors[i].device);
+        if (drivers[i]->reset != NULL)
+            drivers[i]->reset(i);
 }
 
 enum error_code sensors_check_gyroscope(uint8_t sensor)
@@ -35,11 +29,11 @@ static bool is_nobody(uint16_t who_am_i)
 
 enum error_code sensors_identify(unsigned sensor, uint16_t *who_am_i)
 {
-    const struct sensor_driver *driver = sensors[sensor].driver;
-    *who_am_i = driver->identify(sensors[sensor].device);
+    const struct sensor_driver *driver = drivers[sensor];
+    *who_am_i = driver->identify(sensor);
     if (*who_am_i == driver->identity) {
         if (driver->keep_to_spi != NULL)
-            driver->keep_to_spi(sensors[sensor].device);
+            driver->keep_to_spi(sensor);
         return 0;
     }
     return is_nobody(*who_am_i) ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;

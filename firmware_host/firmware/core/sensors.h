@@ -5,17 +5,19 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "board_parts.h"
 #include "sensor.h"
 
-/* Data-ready lines are numbered as the sensors are. */
-struct sensor {
-    const struct sensor_driver *driver;
-    unsigned device;
-};
+/* Devices of the bus and data-ready lines are numbered as the sensors are. */
+#define NUMBER(driver, ...) SENSOR_##driver,
+enum sensor_number { SENSORS(NUMBER) };
+#undef NUMBER
 
-#define SENSOR_COUNT 4u
-#define GYROSCOPE_COUNT 3u /* which come first */
-extern const struct sensor sensors[SENSOR_COUNT];
+#define DECLARE(driver, ...) extern const struct sensor_driver driver;
+SENSORS(DECLARE)
+#undef DECLARE
+
+extern const struct sensor_driver *const drivers[SENSOR_COUNT];
 
 /* What the drivers remember of their parts goes. */
 void sensors_reset(void);

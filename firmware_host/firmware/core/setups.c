@@ -25,15 +25,15 @@ static enum error_code refuse_wanted(const struct configure_payload *wanted, uin
 
 enum error_code setups_configure(const struct configure_payload *wanted)
 {
-    const struct sensor *sensor = &sensors[wanted->sensor];
+    const struct sensor_driver *driver = drivers[wanted->sensor];
     struct setup_payload *setup = &setups[wanted->sensor];
     uint16_t who_am_i;
     *setup = (struct setup_payload){.sensor = wanted->sensor};
-    enum error_code error = refuse_wanted(wanted, sensor->driver->quantity);
+    enum error_code error = refuse_wanted(wanted, driver->quantity);
     if (!error)
         error = sensors_identify(wanted->sensor, &who_am_i);
     if (!error)
-        error = sensor->driver->configure(sensor->device, wanted, setup);
+        error = driver->configure(wanted->sensor, wanted, setup);
     if (error)
         setup->rate_hz = 0.0;
     return error;

@@ -62,7 +62,7 @@ static enum error_code describe(unsigned sensor, struct calibration_payload *rec
         .who_am_i = who_am_i,
         .range_deg_s = (float)setups_of(sensor)->range_deg_s,
     };
-    memcpy(record->part, sensors[sensor].driver->part, sizeof record->part);
+    memcpy(record->part, drivers[sensor]->part, sizeof record->part);
     return 0;
 }
 

@@ -2,35 +2,48 @@
 
 #include <string.h>
 
-#define PARTS 4u
+#include "sensors.h"
+#include "settings.h"
+
+#define BURST_DATA 0x80u /* of the ADIS16465: above the registers, where its burst of ten words begins */
+
 #define MEMORY 256u
-
-/* All but the third: registers behind a byte of address, of which the magnetometer has one bit less. The third: words of 16
-   bits, high byte first, answered a frame later, but for the burst, whose ten words begin at BURST_DATA. */
-enum { LSM9DS1, MPU9250, ADIS16465, MAGNETOMETER };
-
 #define READ 0x80u
+#define WORDS 0u /* in the place of a mask: words of 16 bits, high byte first, answered a frame later */
+
+/* A part: which bits of the first byte are the address, and are answered by the bytes from there on; what its memory holds
+   after power-up, such as its identity and that there are new data, always; where its outputs lie. */
+static const struct part {
+    uint8_t mask;
+    struct {
+        uint8_t address, value;
+    } initial[3];
+    struct {
+        uint8_t first, size;
+    } outputs[2];
+} parts[SENSOR_COUNT] = {
+    [SENSOR_lsm9ds1_gyro] = {0x7F, {{0x0F, 0x68}, {0x17, 0x02}}, {{0x18, 6}, {0x28, 6}}}, /* no new accelerations at 0x27 */
+    [SENSOR_mpu9250_gyro] = {0x7F, {{0x75, 0x71}, {0x6B, 0x01}, {0x3A, 0x01}}, {{0x3B, 6}, {0x43, 6}}},
+    [SENSOR_adis16465_gyro] = {WORDS, {{0x72, 0x40}, {0x73, 0x51}, {0x5F, 0x07}}, {{BURST_DATA + 2, 12}, {0x04, 24}}},
+    [SENSOR_icm42688p_gyro] = {0x7F, {{0x75, 0x47}, {0x2D, 0x08}}, {{0x1F, 6}, {0x25, 6}}},
+    [SENSOR_lsm6dsv16x_gyro] = {0x7F, {{0x0F, 0x70}, {0x1E, 0x07}}, {{0x22, 6}, {0x28, 6}}},
+    [SENSOR_lsm9ds1_magnetometer] = {0x3F, {{0x0F, 0x3D}, {0x27, 0x0F}}, {{0x28, 6}}},
+};
+
+#define ADIS16465 SENSOR_adis16465_gyro
 #define ADIS_WRITE 0x80u
 #define ADIS_BURST 0x68u
-#define BURST_DATA 0x80u /* above the registers */
 #define BURST_SIZE 20u
 
-static uint8_t memory[PARTS][MEMORY];
+static uint8_t memory[SENSOR_COUNT][MEMORY];
 static uint8_t answer_at; /* of the ADIS16465: the register its next frame answers */
 
 void parts_reset(void)
 {
     memset(memory, 0, sizeof memory);
-    memory[LSM9DS1][0x0F] = 0x68;   /* WHO_AM_I */
-    memory[LSM9DS1][0x17] = 0x02;   /* STATUS_REG: new data, always; its twin at 0x27 says none after the rates */
-    memory[MPU9250][0x75] = 0x71;   /* WHO_AM_I */
-    memory[MPU9250][0x6B] = 0x01;   /* PWR_MGMT_1 */
-    memory[MPU9250][0x3A] = 0x01;   /* INT_STATUS: new data, always */
-    memory[MAGNETOMETER][0x0F] = 0x3D; /* WHO_AM_I_M */
-    memory[MAGNETOMETER][0x27] = 0x0F; /* STATUS_REG_M: new data, always */
-    memory[ADIS16465][0x72] = 0x40; /* PROD_ID */
-    memory[ADIS16465][0x73] = 0x51;
-    memory[ADIS16465][0x5F] = 0x07; /* RANG_MDL: 500 °/s */
+    for (unsigned i = 0; i < SENSOR_COUNT; i++)
+        for (unsigned k = 0; k < COUNT(parts[i].initial); k++)
+            memory[i][parts[i].initial[k].address] = parts[i].initial[k].value;
     answer_at = 0;
 }
 
@@ -62,11 +75,11 @@ static void adis_xfer(uint8_t *bytes, size_t size)
 void parts_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
     (void)max_hz;
-    if (device == ADIS16465) {
+    uint8_t mask = parts[device].mask, address = bytes[0] & mask;
+    if (mask == WORDS) {
         adis_xfer(bytes, size);
         return;
     }
-    uint8_t mask = device == MAGNETOMETER ? 0x3Fu : 0x7Fu, address = bytes[0] & mask;
     for (size_t i = 1; i < size; i++, address = (address + 1) & mask) {
         if (bytes[0] & READ)
             bytes[i] = memory[device][address];
@@ -77,12 +90,9 @@ void parts_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 
 void parts_convert(unsigned device, uint8_t value)
 {
-    static const struct {
-        uint8_t first, size;
-    } outputs[PARTS][2] = {{{0x18, 6}, {0x28, 6}}, {{0x3B, 6}, {0x43, 6}}, {{BURST_DATA + 2, 12}, {0x04, 24}}, {{0x28, 6}}};
-    for (unsigned block = 0; block < 2; block++)
-        for (uint8_t i = 0; i < outputs[device][block].size; i++)
-            memory[device][outputs[device][block].first + i] = (uint8_t)(value * (i + 1));
+    for (unsigned block = 0; block < COUNT(parts[device].outputs); block++)
+        for (uint8_t i = 0; i < parts[device].outputs[block].size; i++)
+            memory[device][parts[device].outputs[block].first + i] = (uint8_t)(value * (i + 1));
     memory[ADIS16465][0x23] = ++memory[ADIS16465][BURST_DATA + 17]; /* the counter of conversions, low byte */
 }
 

@@ -1,11 +1,11 @@
-/* Four parts on the bus, as far as the drivers look: memories that answer, and that the fuzzer may disturb. */
+/* The parts on the bus, as far as the drivers look: memories that answer, and that the fuzzer may disturb. */
 #ifndef PARTS_H
 #define PARTS_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* All four as after power-up. */
+/* All as after power-up. */
 void parts_reset(void);
 
 /* One chip select; answers in place. */

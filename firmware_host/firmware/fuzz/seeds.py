@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 from firmware_host.protocol import MESSAGES, Message
 
 # What fuzz_board.c does at these bytes
@@ -33,13 +34,14 @@ def zeros(message: Message) -> bytes:
 
 
 def setup(range_g: float) -> bytes:
-    """All four sensors set up."""
-    rates_and_ranges = ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
-    gyroscopes = b"".join(frame("configure", *sensor, range_g, 0.0) for sensor in rates_and_ranges)
-    return gyroscopes + frame("configure", 3, 80.0, 0.0, 0.0, 4.0)
+    """All sensors set up."""
+    gyroscopes = (frame("configure", sensor, 200.0, 100.0, range_g, 0.0) for sensor in range(len(GYROSCOPES)))
+    beside = (frame("configure", sensor, 80.0, 0.0, 0.0, 4.0) for sensor in range(len(GYROSCOPES), len(BOARD_PARTS)))
+    return b"".join((*gyroscopes, *beside))
 
 
 SETUP = setup(0.0)
+RATES = (1 << len(GYROSCOPES)) - 1  # a mask of the gyroscopes
 RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
 OBSERVATIONS = b"".join(
     frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
@@ -47,12 +49,16 @@ OBSERVATIONS = b"".join(
 )
 PLAYS = {
     "requests": b"".join(zeros(message) for message in MESSAGES if message.sender == "host"),
-    "stream": SETUP + frame("start", 0) + convert(15, 120, 4000) + frame("status") + frame("stop"),
-    "accelerations": setup(8.0) + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
-    "kept": SETUP
-    + frame("keep", 7, 0.5)
+    "stream": SETUP
     + frame("start", 0)
-    + convert(7, 250, 4000)
+    + convert((1 << len(BOARD_PARTS)) - 1, 120, 4000)
+    + frame("status")
+    + frame("stop"),
+    "accelerations": setup(8.0) + frame("start", 0) + convert(RATES, 120, 4000) + frame("status") + frame("stop"),
+    "kept": SETUP
+    + frame("keep", RATES, 0.5)
+    + frame("start", 0)
+    + convert(RATES, 250, 4000)
     + frame("observe", 0, 0, 200_000, 400_000, 0.5),
     "solved": SETUP + OBSERVATIONS + frame("solve", 0, 0) + frame("solve", 0, 1),
     "stored": SETUP
@@ -63,9 +69,9 @@ PLAYS = {
     + frame("stop")
     + frame("erase_calibration", 0),
     "power cut": SETUP + bytes((FLASH, 9)) + frame("write_calibration", 0, *RECORD) + frame("read_calibration", 0),
-    "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF)) + SETUP + bytes((DISTURB, 2, 0x93, 1)) + convert(7, 40, 4000),
+    "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF)) + SETUP + bytes((DISTURB, 2, 0x93, 1)) + convert(RATES, 40, 4000),
     "silence": SETUP + frame("start", 0) + bytes((WAIT, 255, 4)) + frame("reboot"),
-    "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(7, 200, 4000) + bytes((LINE, 0)),
+    "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(RATES, 200, 4000) + bytes((LINE, 0)),
     "too much noise": 2 * (bytes((NOISE, 255)) + bytes(range(1, 256))) + bytes((NOISE, 1, 0)),
     "noise": bytes((NOISE, 200)) + bytes(range(1, 201)) + bytes((NOISE, 1, 0)) + zeros(_BY_NAME["hello"]),
 }

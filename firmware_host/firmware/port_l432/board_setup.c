@@ -1,17 +1,12 @@
-/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; select and data-ready of the LSM9DS1 on PA11 and PA8,
-   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1, of the LSM9DS1's magnetometer on PB1 and PA3. */
+/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; the sensors' own pins are wiring.c's. */
 #include "board_setup.h"
 
+#include "pins.h"
 #include "protocol.h"
 #include "registers.h"
+#include "wiring.h"
 
 #define TICK_HZ 20u
-
-enum pin_mode { PIN_INPUT = 0, PIN_OUTPUT = 1, PIN_ALTERNATE = 2 };
-enum pin_pull { PULL_UP = 1, PULL_DOWN = 2 };
-enum pin_speed { SPEED_MEDIUM = 1 }; /* enough for 5 MHz; faster edges would ring on loose wires */
-#define PER_PIN(pin, value) ((uint32_t)(value) << (2u * (pin)))
-#define PIN_MASK(pin) PER_PIN(pin, 3u)
 
 /* MSI 4 MHz × 40 / 2. The MSI, not the HSI: it can be locked to the board's crystal. Flash needs 4 wait states above 64 MHz. */
 static void setup_clock(void)
@@ -56,32 +51,21 @@ bool setup_lock_clock(void)
     return true;
 }
 
-/* Pulls give a disconnected wire a level: no data-ready edges, sensor bytes of 0xFF, a silent serial line. */
+/* Pulls give a disconnected wire a level: sensor bytes of 0xFF, a silent serial line. */
 static void setup_pins(void)
 {
-    GPIOA_BSRR = GPIOA_BSRR_BS4 | GPIOA_BSRR_BS11; /* deselected before they are outputs */
     GPIOA_AFRL |= GPIOA_AFRL_AFRL2(7u);
     GPIOA_AFRH |= GPIOA_AFRH_AFRH15(3u);
-    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(8u) | PIN_MASK(12u) | PIN_MASK(15u))) |
-                  PER_PIN(1u, PULL_DOWN) | PER_PIN(3u, PULL_DOWN) | PER_PIN(8u, PULL_DOWN) | PER_PIN(12u, PULL_DOWN) |
-                  PER_PIN(15u, PULL_UP);
-    GPIOA_OSPEEDR = (GPIOA_OSPEEDR & ~(PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(11u))) |
-                    PER_PIN(2u, SPEED_MEDIUM) | PER_PIN(4u, SPEED_MEDIUM) | PER_PIN(11u, SPEED_MEDIUM);
-    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(1u) | PIN_MASK(2u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(8u) | PIN_MASK(11u) |
-                                   PIN_MASK(12u) | PIN_MASK(15u))) |
-                  PER_PIN(1u, PIN_INPUT) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(3u, PIN_INPUT) |
-                  PER_PIN(4u, PIN_OUTPUT) | PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) |
-                  PER_PIN(12u, PIN_INPUT) | PER_PIN(15u, PIN_ALTERNATE);
+    GPIOA_PUPDR = (GPIOA_PUPDR & ~PIN_MASK(15u)) | PER_PIN(15u, PULL_UP);
+    GPIOA_OSPEEDR = (GPIOA_OSPEEDR & ~PIN_MASK(2u)) | PER_PIN(2u, SPEED_MEDIUM);
+    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(2u) | PIN_MASK(15u))) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(15u, PIN_ALTERNATE);
 
-    GPIOB_BSRR = GPIOB_BSRR_BS0 | GPIOB_BSRR_BS1;
     GPIOB_AFRL |= GPIOB_AFRL_AFRL3(5u) | GPIOB_AFRL_AFRL4(5u) | GPIOB_AFRL_AFRL5(5u);
     GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(4u)) | PER_PIN(4u, PULL_UP);
-    GPIOB_OSPEEDR = (GPIOB_OSPEEDR & ~(PIN_MASK(0u) | PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(5u))) |
-                    PER_PIN(0u, SPEED_MEDIUM) | PER_PIN(1u, SPEED_MEDIUM) | PER_PIN(3u, SPEED_MEDIUM) |
-                    PER_PIN(5u, SPEED_MEDIUM);
-    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(0u) | PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) |
-                  PER_PIN(0u, PIN_OUTPUT) | PER_PIN(1u, PIN_OUTPUT) | PER_PIN(3u, PIN_ALTERNATE) |
+    GPIOB_OSPEEDR = (GPIOB_OSPEEDR & ~(PIN_MASK(3u) | PIN_MASK(5u))) | PER_PIN(3u, SPEED_MEDIUM) | PER_PIN(5u, SPEED_MEDIUM);
+    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) | PER_PIN(3u, PIN_ALTERNATE) |
                   PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
+    wiring_setup();
 }
 
 static void setup_microseconds(void)
@@ -110,21 +94,14 @@ static void setup_serial(void)
     USART2_CR1 = USART2_CR1_UE | USART2_CR1_RE | USART2_CR1_TE | USART2_CR1_RXNEIE;
 }
 
-static void setup_data_ready(void)
-{
-    SYSCFG_EXTICR1 = SYSCFG_EXTICR1_EXTI1(0u) | SYSCFG_EXTICR1_EXTI3(0u); /* port A, all four */
-    SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u);
-    SYSCFG_EXTICR4 = SYSCFG_EXTICR4_EXTI12(0u);
-    EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR3 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
-}
-
 #define LATER 0x10u /* the next priority after the data-ready edges', whose time stamps wait for nobody */
 
 static void setup_interrupts(void)
 {
     NVIC_IPR4 = NVIC_IPR4_IPR_N1(LATER); /* DMA1_CH7 */
     NVIC_IPR9 = NVIC_IPR9_IPR_N2(LATER); /* USART2 */
-    NVIC_ISER0 = 1u << EXTI1_IRQ | 1u << EXTI3_IRQ | 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
+    NVIC_ISER0 = 1u << EXTI0_IRQ | 1u << EXTI1_IRQ | 1u << EXTI2_IRQ | 1u << EXTI3_IRQ | 1u << EXTI4_IRQ |
+                 1u << EXTI9_5_IRQ | 1u << DMA1_CH7_IRQ; /* those of lines without a sensor stay quiet */
     NVIC_ISER1 = 1u << (USART2_IRQ - 32u) | 1u << (EXTI15_10_IRQ - 32u);
     STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;
     STK_VAL = 0;
@@ -149,7 +126,6 @@ void setup_hardware(void)
     setup_microseconds();
     setup_spi();
     setup_serial();
-    setup_data_ready();
     setup_interrupts();
     setup_watchdog();
 }

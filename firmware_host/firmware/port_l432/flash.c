@@ -1,4 +1,4 @@
-/* The last six pages of the flash. RM0394, section 3.3: keys, page erase (3.3.5), standard programming (3.3.7), ECC (3.3.2).
+/* The last sixteen pages of the flash. RM0394, section 3.3: keys, page erase (3.3.5), standard programming (3.3.7), ECC (3.3.2).
 
    While the flash is busy, every fetch from it waits: the processor stands still, 25 ms for a page, and interrupts with it. The
    watchdog allows a second. Nothing here may run while sensors stream. */
@@ -13,6 +13,9 @@
 
 extern volatile uint8_t store_start[FLASH_PAGES][FLASH_PAGE_BYTES]; /* the linker script's */
 
+/* Images up to firmware 0.5 had the last six pages alone: what they stored is still where it was. */
+#define FIRST_PAGE (FLASH_PAGES - 6u)
+
 static volatile bool reading, torn;
 
 /* The data cache does not see what is erased and programmed, and may hold a doubleword whose error has been told already. */
@@ -26,6 +29,11 @@ static void switch_cache_on(void)
     FLASH_ACR |= FLASH_ACR_DCRST; /* only while it is off */
     FLASH_ACR &= ~FLASH_ACR_DCRST;
     FLASH_ACR |= FLASH_ACR_DCEN;
+}
+
+static volatile uint8_t *place_of(unsigned page)
+{
+    return store_start[(FIRST_PAGE + page) % FLASH_PAGES];
 }
 
 /* An error left over from before, such as by a stray write, would refuse the next operation. */
@@ -51,7 +59,7 @@ static bool finish(void)
 bool port_flash_erase(unsigned page)
 {
     begin();
-    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(((uint32_t)store_start[page] - FLASH_START) / FLASH_PAGE_BYTES);
+    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(((uint32_t)place_of(page) - FLASH_START) / FLASH_PAGE_BYTES);
     FLASH_CR |= FLASH_CR_START;
     return finish();
 }
@@ -59,7 +67,7 @@ bool port_flash_erase(unsigned page)
 /* Two words in this order start it. The barrier keeps them apart in the write buffer, as ST's own library does. */
 bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword)
 {
-    volatile uint32_t *words = (volatile uint32_t *)&store_start[page][offset];
+    volatile uint32_t *words = (volatile uint32_t *)(place_of(page) + offset);
     begin();
     FLASH_CR = FLASH_CR_PG;
     words[0] = (uint32_t)doubleword;
@@ -71,11 +79,12 @@ bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword)
 bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size)
 {
     uint8_t *to = bytes;
+    volatile uint8_t *from = place_of(page) + offset;
     switch_cache_off();
     torn = false;
     reading = true;
     for (size_t i = 0; i < size && !torn; i++)
-        to[i] = store_start[page][offset + i];
+        to[i] = from[i];
     __asm volatile("dsb\n isb" ::: "memory"); /* an error of the last byte has come by now */
     reading = false;
     switch_cache_on();

@@ -10,6 +10,7 @@
 #include "registers.h"
 #include "sensors.h"
 #include "startup.h"
+#include "wiring.h"
 
 #define SPI1_FIFO (*(volatile uint16_t *)&SPI1_DR) /* a 16-bit access moves two bytes */
 
@@ -32,36 +33,20 @@ void port_wait_us(uint32_t duration_us)
         ;
 }
 
-static const struct {
-    volatile uint32_t *set_reset;
-    uint32_t select, deselect;
-} chip_selects[BUS_DEVICES] = {
-    {&GPIOA_BSRR, GPIOA_BSRR_BR11, GPIOA_BSRR_BS11},
-    {&GPIOB_BSRR, GPIOB_BSRR_BR0, GPIOB_BSRR_BS0},
-    {&GPIOA_BSRR, GPIOA_BSRR_BR4, GPIOA_BSRR_BS4},
-    {&GPIOB_BSRR, GPIOB_BSRR_BR1, GPIOB_BSRR_BS1},
-};
-
 /* An edge pends its line also while that is masked. */
 void port_listen(uint8_t mask)
 {
-    static const struct {
-        uint32_t enable, pending;
-    } lines[SENSOR_COUNT] = {
-        {EXTI_IMR1_MR8, EXTI_PR1_PR8}, {EXTI_IMR1_MR12, EXTI_PR1_PR12}, {EXTI_IMR1_MR1, EXTI_PR1_PR1},
-        {EXTI_IMR1_MR3, EXTI_PR1_PR3}};
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
-        EXTI_IMR1 &= ~lines[i].enable;
-        EXTI_PR1 = lines[i].pending;
+        EXTI_IMR1 &= ~ready_lines[i].bit;
+        EXTI_PR1 = ready_lines[i].bit;
         if (is_named(mask, i))
-            EXTI_IMR1 |= lines[i].enable;
+            EXTI_IMR1 |= ready_lines[i].bit;
     }
 }
 
 bool port_line_is_high(unsigned sensor)
 {
-    static const uint32_t levels[SENSOR_COUNT] = {GPIOA_IDR_IDR8, GPIOA_IDR_IDR12, GPIOA_IDR_IDR1, GPIOA_IDR_IDR3};
-    return (GPIOA_IDR & levels[sensor]) != 0;
+    return (*ready_lines[sensor].level & ready_lines[sensor].bit) != 0;
 }
 
 static void set_bus_clock(uint32_t max_hz)
@@ -82,7 +67,7 @@ static void wait_for_selected(void)
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
     set_bus_clock(max_hz);
-    *chip_selects[device].set_reset = chip_selects[device].select;
+    *selects[device].set_reset = selects[device].select;
     wait_for_selected();
     for (size_t i = 0; i < size; i += 2) {
         SPI1_FIFO = (uint16_t)(bytes[i] | bytes[i + 1] << 8);
@@ -94,7 +79,7 @@ void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
     }
     while (SPI1_SR & SPI1_SR_BSY)
         ;
-    *chip_selects[device].set_reset = chip_selects[device].deselect;
+    *selects[device].set_reset = selects[device].deselect;
 }
 
 void port_transmit(const uint8_t *bytes, size_t size)
@@ -148,34 +133,54 @@ static void remember_reset(void)
     RCC_CSR |= RCC_CSR_RMVF;
 }
 
-/* The barrier: were the flag still set on return, the same edge would come again and count as a second conversion. */
-static inline void data_ready(unsigned sensor, uint32_t flag)
+/* The barrier: were a flag still set on return, the same edge would come again and count as a second conversion. Lines that
+   share a handler are told apart by their flags; those of other handlers the compiler leaves out. */
+static inline void data_ready(uint32_t lines)
 {
     uint32_t captured_us = TIM2_CNT; /* before anything else */
-    EXTI_PR1 = flag;
-    acquisition_data_ready(sensor, captured_us);
+    uint32_t edges = EXTI_PR1 & EXTI_IMR1 & lines;
+    EXTI_PR1 = edges;
+#define TELL(driver, select_port, select_pin, ready_port, ready_pin) \
+    if (lines & edges & 1u << (ready_pin)) \
+        acquisition_data_ready(SENSOR_##driver, captured_us);
+    SENSORS(TELL)
     woken = true;
     __asm volatile("dsb" ::: "memory");
 }
 
-void exti9_5_handler(void)
+void exti0_handler(void)
 {
-    data_ready(0, EXTI_PR1_PR8);
-}
-
-void exti15_10_handler(void)
-{
-    data_ready(1, EXTI_PR1_PR12);
+    data_ready(1u << 0);
 }
 
 void exti1_handler(void)
 {
-    data_ready(2, EXTI_PR1_PR1);
+    data_ready(1u << 1);
+}
+
+void exti2_handler(void)
+{
+    data_ready(1u << 2);
 }
 
 void exti3_handler(void)
 {
-    data_ready(3, EXTI_PR1_PR3);
+    data_ready(1u << 3);
+}
+
+void exti4_handler(void)
+{
+    data_ready(1u << 4);
+}
+
+void exti9_5_handler(void)
+{
+    data_ready(0x03E0u);
+}
+
+void exti15_10_handler(void)
+{
+    data_ready(0xFC00u);
 }
 
 void dma1_channel7_handler(void)

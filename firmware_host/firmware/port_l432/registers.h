@@ -79,15 +79,7 @@
 #define GPIOA_OSPEEDR REGISTER(GPIOA_BASE, 0x08u)
 #define GPIOA_PUPDR REGISTER(GPIOA_BASE, 0x0Cu)
 #define GPIOA_IDR REGISTER(GPIOA_BASE, 0x10u)
-#define GPIOA_IDR_IDR1 (1u << 1)
-#define GPIOA_IDR_IDR3 (1u << 3)
-#define GPIOA_IDR_IDR8 (1u << 8)
-#define GPIOA_IDR_IDR12 (1u << 12)
 #define GPIOA_BSRR REGISTER(GPIOA_BASE, 0x18u)
-#define GPIOA_BSRR_BS4 (1u << 4)
-#define GPIOA_BSRR_BS11 (1u << 11)
-#define GPIOA_BSRR_BR4 (1u << 20)
-#define GPIOA_BSRR_BR11 (1u << 27)
 #define GPIOA_AFRL REGISTER(GPIOA_BASE, 0x20u)
 #define GPIOA_AFRL_AFRL2(value) ((value) << 8)
 #define GPIOA_AFRH REGISTER(GPIOA_BASE, 0x24u)
@@ -97,11 +89,8 @@
 #define GPIOB_MODER REGISTER(GPIOB_BASE, 0x00u)
 #define GPIOB_OSPEEDR REGISTER(GPIOB_BASE, 0x08u)
 #define GPIOB_PUPDR REGISTER(GPIOB_BASE, 0x0Cu)
+#define GPIOB_IDR REGISTER(GPIOB_BASE, 0x10u)
 #define GPIOB_BSRR REGISTER(GPIOB_BASE, 0x18u)
-#define GPIOB_BSRR_BS0 (1u << 0)
-#define GPIOB_BSRR_BS1 (1u << 1)
-#define GPIOB_BSRR_BR0 (1u << 16)
-#define GPIOB_BSRR_BR1 (1u << 17)
 #define GPIOB_AFRL REGISTER(GPIOB_BASE, 0x20u)
 #define GPIOB_AFRL_AFRL3(value) ((value) << 12)
 #define GPIOB_AFRL_AFRL4(value) ((value) << 16)
@@ -109,29 +98,14 @@
 
 #define SYSCFG_BASE 0x40010000u
 #define SYSCFG_EXTICR1 REGISTER(SYSCFG_BASE, 0x08u)
-#define SYSCFG_EXTICR1_EXTI1(value) ((value) << 4)
-#define SYSCFG_EXTICR1_EXTI3(value) ((value) << 12)
+#define SYSCFG_EXTICR2 REGISTER(SYSCFG_BASE, 0x0Cu)
 #define SYSCFG_EXTICR3 REGISTER(SYSCFG_BASE, 0x10u)
-#define SYSCFG_EXTICR3_EXTI8(value) ((value) << 0)
 #define SYSCFG_EXTICR4 REGISTER(SYSCFG_BASE, 0x14u)
-#define SYSCFG_EXTICR4_EXTI12(value) ((value) << 0)
 
 #define EXTI_BASE 0x40010400u
 #define EXTI_IMR1 REGISTER(EXTI_BASE, 0x00u)
-#define EXTI_IMR1_MR1 (1u << 1)
-#define EXTI_IMR1_MR3 (1u << 3)
-#define EXTI_IMR1_MR8 (1u << 8)
-#define EXTI_IMR1_MR12 (1u << 12)
 #define EXTI_RTSR1 REGISTER(EXTI_BASE, 0x08u)
-#define EXTI_RTSR1_TR1 (1u << 1)
-#define EXTI_RTSR1_TR3 (1u << 3)
-#define EXTI_RTSR1_TR8 (1u << 8)
-#define EXTI_RTSR1_TR12 (1u << 12)
 #define EXTI_PR1 REGISTER(EXTI_BASE, 0x14u)
-#define EXTI_PR1_PR1 (1u << 1)
-#define EXTI_PR1_PR3 (1u << 3)
-#define EXTI_PR1_PR8 (1u << 8)
-#define EXTI_PR1_PR12 (1u << 12)
 
 #define DMA1_BASE 0x40020000u
 #define DMA1_IFCR REGISTER(DMA1_BASE, 0x04u)
@@ -221,8 +195,11 @@
 #define FPU_CPACR_CPACR REGISTER(FPU_CPACR_BASE, 0x00u)
 #define FPU_CPACR_CPACR_CP(value) ((value) << 20)
 
+#define EXTI0_IRQ 6u
 #define EXTI1_IRQ 7u
+#define EXTI2_IRQ 8u
 #define EXTI3_IRQ 9u
+#define EXTI4_IRQ 10u
 #define DMA1_CH7_IRQ 17u
 #define EXTI9_5_IRQ 23u
 #define USART2_IRQ 38u

@@ -18,8 +18,11 @@ int main(void);
 void reset_handler(void);
 void fault_handler(void);
 void nmi_handler(void);
+void exti0_handler(void);
 void exti1_handler(void);
+void exti2_handler(void);
 void exti3_handler(void);
+void exti4_handler(void);
 void exti9_5_handler(void);
 void dma1_channel7_handler(void);
 void usart2_handler(void);
@@ -103,8 +106,11 @@ __attribute__((section(".vectors"), used)) static const struct {
         [1] = nmi_handler,
         [2] = fault_handler, /* HardFault, to which all other faults lead while they are not enabled */
         [14] = systick_handler,
+        [INTERRUPT(EXTI0_IRQ)] = exti0_handler,
         [INTERRUPT(EXTI1_IRQ)] = exti1_handler,
+        [INTERRUPT(EXTI2_IRQ)] = exti2_handler,
         [INTERRUPT(EXTI3_IRQ)] = exti3_handler,
+        [INTERRUPT(EXTI4_IRQ)] = exti4_handler,
         [INTERRUPT(DMA1_CH7_IRQ)] = dma1_channel7_handler,
         [INTERRUPT(EXTI9_5_IRQ)] = exti9_5_handler,
         [INTERRUPT(USART2_IRQ)] = usart2_handler,

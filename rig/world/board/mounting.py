@@ -3,17 +3,14 @@
 from collections.abc import Callable, Collection
 from functools import cache, partial
 from importlib import resources
-from typing import assert_never
+from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
-from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
-from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
+from firmware_host.parts import GYROSCOPES, MAGNETOMETERS
 from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import WorldSection
@@ -62,7 +59,7 @@ def mount_magnetometers(
         for name, simulated in sorted(world.magnetometers.items())
     }
     return {
-        name: Lsm9ds1Magnetometer(
+        name: MAGNETOMETERS[config.magnetometers[name].part].register_model(
             field_of(each), each.truth, seed=np.random.SeedSequence([world.seed, len(world.sensors) + index])
         )
         for index, (name, each) in enumerate(mounted.items())
@@ -95,27 +92,14 @@ def _sensor(
     seed: np.random.SeedSequence,
     ready_s: float,
 ) -> SpiDevice:
-    motion_at, acceleration = motion_of(truth), truth.accelerometer
-    match sensor.part:
-        case "lsm9ds1":
-            return Lsm9ds1(
-                motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed, acceleration=acceleration
-            )
-        case "mpu9250":
-            return Mpu9250(
-                motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed, acceleration=acceleration
-            )
-        case "adis16465":  # it comes in three variants, one for each range
-            return Adis16465(
-                motion_at,
-                truth.gyro,
-                temperature_c=truth.temperature_c,
-                seed=seed,
-                acceleration=acceleration,
-                range_deg_s=int(sensor.range_deg_s),
-                ready_s=ready_s,
-            )
-        case "kvh1775":
-            raise ValueError("a KVH 1775 is on no board")
-        case unmodelled:  # a new part: the type checker says so too
-            assert_never(unmodelled)
+    part = GYROSCOPES[sensor.part]
+    chosen: dict[str, Any] = {"range_deg_s": int(sensor.range_deg_s), "ready_s": ready_s}
+    return part.register_model(
+        motion_of(truth),
+        truth.gyro,
+        temperature_c=truth.temperature_c,
+        seed=seed,
+        acceleration=truth.accelerometer,
+        oscillator_ppm=truth.data_rate_ppm,
+        **{name: chosen[name] for name in part.told},
+    )

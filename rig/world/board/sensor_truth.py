@@ -18,7 +18,7 @@ from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
 class SensorTruth:
     """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read; `temperature_c`: the
-    die's, of a part that gets power at the time `powered_s`.
+    die's, of a part that gets power at the time `powered_s`; `data_rate_ppm`: how much too fast its own oscillator is.
     """
 
     def __init__(self, sensor: SensorSection, simulated: SimulatedSensorSection, powered_s: float = 0.0) -> None:
@@ -26,6 +26,7 @@ class SensorTruth:
         self.accelerometer = (
             None if sensor.acceleration is None else _accelerometer(simulated.accelerometer, simulated.temperature_c)
         )
+        self.data_rate_ppm = simulated.data_rate_ppm
         self.temperature_c: float | Temperature = simulated.temperature_c
         if simulated.start_temperature_c is not None:
             self.temperature_c = Warming(

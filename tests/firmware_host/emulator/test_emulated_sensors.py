@@ -41,15 +41,13 @@ def test_all_sensors_at_their_full_rates_lose_nothing() -> None:
     numbers = [frame.values["sequence"] + i for frame in fields for i in range(len(frame.items))]
     assert numbers == list(range(len(numbers))) and len(numbers) > 80
     report = session.ask("status")
-    assert report.items["dropped"].tolist() == [0, 0, 0, 0] and report.values["bus_errors"] == 0
+    assert set(report.items["dropped"].tolist()) == {0} and report.values["bus_errors"] == 0
 
 
 @pytest.mark.parametrize(
     ("name", "fault", "error"),
     [
-        ("lsm9ds1", Fault.ABSENT, "sensor_silent"),
-        ("mpu9250", Fault.ABSENT, "sensor_silent"),
-        ("adis16465", Fault.ABSENT, "sensor_silent"),
+        *((name, fault, "sensor_silent") for name in NAMES for fault in (Fault.ABSENT, Fault.SILENT)),
         ("adis16465", Fault.DAMAGED, "checksum_failed"),
     ],
 )

@@ -5,7 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, FLASH_BYTES, PAGE_BYTES, STORE_OFFSET, FlashMemory
+from firmware_host.emulator.flash_memory import (
+    DOUBLEWORD_BYTES,
+    FLASH_BYTES,
+    PAGE_BYTES,
+    STORE_OFFSET,
+    STORE_PAGES,
+    FlashMemory,
+)
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.errors import BoardError
 from support import tiny_firmware
@@ -76,11 +83,13 @@ def test_what_is_programmed_is_there_after_a_power_cycle(tmp_path: Path) -> None
 
 
 def test_an_erased_page_is_all_ones_and_its_neighbours_stay(tmp_path: Path) -> None:
-    one = chip("erase(PAGE + 1);", tmp_path, store=bytes(6 * PAGE_BYTES))
+    one = chip("erase(PAGE + 1);", tmp_path, store=bytes(STORE_PAGES * PAGE_BYTES))
     program = bytes(one.flash.data[:STORE_OFFSET])
     one.run(0.05)
     assert one.flash.data[:STORE_OFFSET] == program
-    assert one.flash.data[STORE_OFFSET:] == bytes(PAGE_BYTES) + b"\xff" * PAGE_BYTES + bytes(4 * PAGE_BYTES)
+    assert one.flash.data[STORE_OFFSET:] == bytes(PAGE_BYTES) + b"\xff" * PAGE_BYTES + bytes(
+        (STORE_PAGES - 2) * PAGE_BYTES
+    )
     assert one.flash.torn == set()
 
 
@@ -169,7 +178,7 @@ WRITE = "erase(PAGE); program(0, 1, 2); program(8, 3, 4);"
 def test_a_power_cut_leaves_an_operation_undone_or_torn(
     operation: int, torn: bool, content: bytes | None, torn_bytes: range, tmp_path: Path
 ) -> None:
-    one = chip(f"{WRITE} put(1);", tmp_path, store=bytes(6 * PAGE_BYTES))
+    one = chip(f"{WRITE} put(1);", tmp_path, store=bytes(STORE_PAGES * PAGE_BYTES))
     one.flash.fail_power(operation, torn)
     board = one.power_up()
     board.advance(0.1)

@@ -43,7 +43,7 @@ def error(frame: Frame) -> str:
     return ERRORS[frame.values["code"]].name
 
 
-def test_three_sensors_stream_each_at_its_own_pace_without_a_loss() -> None:
+def test_all_sensors_stream_each_at_its_own_pace_without_a_loss() -> None:
     session = streaming()
     setups = {part: session.sensors[part] for part in ALL}
     frames = session.run(2.0)
@@ -71,7 +71,7 @@ def test_each_tells_its_own_truth_in_its_own_counts() -> None:
         assert np.all(np.abs(counts * per_count[part] - reading) <= 0.5 * per_count[part])
 
 
-def test_accelerations_of_all_three_come_along_in_the_same_axes_without_a_loss() -> None:
+def test_accelerations_of_all_come_along_in_the_same_axes_without_a_loss() -> None:
     """Motion and truth are in right-handed axes, and so is what arrives, of the LSM9DS1 too."""
     force_g = (0.5, -0.3, 0.8)
     session = Session(parts=ALL, rate_at=lambda _time_s: (*RATE_RAD_S, *force_g), noise_rad_s=0.0)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from firmware_host.emulator.bus import Violation
-from support.spi_master import LSM9DS1_RATES, Lsm9ds1Driver, Rate, integers, still
+from support.parts.lsm9ds1 import RATES, Lsm9ds1Driver
+from support.spi_master import Rate, integers, still
 
 INT1_CTRL, WHO_AM_I, CTRL_REG1_G, CTRL_REG8 = 0x0C, 0x0F, 0x10, 0x22
 STATUS, OUT_G, CTRL_REG6_XL, STATUS_AGAIN, OUT_XL = 0x17, 0x18, 0x20, 0x27, 0x28
@@ -18,7 +19,7 @@ PERIOD_S = 1 / 238
 def polled(rate_at: Rate = still, rate_hz: float = 238.0) -> Lsm9ds1Driver:
     """A part that converts, its interrupt pin not routed."""
     driver = Lsm9ds1Driver(rate_at)
-    driver.set(CTRL_REG1_G, LSM9DS1_RATES[rate_hz] << 5)
+    driver.set(CTRL_REG1_G, RATES[rate_hz] << 5)
     return driver
 
 
@@ -83,7 +84,7 @@ def test_an_unread_conversion_is_replaced_by_the_next() -> None:
 def test_block_data_update_keeps_both_bytes_of_one_conversion(control: int, torn: bool) -> None:
     driver = Lsm9ds1Driver(ramp)
     driver.set(CTRL_REG8, control)
-    driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+    driver.set(CTRL_REG1_G, RATES[238.0] << 5)
     driver.advance(9.5 * PERIOD_S)
     low = driver.get(OUT_G)
     driver.advance(10.5 * PERIOD_S)
@@ -121,8 +122,8 @@ def test_rates_and_ranges_it_does_not_have_are_refused(control: int) -> None:
 def accelerating(force_at: Rate = lambda _time_s: (0.0, 0.0, 0.0, 0.25, 0.5, 1.0)) -> Lsm9ds1Driver:
     driver = Lsm9ds1Driver(force_at)
     driver.set(CTRL_REG8, IF_ADD_INC | BDU)
-    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[238.0] << 5)
-    driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+    driver.set(CTRL_REG6_XL, RATES[238.0] << 5)
+    driver.set(CTRL_REG1_G, RATES[238.0] << 5)
     driver.advance(10.5 * PERIOD_S)
     return driver
 
@@ -160,15 +161,15 @@ def test_block_data_update_holds_for_accelerations_too() -> None:
 
 def test_writing_its_control_register_leaves_the_accelerometer_alone_until_the_gyroscope_is_told() -> None:
     driver = accelerating()
-    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[238.0] << 5)
+    driver.set(CTRL_REG6_XL, RATES[238.0] << 5)
     assert driver.part.next_event_s == math.inf
-    driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+    driver.set(CTRL_REG1_G, RATES[238.0] << 5)
     assert driver.part.next_event_s - driver.time_s == pytest.approx(PERIOD_S)
 
 
 def test_two_data_rates_at_once_are_refused() -> None:
     driver = Lsm9ds1Driver()
-    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[119.0] << 5)
+    driver.set(CTRL_REG6_XL, RATES[119.0] << 5)
     with pytest.raises(Violation, match="two data rates") as caught:
-        driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+        driver.set(CTRL_REG1_G, RATES[238.0] << 5)
     assert caught.value.name == "sensor_setup"

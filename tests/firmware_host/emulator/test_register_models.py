@@ -1,11 +1,9 @@
 """What every simulated sensor must do, whatever its registers: obey its truth, its data rate, its range, its seed."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,94 +14,13 @@ from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.spi_device import Fault
-from support.spi_master import NO_ERRORS, Adis16465Driver, Driver, Lsm9ds1Driver, Mpu9250Driver, Rate, still
+from support.data_sheet import DataSheet
+from support.parts import SHEETS
+from support.spi_master import Driver
 
+PARTS = tuple(SHEETS.values())
 DISCARD_S = 0.1  # every part's filters have settled
 
-
-@dataclass(frozen=True)
-class Part:
-    """A part's datasheet: `per_count_deg_s`, `per_count_g`: range → sensitivity; `forbidden`: accesses."""
-
-    name: str
-    new: Callable[..., Driver]
-    identity: int
-    other_identity: int
-    rates_hz: Sequence[float]
-    per_count_deg_s: dict[float, float]
-    per_count_g: dict[float, float]
-    temperature_counts: Callable[[float], float]
-    forbidden: Sequence[tuple[str, bytes]]
-
-    def driver(
-        self,
-        rate_at: Rate = still,
-        truth: GyroTruth = NO_ERRORS,
-        *,
-        rate_hz: float | None = None,
-        range_deg_s: float = 500.0,
-        range_g: float = 8.0,
-        **others: Any,
-    ) -> Driver:
-        """A part that runs, by default at its fastest rate here and in the ranges that all parts have."""
-        driver = self.new(rate_at, truth, range_deg_s=range_deg_s, **others)
-        driver.start(rate_hz or self.rates_hz[-1], range_deg_s, range_g)
-        return driver
-
-    def per_count_rad_s(self, range_deg_s: float = 500.0) -> float:
-        return math.radians(self.per_count_deg_s[range_deg_s])
-
-
-PARTS = (
-    Part(
-        name="LSM9DS1",
-        new=Lsm9ds1Driver,
-        identity=0x68,
-        other_identity=0x69,
-        rates_hz=(14.9, 59.5, 119.0, 238.0, 476.0, 952.0),
-        per_count_deg_s={245.0: 8.75e-3, 500.0: 17.5e-3, 2000.0: 70.0e-3},
-        per_count_g={2.0: 0.061e-3, 4.0: 0.122e-3, 8.0: 0.244e-3, 16.0: 0.732e-3},
-        temperature_counts=lambda temperature_c: 16 * (temperature_c - 25),
-        forbidden=(
-            ("unmodelled_register", b"\xa6\x00"),
-            ("unmodelled_register", b"\x06\x01"),
-            ("unmodelled_bits", b"\x21\x04"),  # the accelerometer's second filter
-        ),
-    ),
-    Part(
-        name="MPU-9250",
-        new=Mpu9250Driver,
-        identity=0x71,
-        other_identity=0x70,
-        rates_hz=(4.0, 100.0, 200.0, 500.0, 1000.0),
-        per_count_deg_s={250.0: 1 / 131, 500.0: 1 / 65.5, 1000.0: 1 / 32.8, 2000.0: 1 / 16.4},
-        per_count_g={2.0: 1 / 16384, 4.0: 1 / 8192, 8.0: 1 / 4096, 16.0: 1 / 2048},
-        temperature_counts=lambda temperature_c: 333.87 * (temperature_c - 21),
-        forbidden=(
-            ("unmodelled_register", b"\xf2\x00"),  # FIFO count
-            ("unmodelled_register", b"\x26\x01"),
-            ("unmodelled_register", b"\x77\x00"),  # the accelerometer's offset, which is the factory's trim
-            ("unmodelled_bits", b"\x1b\xe0"),  # self-test
-            ("unmodelled_bits", b"\x6a\x40"),  # FIFO on
-        ),
-    ),
-    Part(
-        name="ADIS16465",
-        new=Adis16465Driver,
-        identity=0x4051,
-        other_identity=0x4056,
-        rates_hz=(1.0, 100.0, 200.0, 500.0, 2000.0),
-        per_count_deg_s={125.0: 1 / 160, 500.0: 1 / 40, 2000.0: 1 / 10},
-        per_count_g={8.0: 1 / 4000},
-        temperature_counts=lambda temperature_c: 10 * temperature_c,
-        forbidden=(
-            ("unmodelled_register", b"\x24\x00"),  # delta angle
-            ("unmodelled_register", b"\xf6\x01"),  # user scratch
-            ("unmodelled_bits", b"\xe0\x04"),  # external sync
-            ("unmodelled_bits", b"\xe8\x04"),  # self-test
-        ),
-    ),
-)
 
 every_part = pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 every_rate = pytest.mark.parametrize(
@@ -144,7 +61,7 @@ def constant(rate: Sequence[float], _time_s: float) -> Sequence[float]:
 
 
 @every_part
-def test_its_identity_is_the_datasheets_unless_it_is_another_part(part: Part) -> None:
+def test_its_identity_is_the_datasheets_unless_it_is_another_part(part: DataSheet) -> None:
     driver = part.new()
     assert driver.identity() == part.identity
     driver.part.fault = Fault.OTHER_PART
@@ -152,7 +69,7 @@ def test_its_identity_is_the_datasheets_unless_it_is_another_part(part: Part) ->
 
 
 @every_rate
-def test_conversions_come_at_the_data_rate(part: Part, rate_hz: float) -> None:
+def test_conversions_come_at_the_data_rate(part: DataSheet, rate_hz: float) -> None:
     asked: list[float] = []
 
     def rate_at(time_s: float) -> Sequence[float]:
@@ -168,7 +85,7 @@ def test_conversions_come_at_the_data_rate(part: Part, rate_hz: float) -> None:
 
 
 @every_part
-def test_its_own_oscillator_sets_the_pace(part: Part) -> None:
+def test_its_own_oscillator_sets_the_pace(part: DataSheet) -> None:
     def ready_s(ppm: float) -> list[float]:
         driver = part.driver(ppm=ppm)
         times_s = []
@@ -183,7 +100,7 @@ def test_its_own_oscillator_sets_the_pace(part: Part) -> None:
 
 
 @every_range
-def test_sensitivity_is_the_datasheets(part: Part, range_deg_s: float) -> None:
+def test_sensitivity_is_the_datasheets(part: DataSheet, range_deg_s: float) -> None:
     rate = np.radians(range_deg_s) * np.array([0.9, -0.5, 0.1])
     driver = part.driver(lambda _time_s: rate.tolist(), range_deg_s=range_deg_s)
     error = settled(driver) - rate / part.per_count_rad_s(range_deg_s)
@@ -191,7 +108,7 @@ def test_sensitivity_is_the_datasheets(part: Part, range_deg_s: float) -> None:
 
 
 @every_part
-def test_too_much_saturates(part: Part) -> None:
+def test_too_much_saturates(part: DataSheet) -> None:
     range_deg_s = min(part.per_count_deg_s)
     much = np.radians(10 * range_deg_s)
     driver = part.driver(lambda _time_s: (much, -much, 0.0), range_deg_s=range_deg_s)
@@ -205,7 +122,7 @@ vectors = st.tuples(*[st.floats(-3, 3)] * 3)
 @settings(max_examples=20)
 @given(vectors, st.tuples(*[st.floats(0.7, 1.3)] * 3), st.tuples(*[st.floats(-0.2, 0.2)] * 3))
 def test_the_truth_is_g_equals_k_times_m_plus_b(
-    part: Part, rate: tuple[float, ...], scale: tuple[float, ...], bias_rad_s: tuple[float, ...]
+    part: DataSheet, rate: tuple[float, ...], scale: tuple[float, ...], bias_rad_s: tuple[float, ...]
 ) -> None:
     reading = settled(part.driver(lambda _time_s: rate, GyroTruth(scale, bias_rad_s), rate_hz=part.rates_hz[-2]))
     per_count = part.per_count_rad_s()
@@ -215,7 +132,7 @@ def test_the_truth_is_g_equals_k_times_m_plus_b(
 
 
 @every_part
-def test_non_orthogonal_axes_pick_up_their_neighbours(part: Part) -> None:
+def test_non_orthogonal_axes_pick_up_their_neighbours(part: DataSheet) -> None:
     xy, xz, yz = 0.02, -0.01, 0.03
     truth = GyroTruth(non_orthogonality_rad=(xy, xz, yz))
     columns = [settled(part.driver(partial(constant, axis), truth)) for axis in np.eye(3).tolist()]
@@ -226,7 +143,7 @@ def test_non_orthogonal_axes_pick_up_their_neighbours(part: Part) -> None:
 
 
 @every_part
-def test_noise_is_white_and_as_strong_as_told(part: Part) -> None:
+def test_noise_is_white_and_as_strong_as_told(part: DataSheet) -> None:
     noise_rad_s, count = 0.035, 3000
     driver = part.driver(truth=GyroTruth(noise_rad_s=noise_rad_s), seed=3)
     readings = counts(driver, count) * part.per_count_rad_s()
@@ -237,7 +154,7 @@ def test_noise_is_white_and_as_strong_as_told(part: Part) -> None:
 
 
 @every_part
-def test_noise_follows_the_seed_and_not_the_reader(part: Part) -> None:
+def test_noise_follows_the_seed_and_not_the_reader(part: DataSheet) -> None:
     truth = GyroTruth(noise_rad_s=0.035)
     eager, lazy, other = (part.driver(truth=truth, seed=seed) for seed in (3, 3, 4))
     eager_counts = counts(eager, 200)
@@ -251,14 +168,14 @@ def test_noise_follows_the_seed_and_not_the_reader(part: Part) -> None:
 
 @every_part
 @pytest.mark.parametrize("temperature_c", [25.0, 22.0, 85.0, -40.0])
-def test_temperature(part: Part, temperature_c: float) -> None:
+def test_temperature(part: DataSheet, temperature_c: float) -> None:
     driver = part.driver(temperature_c=temperature_c)
     driver.await_data()
     assert driver.read()[1] == round(part.temperature_counts(temperature_c))
 
 
 @every_part
-def test_what_has_no_model_is_refused_by_name(part: Part) -> None:
+def test_what_has_no_model_is_refused_by_name(part: DataSheet) -> None:
     for name, access in part.forbidden:
         driver = part.new()
         with pytest.raises(Violation) as caught:
@@ -270,7 +187,7 @@ def test_what_has_no_model_is_refused_by_name(part: Part) -> None:
 @pytest.mark.parametrize(
     ("part", "range_g"), [(p, r) for p in PARTS for r in p.per_count_g], ids=lambda v: getattr(v, "name", None)
 )
-def test_sensitivity_to_acceleration_is_the_datasheets(part: Part, range_g: float) -> None:
+def test_sensitivity_to_acceleration_is_the_datasheets(part: DataSheet, range_g: float) -> None:
     force_g = range_g * np.array([0.9, -0.5, 0.1])
     driver = part.driver(lambda _time_s: (0.1, 0.2, 0.3, *force_g.tolist()), range_g=range_g)
     error = settled_acceleration(driver) - force_g / part.per_count_g[range_g]
@@ -278,18 +195,18 @@ def test_sensitivity_to_acceleration_is_the_datasheets(part: Part, range_g: floa
 
 
 @every_part
-def test_too_much_acceleration_saturates(part: Part) -> None:
+def test_too_much_acceleration_saturates(part: DataSheet) -> None:
     driver = part.driver(lambda _time_s: (0.0, 0.0, 0.0, 90.0, -90.0, 0.0))
     assert settled_acceleration(driver).tolist() == [32767, -32768, 0]
 
 
 @every_part
-def test_a_motion_without_force_shows_a_part_at_rest_with_z_up(part: Part) -> None:
+def test_a_motion_without_force_shows_a_part_at_rest_with_z_up(part: DataSheet) -> None:
     assert settled_acceleration(part.driver()).tolist() == [0, 0, round(1 / part.per_count_g[8.0])]
 
 
 @every_part
-def test_a_motion_is_asked_for_once_though_two_triads_feel_it(part: Part) -> None:
+def test_a_motion_is_asked_for_once_though_two_triads_feel_it(part: DataSheet) -> None:
     asked: list[float] = []
 
     def motion_at(time_s: float) -> Sequence[float]:
@@ -303,7 +220,7 @@ def test_a_motion_is_asked_for_once_though_two_triads_feel_it(part: Part) -> Non
 
 
 @every_part
-def test_what_the_accelerometer_does_leaves_the_rates_as_they_are(part: Part) -> None:
+def test_what_the_accelerometer_does_leaves_the_rates_as_they_are(part: DataSheet) -> None:
     """Byte for byte: its noise is drawn from a seed of its own."""
     noisy = AccelerometerTruth(noise_m_s2=0.1, random_walk_m_s2_per_sqrt_s=0.1)
     truth = GyroTruth(noise_rad_s=0.035, random_walk_rad_s_per_sqrt_s=0.01)

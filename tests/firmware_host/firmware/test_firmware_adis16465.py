@@ -7,7 +7,8 @@ import pytest
 
 from firmware_host.protocol import ERRORS, MESSAGE_BY_NAME
 from support.host_board import HostBoard, configured, convert, error_of, first_samples, sample_sequences
-from support.host_sensors import Adis16465Registers, Nobody
+from support.host_sensors import Nobody
+from support.parts.adis16465 import Adis16465Registers
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from firmware_host.frames import Frame
+from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
 from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
@@ -89,7 +90,7 @@ def test_a_calibration_that_cannot_be_right_is_refused_and_the_stored_one_stays(
 def test_requests_about_calibrations_are_refused_by_name() -> None:
     board = HostBoard()
     for name, values in (("read_calibration", {}), ("write_calibration", CALIBRATION), ("erase_calibration", {})):
-        assert error_of(board.ask(name, sensor=4, **values)) == "no_such_sensor"
+        assert error_of(board.ask(name, sensor=len(BOARD_PARTS), **values)) == "no_such_sensor"
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "not_configured"
     configured(board, 0, 238, 245)
     board.gyro.values[0x0F] = 0x00
@@ -213,7 +214,7 @@ def test_a_start_that_comes_twice_changes_nothing_and_another_mode_is_refused() 
 
 def test_a_calibrated_start_without_a_fitting_calibration_is_refused() -> None:
     board = HostBoard()
-    assert error_of(board.ask("start", sensors=16)) == "no_such_sensor"
+    assert error_of(board.ask("start", sensors=1 << len(BOARD_PARTS))) == "no_such_sensor"
     configured(board, 0, 238, 245)
     assert error_of(board.ask("start", sensors=1)) == "no_calibration"
     assert error_of(board.ask("start", sensors=3)) == "not_configured"

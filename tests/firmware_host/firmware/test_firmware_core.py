@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from firmware_host import protocol
 from firmware_host.frames import encode
+from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
 from support.host_board import PERIOD_US, HostBoard, convert, error_of, streaming_board
 
 
@@ -39,10 +40,7 @@ def test_identity_names_board_firmware_and_sensor(board: HostBoard) -> None:
     assert protocol.text(identity.values["firmware"]) == protocol.FIRMWARE_VERSION
     assert identity.values["unique_id"].hex() == "0123456789abcdef01234567"
     assert identity.items.tolist() == [
-        (b"LSM9DS1", 0x68, 1, 0),
-        (b"MPU-9250", 0x71, 1, 0),
-        (b"ADIS16465", 0x4051, 1, 0),
-        (b"LSM9DS1-M", 0x3D, 1, 1),
+        (part.name.encode(), part.who_am_i, 1, name in MAGNETOMETERS) for name, part in BOARD_PARTS.items()
     ]
 
 
@@ -69,7 +67,9 @@ def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> No
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     assert error_of(board.ask("start", sensors=1)) == "not_configured"
     assert (
-        error_of(board.ask("configure", sensor=4, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0))
+        error_of(
+            board.ask("configure", sensor=len(BOARD_PARTS), rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
+        )
         == "no_such_sensor"
     )
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"

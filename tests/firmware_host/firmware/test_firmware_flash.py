@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashMemory
+from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, STORE_PAGES, FlashMemory
 from firmware_host.errors import BoardError
 from support import tiny_firmware
+from support.emulated_session import FIRST_RECORD
 from support.paths import FIRMWARE
 
 INCLUDES = (FIRMWARE / "core", FIRMWARE / "port_l432")
@@ -52,9 +53,9 @@ def test_a_doubleword_is_programmed_once_after_an_erase_and_a_refusal_is_told_an
         """
     sent, flash = run(body, tmp_path)
     assert sent == [1, 0, 1, 1, 0x08, 1, 1, 0xFF, 1, 1, 0x18]
-    changed = STORE_OFFSET + PAGE_BYTES + 16
+    changed = FIRST_RECORD + PAGE_BYTES + 16
     assert flash.data[changed : changed + 8] == bytes(range(0x18, 0x10, -1))
-    assert bytes(flash.data[STORE_OFFSET:]).count(0xFF) == 6 * PAGE_BYTES - 8
+    assert bytes(flash.data[STORE_OFFSET:]).count(0xFF) == STORE_PAGES * PAGE_BYTES - 8
 
 
 @pytest.mark.parametrize("operation", ["port_flash_erase(0)", "port_flash_program(0, 0, 1)"])
@@ -71,7 +72,7 @@ def test_a_torn_doubleword_is_told_each_time_and_hides_no_other(tmp_path: Path) 
         put(port_flash_erase(0));
         put(port_flash_read(0, 0, bytes, 8));
         """
-    assert run(body, tmp_path, torn=frozenset({STORE_OFFSET}))[0] == [0, 0, 1, 1, 1]
+    assert run(body, tmp_path, torn=frozenset({FIRST_RECORD}))[0] == [0, 0, 1, 1, 1]
 
 
 def test_a_torn_doubleword_is_told_also_where_the_chip_has_lost_the_flag_of_it(tmp_path: Path) -> None:
@@ -81,11 +82,12 @@ def test_a_torn_doubleword_is_told_also_where_the_chip_has_lost_the_flag_of_it(t
         put(port_flash_erase(0));
         put(port_flash_read(0, 0, bytes, 8));
         """
-    assert run(body, tmp_path, torn=frozenset({STORE_OFFSET}), flags_lost=True)[0] == [0, 1, 1, 1]
+    assert run(body, tmp_path, torn=frozenset({FIRST_RECORD}), flags_lost=True)[0] == [0, 1, 1, 1]
 
 
 def test_torn_flash_that_something_else_reads_is_not_taken_for_the_stores(tmp_path: Path) -> None:
     read_before = "port_flash_read(1, 0, bytes, 8);"  # and is over
-    body = f"{read_before} FLASH_ACR &= ~FLASH_ACR_DCEN; (void)REG({STORE:#x}); FLASH_ECCR = FLASH_ECCR_ECCD;"
-    sent, _flash = run(body, tmp_path, torn=frozenset({STORE_OFFSET}))
+    read = f"(void)REG({0x0800_0000 + FIRST_RECORD:#x});"
+    body = f"{read_before} FLASH_ACR &= ~FLASH_ACR_DCEN; {read} FLASH_ECCR = FLASH_ECCR_ECCD;"
+    sent, _flash = run(body, tmp_path, torn=frozenset({FIRST_RECORD}))
     assert set(sent) == {ord("?")}

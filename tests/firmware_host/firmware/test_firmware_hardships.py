@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from firmware_host.emulator.adis16465 import Adis16465
-from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET
+from firmware_host.emulator.flash_memory import PAGE_BYTES
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.frames import encode
 from support import emulated_session
-from support.emulated_session import Session, samples, shipped_flash
+from support.emulated_session import FIRST_RECORD, Session, samples, shipped_flash
 
 pytestmark = pytest.mark.slow
 
@@ -116,7 +116,7 @@ def registers(session: Session, part: str) -> Sequence[int] | dict[int, int]:
 
 def test_torn_pages_whose_flag_the_chip_has_lost_do_not_keep_the_board_from_its_work() -> None:
     flash = shipped_flash()
-    flash.torn.update(range(STORE_OFFSET, STORE_OFFSET + 2 * PAGE_BYTES, 8))
+    flash.torn.update(range(FIRST_RECORD, FIRST_RECORD + 2 * PAGE_BYTES, 8))
     flash.flags_lost = True
     session = Session(flash=flash, boot_time_s=0.0)
     session.run(0.1)

@@ -17,7 +17,7 @@ IMAGE = FIRMWARE / "image"
 PORT = FIRMWARE / "port_l432"
 
 FLASH, FLASH_SIZE = 0x08000000, 32 * 1024
-RAM, RAM_SIZE = 0x20000000, 32 * 1024
+RAM, RAM_SIZE = 0x20000000, 40 * 1024
 
 
 # The image
@@ -127,6 +127,7 @@ def test_every_line_of_the_register_header_is_the_makers(name: str, value: str) 
 
 def test_the_register_header_has_nothing_the_port_does_not_use() -> None:
     sources = "".join(path.read_text() for path in PORT.glob("*.c")) + HEADER
+    sources = re.sub(r"GPIO##\w+##(\w+)", r"GPIOA\1 GPIOB\1", sources)  # by the table of parts
     names = [name.split("(")[0] for name, _ in DEFINES]
     assert [name for name in names if len(re.findall(rf"\b{name}\b", sources)) < 2] == []
     assert len(names) > 100

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from firmware_host.frames import Frame
+from firmware_host.parts import BOARD_PARTS
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
@@ -188,7 +189,7 @@ def test_three_sensors_share_the_room_and_each_has_its_duration(duration_s: floa
 def test_keep_refuses_what_it_cannot() -> None:
     board = HostBoard()
     assert error_of(board.ask("keep", sensors=1, duration_s=1.0)) == "not_configured"
-    assert error_of(board.ask("keep", sensors=16, duration_s=1.0)) == "no_such_sensor"
+    assert error_of(board.ask("keep", sensors=1 << len(BOARD_PARTS), duration_s=1.0)) == "no_such_sensor"
     configured(board, 0, 238, 245)
     for duration_s in (0.0, -1.0, float("nan"), float("inf"), 1e6):
         assert error_of(board.ask("keep", sensors=1, duration_s=duration_s)) == "bad_observation"
@@ -253,8 +254,8 @@ def test_an_empty_span_is_a_bad_observation_and_an_unknown_sensor_is_named() -> 
     request: dict[str, Any] = {"index": 0, "start_us": 9, "end_us": 9, "speed_rad_s": 1.0}
     assert error_of(sweeps.ask("observe", sensor=0, **request)) == "bad_observation"
     assert error_of(sweeps.ask("observe", sensor=1, **request)) == "not_configured"
-    assert error_of(sweeps.ask("observe", sensor=4, **request)) == "no_such_sensor"
-    assert error_of(sweeps.ask("solve", sensor=4, method=0)) == "no_such_sensor"
+    assert error_of(sweeps.ask("observe", sensor=len(BOARD_PARTS), **request)) == "no_such_sensor"
+    assert error_of(sweeps.ask("solve", sensor=len(BOARD_PARTS), method=0)) == "no_such_sensor"
 
 
 def test_setting_a_sensor_up_forgets_what_was_observed_with_another_setting() -> None:

@@ -8,8 +8,9 @@ import pytest
 from firmware_host.frames import Frame
 from support.emulated_session import FIELD_T, MAGNETIC, Session
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, sample_sequences, settle
+from support.parts import NUMBER
 
-SENSOR = 3
+SENSOR = NUMBER["lsm9ds1_magnetometer"]
 PERIOD_80_HZ_US = 12_500
 SETTLING = 2
 CALIBRATION = {
@@ -85,8 +86,8 @@ def test_a_gyroscope_has_no_range_of_a_field(board: HostBoard, sensor: int) -> N
 @pytest.mark.parametrize(
     ("request_name", "values"),
     [
-        ("start", {"sensors": 0b1000}),
-        ("keep", {"sensors": 0b1000, "duration_s": 1.0}),
+        ("start", {"sensors": 1 << SENSOR}),
+        ("keep", {"sensors": 1 << SENSOR, "duration_s": 1.0}),
         ("observe", {"sensor": SENSOR, "index": 0, "start_us": 0, "end_us": 1, "speed_rad_s": 1.0}),
         ("recall", {"sensor": SENSOR, "index": 0, "mean_rad_s": (1, 0, 0), "speed_rad_s": 1.0}),
         ("solve", {"sensor": SENSOR, "method": 0}),
@@ -184,7 +185,7 @@ def test_the_image_reads_the_emulated_die_on_its_own_select_and_line() -> None:
     session = Session(parts=("lsm9ds1", "lsm9ds1_magnetometer"), boot_time_s=0.0)
     session.run(0.1)
     identity = session.ask("hello")
-    assert identity.items[[0, 3]].tolist() == [(b"LSM9DS1", 0x68, 1, 0), (b"LSM9DS1-M", 0x3D, 1, 1)]
+    assert identity.items[[0, SENSOR]].tolist() == [(b"LSM9DS1", 0x68, 1, 0), (b"LSM9DS1-M", 0x3D, 1, 1)]
     session.configure("lsm9ds1")
     setup = session.configure_magnetometer()
     assert session.ask("start", sensors=0).name == "ack"
@@ -198,5 +199,5 @@ def test_the_image_reads_the_emulated_die_on_its_own_select_and_line() -> None:
     ]
     assert counts[0] == pytest.approx(expected, abs=0.51)
     report = session.ask("status")
-    assert report.items[3]["dropped"] == 0 and report.items[0]["dropped"] == 0
+    assert report.items[SENSOR]["dropped"] == 0 and report.items[0]["dropped"] == 0
     assert report.values["bus_errors"] == 0

@@ -1,12 +1,14 @@
-"""The drivers of the three parts: what holds for all, and the LSM9DS1."""
+"""The drivers of the parts: what holds for all, and the LSM9DS1."""
 
 import math
 
 import pytest
 
+from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import ERRORS
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, streaming_board
 from support.host_sensors import Nobody
+from support.parts import NUMBER
 
 
 @pytest.fixture
@@ -17,7 +19,7 @@ def board() -> HostBoard:
 # What holds for every part
 
 
-@pytest.mark.parametrize("sensor", range(3))
+@pytest.mark.parametrize("sensor", range(len(GYROSCOPES)))
 @pytest.mark.parametrize("rate_hz", [0.0, -238.0, math.nan, math.inf])
 def test_a_rate_that_is_no_rate_is_refused(board: HostBoard, sensor: int, rate_hz: float) -> None:
     assert (
@@ -26,7 +28,7 @@ def test_a_rate_that_is_no_rate_is_refused(board: HostBoard, sensor: int, rate_h
     )
 
 
-@pytest.mark.parametrize("sensor", range(3))
+@pytest.mark.parametrize("sensor", range(len(GYROSCOPES)))
 @pytest.mark.parametrize("range_deg_s", [0.0, -245.0, 2001.0, math.nan, math.inf])
 def test_a_range_the_part_does_not_have_is_refused(board: HostBoard, sensor: int, range_deg_s: float) -> None:
     assert (
@@ -35,41 +37,35 @@ def test_a_range_the_part_does_not_have_is_refused(board: HostBoard, sensor: int
     )
 
 
-@pytest.mark.parametrize(("sensor", "bytes_read"), [(0, 1), (1, 1), (2, 2), (3, 1)])
+@pytest.mark.parametrize("part", BOARD_PARTS)
 @pytest.mark.parametrize("level", [0x00, 0xFF])
-def test_a_missing_part_is_told_in_the_identity_and_refused(
-    board: HostBoard, sensor: int, bytes_read: int, level: int
-) -> None:
+def test_a_missing_part_is_told_in_the_identity_and_refused(board: HostBoard, part: str, level: int) -> None:
+    sensor, bytes_read = NUMBER[part], 2 if BOARD_PARTS[part].who_am_i > 0xFF else 1
     board.sensors[sensor] = Nobody(level)
     (identity,) = board.ask("hello")
     expected = int.from_bytes(bytes((level,)) * bytes_read, "big")
     assert identity.items["who_am_i"][sensor] == expected
-    assert identity.items["present"].tolist() == [i != sensor for i in range(4)]
-    ranges = (0, 0, 4) if sensor == 3 else (100, 0, 0)
+    assert identity.items["present"].tolist() == [i != sensor for i in range(len(BOARD_PARTS))]
+    ranges = (0, 0, 4) if part in MAGNETOMETERS else (100, 0, 0)
     wanted = dict(zip(("range_deg_s", "range_g", "range_gauss"), ranges, strict=True))
     (error,) = board.ask("configure", sensor=sensor, rate_hz=200, **wanted)
     assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_absent", sensor)
 
 
 @pytest.mark.parametrize(
-    ("sensor", "identity"),
-    [(0, 0x69), (0, 0x71), (1, 0x68), (1, 0x70), (1, 0x73), (2, 0x4056), (2, 0x4053)],
-    ids=["LSM6DS3", "MPU-9250", "MPU-6050", "MPU-6500", "MPU-9255", "ADIS16470", "ADIS16467"],
+    ("part", "identity"),
+    [(name, other) for name, part in GYROSCOPES.items() for other in list(part.in_its_place)[:8]],
 )
-def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, sensor: int, identity: int) -> None:
-    if sensor == 0:
-        board.gyro.values[0x0F] = identity
-    elif sensor == 1:
-        board.mpu9250.values[0x75] = identity
-    else:
-        board.adis16465.words[0x72] = identity
+def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, part: str, identity: int) -> None:
+    sensor = NUMBER[part]
+    board.parts[part].answer_as(identity)
     (answer,) = board.ask("hello")
     assert answer.items["who_am_i"][sensor] == identity and not answer.items["present"][sensor]
     (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100, range_g=0, range_gauss=0)
     assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_mismatch", sensor)
 
 
-@pytest.mark.parametrize("sensor", range(3))
+@pytest.mark.parametrize("sensor", range(len(GYROSCOPES)))
 def test_a_part_is_identified_before_its_range_is_judged(board: HostBoard, sensor: int) -> None:
     board.sensors[sensor] = Nobody()
     assert (
@@ -95,10 +91,10 @@ def test_a_setting_that_does_not_stick_is_refused_and_takes_the_sensor_out(
     assert board.ask("start", sensors=0)[0].name == "ack"
 
 
-@pytest.mark.parametrize("sensor", range(3))
+@pytest.mark.parametrize("sensor", range(len(GYROSCOPES)))
 def test_asking_who_is_there_changes_nothing(board: HostBoard, sensor: int) -> None:
     configured(board, sensor)
-    part = (board.gyro, board.mpu9250, board.adis16465)[sensor]
+    part = list(board.parts.values())[sensor]
     part.writes.clear()
     board.ask("start", 2, sensors=0)
     for k in range(40):
@@ -133,7 +129,7 @@ def test_a_magnetometer_whose_answers_are_not_wired_is_kept_off_i2c_blindly() ->
     board = HostBoard()
     board.magnetometer.is_heard = False
     (identity,) = board.ask("hello")
-    assert identity.items[3].tolist() == (b"LSM9DS1-M", 0xFF, 0, 1)
+    assert identity.items[NUMBER["lsm9ds1_magnetometer"]].tolist() == (b"LSM9DS1-M", 0xFF, 0, 1)
     assert board.magnetometer.values[0x22] == 0x83
 
 

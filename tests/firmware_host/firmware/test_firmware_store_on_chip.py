@@ -9,7 +9,7 @@ from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashM
 from firmware_host.emulator.nvic import NMI, Nvic
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
-from support.emulated_session import Session, shipped_flash
+from support.emulated_session import FIRST_RECORD, Session, shipped_flash
 
 pytestmark = pytest.mark.slow
 
@@ -154,7 +154,7 @@ def test_power_that_fails_at_any_moment_of_a_write_leaves_the_old_calibration_or
 
 def test_a_page_that_is_torn_all_over_is_no_calibration_and_no_fault() -> None:
     flash = shipped_flash()
-    flash.torn.update(range(STORE_OFFSET, STORE_OFFSET + 2 * PAGE_BYTES, 8))
+    flash.torn.update(range(FIRST_RECORD, FIRST_RECORD + 2 * PAGE_BYTES, 8))
     session = boot(flash)
     assert stored(session) is None
     assert write(session, 1).name == "ack"

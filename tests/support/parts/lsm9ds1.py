@@ -1,0 +1,107 @@
+"""The LSM9DS1's gyroscope and accelerometer, by the datasheet DocID025715."""
+
+from collections.abc import Callable, Sequence
+
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from support.data_sheet import DataSheet
+from support.host_sensors import ByteRegisters
+from support.spi_master import ModelledRegisters, integers
+
+# Codes by data rate in Hz and by range in degrees per second
+RATES = {14.9: 1, 59.5: 2, 119.0: 3, 238.0: 4, 476.0: 5, 952.0: 6}
+RANGES = {245.0: 0, 500.0: 1, 2000.0: 3}
+RANGES_G = {2.0: 0, 4.0: 2, 8.0: 3, 16.0: 1}
+
+
+class Lsm9ds1Driver(ModelledRegisters):
+    """Datasheet DocID025715."""
+
+    model = Lsm9ds1
+
+    def identity(self) -> int:
+        return self.get(0x0F)[0]
+
+    def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None:
+        self.set(0x0C, 0x02)
+        self.set(0x20, RATES[rate_hz] << 5 | RANGES_G[range_g] << 3)
+        self.set(0x10, RATES[rate_hz] << 5 | RANGES[range_deg_s] << 3)
+
+    def read(self) -> tuple[list[int], int]:
+        (temperature,) = integers(self.get(0x15, 2), "<")
+        return self._vector(0x18), temperature
+
+    def accelerations(self) -> list[int]:
+        return self._vector(0x28)
+
+    def _vector(self, address: int) -> list[int]:
+        """The part's own x points the other way than the right-handed one."""
+        x, y, z = integers(self.get(address, 6), "<")
+        return [max(-32768, min(32767, -x)), y, z]
+
+
+SHEET = DataSheet(
+    name="LSM9DS1",
+    new=Lsm9ds1Driver,
+    identity=0x68,
+    other_identity=0x69,
+    rates_hz=(14.9, 59.5, 119.0, 238.0, 476.0, 952.0),
+    per_count_deg_s={245.0: 8.75e-3, 500.0: 17.5e-3, 2000.0: 70.0e-3},
+    per_count_g={2.0: 0.061e-3, 4.0: 0.122e-3, 8.0: 0.244e-3, 16.0: 0.732e-3},
+    temperature_counts=lambda temperature_c: 16 * (temperature_c - 25),
+    forbidden=(
+        ("unmodelled_register", b"\xa6\x00"),
+        ("unmodelled_register", b"\x06\x01"),
+        ("unmodelled_bits", b"\x21\x04"),  # the accelerometer's second filter
+    ),
+)
+
+
+class Lsm9ds1Registers(ByteRegisters):
+    """Registers that count up in a burst; a new conversion raises flags that reading the last outputs lowers.
+
+    Both triads are left-handed: the registers hold x with the other sign.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.values[0x0F] = 0x68
+        self.values[0x22] = 0x04  # IF_ADD_INC, as after power-up
+        self.fresh_acceleration = False
+        self.again_after_reading = 0  # so many times a conversion comes just when the last one has been read
+        self.before_acceleration: Callable[[], None] | None = (
+            None  # what happens once, before the accelerations are read
+        )
+        self.after_acceleration: Callable[[], None] | None = None  # or just after
+
+    @property
+    def line_is_high(self) -> bool:  # type: ignore[override]
+        """Its line is up until it is read."""
+        return self.fresh
+
+    def answer_as(self, who_am_i: int) -> None:
+        """Be another part."""
+        self.values[0x0F] = who_am_i
+
+    def read(self, address: int, size: int) -> bytes:
+        reads_acceleration = address <= 0x2D < address + size
+        if reads_acceleration and self.before_acceleration is not None:
+            before, self.before_acceleration = self.before_acceleration, None
+            before()
+        self.values[0x17] = self.values[0x27] = 0x02 * self.fresh | 0x01 * self.fresh_acceleration
+        read = bytes(self.values[address : address + size])
+        if address <= 0x1D < address + size:
+            self.fresh = self.again_after_reading > 0
+            self.again_after_reading -= self.fresh
+        if reads_acceleration:
+            self.fresh_acceleration = False
+            if self.after_acceleration is not None:
+                after, self.after_acceleration = self.after_acceleration, None
+                after()
+        return read
+
+    def convert(self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0, 0, 0)) -> None:
+        """A new conversion in the output registers, of vectors in right-handed axes."""
+        words = (temperature, -counts[0], *counts[1:], -acceleration[0], *acceleration[1:])
+        for address, value in zip((0x15, 0x18, 0x1A, 0x1C, 0x28, 0x2A, 0x2C), words, strict=True):
+            self.values[address : address + 2] = min(value, 32767).to_bytes(2, "little", signed=True)
+        self.fresh = self.fresh_acceleration = True
