@@ -7,6 +7,7 @@ from pydantic import Field
 
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.stage_section import StageMountSection
+from rig.config.world_autopilot import SimulatedAutopilotSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
@@ -383,6 +384,10 @@ class SimulatedSensorSection(Section):
         default=SimulatedFieldSection(), description="the magnetometer beside it, of a `kvh1775` that sends format C"
     )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
+    autopilot: SimulatedAutopilotSection | None = Field(
+        default=None,
+        description="the autopilot it is in, of a `mavlink`; of several at one port the first says it",
+    )
 
 
 class WorldSection(Section):
