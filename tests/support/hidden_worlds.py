@@ -31,9 +31,10 @@ STATED = UncertaintySection()
 SQUARE_DEG = {"adis16465": 0.05, "kvh1775": 0.03}  # how far axes are from right angles, one standard deviation
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
-PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"]}
+PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"], "mavlink": PART_ERRORS["lsm9ds1"]}
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
+    "mavlink": (0.03, 0.5),
 }  # fmt: skip
 TIMEOUT_S = 3000.0
 UNLIMITED = {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": None, "verification_mean_rad_s": None}
@@ -96,6 +97,27 @@ def kvh(seed: int) -> dict[str, Any]:
     return changed
 
 
+def autopilot(seed: int) -> dict[str, Any]:
+    """An autopilot's IMU: ArduPilot's in single precision, or PX4's in whole mrad/s, with corrections to be undone."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("autopilot"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
+    document["world"]["time_scale"] = 8
+    document["world"]["sensors"]["imu1"].pop("autopilot")
+    document["sensors"]["imu1"].pop("acceleration")
+    changed = _with_sensors(document, rng, {"mavlink": 0.001})
+    px4 = seed % 2 == 1
+    stem = "CAL_GYRO0_{}OFF" if px4 else "INS_GYROFFS_{}"
+    offsets = {stem.format(axis): float(rng.uniform(-0.05, 0.05)) for axis in "XYZ"}
+    changed["world"]["sensors"]["imu1"]["autopilot"] = {
+        "firmware": "px4" if px4 else "ardupilot",
+        "clock_ppm": float(rng.uniform(-1, 1)) * STATED.crystal_ppm,
+        "parameters": {**offsets, "SENS_BOARD_ROT" if px4 else "AHRS_ORIENTATION": int(rng.choice([0, 4, 6, 8]))},
+        "doubled": 0.002,
+    }
+    changed["sensors"]["imu1"]["mavlink"]["imu"] = "SCALED_IMU" if px4 else "HIGHRES_IMU"
+    return changed
+
+
 def on_another_arm(model: str, seed: int) -> dict[str, Any]:
     """As `quiet`, on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
@@ -111,9 +133,12 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         "imu": imu,
         "kvh": kvh,
         **{model: partial(on_another_arm, model) for model in OTHER_ARMS},
+        "autopilot": autopilot,
     }
 )
-WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys(OTHER_ARMS, 6)})
+WORLDS = MappingProxyType(
+    {"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys(OTHER_ARMS, 6), "autopilot": 6}
+)
 
 
 def _document(name: str) -> dict[str, Any]:
@@ -301,4 +326,6 @@ def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
     for sensor in document["sensors"].values():
         if sensor and "serial" in sensor:
             sensor["serial"]["port"] = f"socket://{host}:7331"
+        if sensor and "mavlink" in sensor:
+            sensor["mavlink"]["port"] = f"socket://{host}:5760"
     return document

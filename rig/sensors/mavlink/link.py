@@ -194,7 +194,7 @@ class Link:
             self._clock_s = self._clock_s if clock_s is None else clock_s
             silent_s = self._silent_s
         if self._streaming and silent_s > SILENCE_S:
-            raise SensorError("mavlink_link_lost", f"no message from {self._where} for {silent_s:.1f} s", _CABLE)
+            raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
         """Whether it was so in time. Raises what went wrong meanwhile."""
@@ -324,7 +324,8 @@ class Link:
                 self._note(message)
                 if message.get_type() in self.wanted:
                     found.append((message, self.counter.lost == lost))
-            if heard:
+            # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
+            if found if self._streaming else heard:
                 self._idle_reads, self._clock_at_message_s = 0, self._clock_s
             else:
                 self._idle_reads += 1

@@ -21,6 +21,7 @@ from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, 
 from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
 from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
+from rig.sensors.mavlink.writing import unfinished
 from rig.sensors.source import OnSamples
 
 FULL_SCALE_COUNTS = 1 << 30  # what a channel's range is divided into: far finer than what is sent
@@ -79,7 +80,7 @@ class MavlinkSource:
         self.link = Link(name, line.port, line.baud, self._take)
         try:
             self.link.identify()
-            for refusal in self._judge():
+            for refusal in (*unfinished(self.link), *self._judge()):
                 raise refusal
             self.link.wanted = frozenset(self._imus)
             for message, imu in self._imus.items():
@@ -210,6 +211,7 @@ def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
     with Link(first, line.port, line.baud) as link:
         link.identify()
         yield f"{link.known.words}, at {line.port}"
+        yield from unfinished(link)
         for name, each in sections.items():
             names = names_of(link.known.firmware, line_of(each))
             found, problems = judged(link, name, each)

@@ -187,6 +187,8 @@ class SimulatedAutopilot:
         number, interval_us = int(message.param1), message.param2
         if number not in IMUS_FIRST or IMUS_FIRST[number] >= len(self._imus) or isnan(interval_us):
             return DENIED
+        if number == RAW_IMU and self._firmware == "px4":
+            return DENIED
         if interval_us <= 0:  # never, or as often as it would by itself, which is never
             self._intervals_s.pop(number, None)
             return ACCEPTED

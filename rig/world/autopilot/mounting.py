@@ -63,7 +63,8 @@ class AutopilotMount:
         sensor = self.config.sensors[name]
         sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
         truth = SensorTruth(sensor, self.world.sensors[name], time_s)
-        seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), place])
+        of_another = [] if place in self.imus else [place]
+        seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *of_another])
         px4 = self.section.firmware == "px4"
         return Imu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed)
 
