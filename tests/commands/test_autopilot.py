@@ -26,6 +26,12 @@ LEFT = {"INS_GYROFFS_X": 0.1, "INS_ACCSCAL_Y": 1.01}  # of which no single-preci
 STORED = 10  # parameters: three offsets and INS_GYR_CAL, three offsets and three scales
 
 
+@pytest.fixture(autouse=True)
+def own_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A journal that no other test's autopilot is entered in, for they all have one number."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))
+
+
 def result(folder: Path) -> Path:
     """A result that passed, as of the autopilot's IMU."""
     frozen = ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-7" / "imu" / "result.json"

@@ -114,6 +114,7 @@ def autopilot(seed: int) -> dict[str, Any]:
         "parameters": {**offsets, "SENS_BOARD_ROT" if px4 else "AHRS_ORIENTATION": int(rng.choice([0, 4, 6, 8]))},
         "doubled": 0.002,
     }
+    changed["limits"] |= {"scale_deviation": 0.2, "bias_rad_s": 0.2}
     changed["sensors"]["imu1"]["mavlink"]["imu"] = "SCALED_IMU" if px4 else "HIGHRES_IMU"
     return changed
 

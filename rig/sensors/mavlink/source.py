@@ -73,7 +73,7 @@ class MavlinkSource:
     def __init__(self, sections: Mapping[str, SensorSection], on_samples: OnSamples) -> None:
         """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
         self._on_samples, self._started = on_samples, False
-        self._imus = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
+        self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
         self._first: dict[str, int] = {}
         (name, section), *_ = sections.items()
         line = line_of(section)
