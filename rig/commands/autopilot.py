@@ -157,7 +157,8 @@ def _values(
 def _kept(options: Namespace) -> Path:
     if options.old is not None:
         return Path(options.old).resolve()
-    folder = options.result if options.result.is_dir() else options.result.parent
+    result = Path(options.result)
+    folder = result if result.is_dir() else result.parent
     return (folder / f"autopilot-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.json").resolve()
 
 

@@ -42,7 +42,12 @@ class Listening:
 
     def hear(self, count: int, name: str = "imu") -> Any:
         """The first samples of one, so many at least."""
-        wait_for(lambda: self.source.check() or sum(map(len, self.samples[name])) >= count, "samples")
+
+        def enough() -> bool:
+            self.source.check()
+            return sum(map(len, self.samples[name])) >= count
+
+        wait_for(enough, "samples")
         return np.concatenate(self.samples[name])
 
     def fails(self) -> SensorError:

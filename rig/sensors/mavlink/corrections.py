@@ -39,7 +39,7 @@ class Names:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """Those without which nothing is known of its readings."""
+        """The parameters without which nothing is known of its readings."""
         named = (*self.gyro_offset, *self.force_offset, *self.force_scale, self.orientation, *self.filters)
         return named if self.identity is None else (*named, self.identity)
 
@@ -149,7 +149,7 @@ def correction_of(names: Names, found: Mapping[str, float]) -> Correction:
 
 
 def delay_s(names: Names, found: Mapping[str, float]) -> float:
-    """By how much a low-pass of second order (Butterworth) delays rates: √2 / (2π f); 0 without one."""
+    """The delay of rates by a low-pass of second order (Butterworth): √2 / (2π f); 0 without one."""
     cutoff_hz = found.get(names.filters[0], 0.0) if names.filters else 0.0
     return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
 

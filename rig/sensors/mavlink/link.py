@@ -179,7 +179,7 @@ class Link:
             self.autopilot = Autopilot(known.system, known.component, known.firmware, said, uid)
 
     def start(self) -> None:
-        """From now on a silence is one too many."""
+        """Start to take the stream's silence for a fault."""
         with self._news:
             self._streaming, self._idle_reads, self._clock_at_message_s = True, 0, None
 

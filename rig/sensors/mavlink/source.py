@@ -92,7 +92,7 @@ class MavlinkSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """Nothing is set in an autopilot to read it."""
+        """Settings that were changed: none, to read an autopilot."""
         return {}
 
     @property

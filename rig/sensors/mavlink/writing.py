@@ -9,7 +9,7 @@ from rig.sensors.mavlink.parameters import Parameter
 
 
 def place_of(link: Link) -> str:
-    """By what an autopilot is known again: its own number, its port where it tells none."""
+    """The mark by which an autopilot is known again: its own number, its port where it tells none."""
     return link.known.uid or link.port
 
 

@@ -90,7 +90,7 @@ class Parameters:
 
     @property
     def names(self) -> list[str]:
-        """All of them, in the order in which they are numbered."""
+        """The names of all parameters, in the order in which they are numbered."""
         return list(self._values)
 
     def field(self, name: str) -> bytes:
