@@ -12,7 +12,12 @@ class SimulatedAutopilotSection(Section):
     """The simulated autopilot around its IMUs: its firmware, its clock, its parameters."""
 
     firmware: Literal["ardupilot", "px4"] = Field(default="ardupilot", description="whose rules it goes by")
-    uid: str = Field(default="1c003f000f51383238353439", pattern=r"^([0-9a-f]{2}){4,12}$", description="its own number")
+    uid: str = Field(
+        default="1c003f000f51383238353439",
+        pattern=r"^([0-9a-f]{2}){4,12}$",
+        description="its own number",
+        json_schema_extra={"allowed": "8 to 24 hexadecimal digits, small letters, two for each byte"},
+    )
     clock_ppm: float = Field(default=15.0, ge=-1000, le=1000, description="how much too fast its clock runs")
     on_for_s: float = Field(
         default=30.0,
@@ -24,7 +29,7 @@ class SimulatedAutopilotSection(Section):
     parameters: dict[str, float] = Field(
         default={},
         description="parameters that differ from those of a new one, by their names",
-        json_schema_extra={"allowed": "parameters that it has", "usual": "`{}`"},
+        json_schema_extra={"allowed": "parameters that it has", "usual": "`{}`", **RATIO},
     )
     parameter_file: Path | None = Field(
         default=None,
