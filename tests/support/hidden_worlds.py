@@ -31,7 +31,11 @@ STATED = UncertaintySection()
 SQUARE_DEG = {"adis16465": 0.05, "kvh1775": 0.03}  # how far axes are from right angles, one standard deviation
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
-PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"], "mavlink": PART_ERRORS["lsm9ds1"]}
+PART_WANDERS = {
+    **PART_ERRORS,
+    "mpu9250": PART_ERRORS["lsm9ds1"],
+    "mavlink": {**PART_ERRORS["lsm9ds1"], "bias_per_k": 5e-5, "scale_per_k": 3e-5},
+}
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
     "mavlink": (0.03, 0.5),
@@ -102,7 +106,8 @@ def autopilot(seed: int) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     document = merge(_document("autopilot"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
     document["world"]["time_scale"] = 8
-    document["world"]["sensors"]["imu1"].pop("autopilot")
+    for name in ("autopilot", "temperature_c"):
+        document["world"]["sensors"]["imu1"].pop(name)
     document["sensors"]["imu1"].pop("acceleration")
     changed = _with_sensors(document, rng, {"mavlink": 0.001})
     px4 = seed % 2 == 1
