@@ -155,7 +155,7 @@ def _world() -> Iterator[str]:
         "## The simulated laboratory",
         "",
         "With a `world:` section a simulated arm, an emulated board, simulated KVH 1775s and autopilots answer at",
-        "`arm.host`, `board.port` and the sensors' ports. They answer on this computer only: the host must be a loopback",
+        "`arm.host`, `board.port` and the sensors' ports. They answer on this computer only: the host is a loopback",
         "address (127.x.y.z), and a port must be `socket://host:port`. If another simulated laboratory already has",
         "this address, a command takes a free one and says so; only `rig world` never changes the address.",
         "Without a `world:` section the rig connects to the real arm and board. Only the simulated laboratory uses the",
