@@ -1,7 +1,7 @@
 """Whether what is stated holds in laboratories that nobody has seen: `python benchmarks/hidden_worlds.py FOLDER`.
 
 Draws 60 laboratories with a quiet LSM9DS1, 40 with a noisy one, 20 with an ADIS16465 beside a quiet one, 20 of `imu`
-with three parts, 10 with a KVH 1775 and 6 with a quiet LSM9DS1 on each of four other arms
+with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of four other arms and 6 with an autopilot
 (tests/support/hidden_worlds.py), runs `rig run` in each, and keeps its recording in FOLDER/family/seed; those that are
 there are not made again. Then all are solved, and a table says of each family, part and parameter: RMS of error over u,
 the share within U, the largest error over U, the spread of u, and which undamaged runs were refused and by what.

@@ -83,7 +83,8 @@ def contradictions(
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = [fitness(name, "rate", f"{DISTURBED}.{sweep}", *named[sweep], sweep=sweep) for sweep in sorted(named)]
         checks += sweeps or [fitness(name, "rate", DISTURBED, *found.sweep)]
-        of_readings = judge_readings(counts, pieces.windows, rate, np.median if settings.holds_all_kinds else np.min)
+        usual, has_bits = np.median if settings.holds_all_kinds else np.min, gyroscope.step is None
+        of_readings = judge_readings(counts, pieces.windows, rate, usual, has_bits=has_bits)
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
         if surroundings is not None and settings.checked_by_model:
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)

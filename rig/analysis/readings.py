@@ -32,12 +32,18 @@ HEAP = 10  # readings
 
 
 def judge_readings(
-    counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float, usual: Usual = np.median
+    counts: Sequence[NDArray[np.int64]],
+    windows: Sequence[Window],
+    rate: float,
+    usual: Usual = np.median,
+    *,
+    has_bits: bool = True,
 ) -> Statistics:
     """Every check's statistic and limit by its name, from all readings (n, 3) of each recording and from the windows.
 
     `rate` is that of false alarms for each, where it is not far smaller. The noise is the `usual` one of the windows,
-    the median: one in which an axis stands still does not make it a sensor without noise.
+    the median: one in which an axis stands still does not make it a sensor without noise. Counts that are finer than
+    what was sent have no bits to judge, `has_bits`.
     """
     from scipy.special import ndtri
 
@@ -46,8 +52,10 @@ def judge_readings(
     noises = [_noise(window.counts) for window in at_rest]
     noise = np.asarray(usual(noises, axis=0), dtype=np.float64)
     spikes, of_a_bit = _spikes(windows)
-    stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
-    found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE)}
+    found = {"spikes": (spikes, SPIKE)}
+    if has_bits:
+        stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
+        found = {"stuck_bit": (float(stuck), 0.0), **found}
     if any(window.sweep < 0 for window in windows):
         found["skewed_noise"] = _skewness(at_rest, sure)
     if noise.min() >= 1:

@@ -40,7 +40,7 @@ class ReadInReference:
     """One sensor's readings: `counts` (n, 3) of each recording, the windows and dwells cut from them, and the model.
 
     `pieces` name the dwells and sweeps of `read`, in its order; `flicker_counts` is the least Allan deviation of the
-    bias, by which the halves of a dwell differ beside their noise.
+    bias, by which the halves of a dwell differ beside their noise. `has_bits`: see `judge_readings`.
     """
 
     counts: Sequence[NDArray[np.int64]]
@@ -49,6 +49,7 @@ class ReadInReference:
     read: Read
     pieces: Sequence[str]
     flicker_counts: float = 0.0
+    has_bits: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,7 @@ def of_accelerometer(
     off_rad = solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(sensor.mounting), off_rad)
     return ReadInReference(
+        has_bits=channel.step is None,
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
         sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
@@ -149,7 +151,7 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
         **(named or {DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP: found.piece}),
         **found.statistics,
         **knocked(held.dwells, held.flicker_counts, rate),
-        **judge_readings(held.counts, windows, rate),
+        **judge_readings(held.counts, windows, rate, has_bits=held.has_bits),
     }
     return ReferenceStatistics(statistics, found.told_from)
 

@@ -94,20 +94,20 @@ def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
     """The sensors with a port of their own; nothing in their memories is changed."""
     from rig.commands.claims import claimed_sensor
     from rig.sensors.errors import SensorError
-    from rig.sensors.registry import OWN_PORT
+    from rig.sensors.registry import by_port
 
     missing: list[Problem] = []
-    for name, section in configured.loaded.config.sensors.items():
-        if section.serial is not None:
-            try:
-                with claimed_sensor(name, section.serial.port):
-                    for seen in OWN_PORT[section.part].look(name, section):
-                        if isinstance(seen, str):
-                            tell(f"sensor {name}: {seen}")
-                        else:
-                            missing.append(seen.problem)
-            except (Refused, SensorError) as error:
-                missing.append(error.problem)
+    for port, kind, sections in by_port(configured.loaded.config.sensors):
+        name = ", ".join(sections)
+        try:
+            with claimed_sensor(name, port):
+                for seen in kind.look(sections):
+                    if isinstance(seen, str):
+                        tell(f"sensor {name}: {seen}")
+                    else:
+                        missing.append(seen.problem)
+        except (Refused, SensorError) as error:
+            missing.append(error.problem)
     return missing
 
 

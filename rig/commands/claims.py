@@ -33,9 +33,9 @@ def claimed(config: RigConfig) -> Iterator[None]:
             stack.enter_context(claimed_arm(config.turner.address))
         if config.board is not None:
             stack.enter_context(claimed_board(config.board.port))
-        for name, section in config.sensors.items():
-            if section.serial is not None:
-                stack.enter_context(claimed_sensor(name, section.serial.port))
+        ports = {each.own_port[1]: name for name, each in config.sensors.items() if each.own_port is not None}
+        for port, name in ports.items():
+            stack.enter_context(claimed_sensor(name, port))
         yield
 
 

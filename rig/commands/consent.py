@@ -55,7 +55,7 @@ def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
         if config.board is not None:
             yield "the board", config.board.port
         for name, section in config.sensors.items():
-            if section.serial is not None:
-                yield f"the sensor {name}", section.serial.port
+            if section.own_port is not None:
+                yield f"the sensor {name}", section.own_port[1]
     if config.history.url is not None and not config.history.off and not os.environ.get(ENVIRONMENT):
         yield "the history", config.history.url

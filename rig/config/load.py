@@ -312,7 +312,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
         return
     ports = {} if config.board is None else {"board.port": config.board.port}
-    ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
+    ports |= {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in config.sensors.items() if s.own_port}
     if isinstance(turner, HandSection) and config.board is None:
         yield "board: missing; the simulated hand turns sensors on a board"
     if host is not None and not _is_loopback(host):
@@ -332,9 +332,12 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         for name in sorted(set(named) ^ set(simulated)):
             where = f"world.{kind}" if name in named else kind
             yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
-    for name in sorted(config.on_board.keys() & world.sensors.keys()):
-        if world.sensors[name].kvh1775 is not None:
-            yield f"world.sensors.{name}.kvh1775: no such instrument; the sensor is on the board"
+    for name in sorted(config.sensors.keys() & world.sensors.keys()):
+        where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
+        if world.sensors[name].kvh1775 is not None and config.sensors[name].serial is None:
+            yield f"world.sensors.{name}.kvh1775: no such instrument; {where}"
+        if world.sensors[name].autopilot is not None and config.sensors[name].mavlink is None:
+            yield f"world.sensors.{name}.autopilot: no such instrument; {where}"
 
 
 def _is_loopback(host: str) -> bool:

@@ -18,6 +18,7 @@ from rig.config.judging_sections import (
 )
 from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget
+from rig.config.mavlink_section import over_budget_of_autopilots
 from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S
 from rig.config.section import (
     RATIO,
@@ -235,8 +236,12 @@ class SensorsConfig(Section):
         """The board has one place for each part, and a calibration one reference at most."""
         places: dict[str, str] = {}
         for name, sensor in sensors.items():
-            if sensor.serial is not None:
-                place, what = sensor.serial.port, f"at {sensor.serial.port}; a port is one sensor's"
+            if sensor.mavlink is not None:
+                place, what = f"{sensor.mavlink.port} {sensor.mavlink.instance}", f"IMU {sensor.mavlink.instance}"
+                what += f" of the autopilot at {sensor.mavlink.port}"
+            elif sensor.own_port is not None:
+                _, place = sensor.own_port
+                what = f"at {place}; a port is one sensor's"
             else:
                 place, what = sensor.part, f"{sensor.part}; the board has one place for each part"
             if place in places:
@@ -244,6 +249,8 @@ class SensorsConfig(Section):
             places[place] = name
         if both := sorted(sensors.keys() & _fields_of_kvhs(sensors)):
             raise ValueError(f"{', '.join(both)} is the name of a KVH 1775's magnetometer already")
+        if problem := over_budget_of_autopilots({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
+            raise ValueError(problem)
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
         if len(references) > 1:
             raise ValueError(f"{' and '.join(references)} have role: reference; at most one sensor can")

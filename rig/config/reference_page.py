@@ -158,9 +158,9 @@ def _world() -> Iterator[str]:
     yield from (
         "## The simulated laboratory",
         "",
-        "With a `world:` section a simulated arm, or the hand of a simulated operator (`turner: {kind: hand}`), an",
-        "emulated board and simulated KVH 1775s answer at `arm.host`,",
-        "`board.port` and `sensors.<name>.serial.port`. They answer on this computer only: the host must be a loopback",
+        "With a `world:` section a simulated arm, servo or operator's hand, an emulated board, simulated KVH 1775s and",
+        "autopilots answer at `arm.host` or `turner.port`, `board.port` and the sensors' ports. They answer on this",
+        "computer only: the host must be a loopback",
         "address (127.x.y.z), and a port must be `socket://host:port`. If another simulated laboratory already has",
         "this address, a command takes a free one and says so; only `rig world` never changes the address.",
         "Without a `world:` section the rig connects to the real arm and board. Only the simulated laboratory uses the",

@@ -287,6 +287,29 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ),
             own_port=True,
         ),
+        # IMUs of autopilots are of many kinds: what follows is what the ICM-42688-P of TDK states, DS-000347, table 1
+        # and 2, which most flight controllers of today have; where it is silent, that of the MPU-9250.
+        "mavlink": Part(
+            rates_hz=tuple(range(5, 401)),
+            rates_rule="5, 6, … 400",
+            ranges_deg_s=(250, 500, 1000, 2000),
+            default_rate_hz=100,
+            default_range_deg_s=2000,
+            g_sensitivity_deg_s_g=0.1,
+            nonlinearity_percent=0.1,
+            asymmetry_percent=0.02,
+            bias_deg_s_k=0.005,
+            scale_ppm_k=50,
+            angle_random_walk_deg_sqrt_h=0.12,  # 0.0028 °/s/√Hz, of one side: 60 / √2 times that
+            bias_instability_deg_h=10,
+            non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 %
+            ranges_g=(16, 8, 4),
+            acceleration_noise_ug_sqrt_hz=70,
+            accelerometer=AccelerometerSheet(
+                nonlinearity_percent=0.1, nonlinear_over_g=2, bias_mg_k=0.15, scale_ppm_k=50, bias_instability_ug=30
+            ),
+            own_port=True,
+        ),
     }
 )
 

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
+from rig.config.mavlink_section import MavlinkSection
 from rig.config.section import (
     RATIO,
     Positive,
@@ -145,11 +146,21 @@ class SensorSection(Section):
     serial: OwnPortSection | None = Field(
         default=None, description="its own serial port, of a `kvh1775`; the other parts are on the board"
     )
+    mavlink: MavlinkSection | None = Field(
+        default=None, description="the autopilot that the IMU is in, of a `mavlink`; other parts have none"
+    )
 
     @property
     def on_board(self) -> bool:
         """Whether the board reads it."""
-        return self.serial is None
+        return self.own_port is None
+
+    @property
+    def own_port(self) -> tuple[str, str] | None:
+        """The port beside the board's that it answers at, after the key in its section that says so."""
+        if self.serial is not None:
+            return "serial.port", self.serial.port
+        return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
     @model_validator(mode="before")
     @classmethod
@@ -196,6 +207,8 @@ class SensorSection(Section):
     @model_validator(mode="after")
     def its_own_port_carries_it(self) -> Self:
         """A part has a port of its own or it is on the board."""
+        if self.part == "mavlink" or self.mavlink is not None:
+            return self._in_an_autopilot()
         own_port = PARTS[self.part].own_port
         if own_port != (self.serial is not None):
             raise ValueError(
@@ -207,6 +220,13 @@ class SensorSection(Section):
             problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
             if problem is not None:
                 raise ValueError(problem)
+        return self
+
+    def _in_an_autopilot(self) -> Self:
+        if self.part != "mavlink":
+            raise ValueError(f"{self.part} is in no autopilot: leave mavlink out")
+        if self.mavlink is None or self.serial is not None:
+            raise ValueError("mavlink is in an autopilot: give its section mavlink, and no serial")
         return self
 
     @field_validator("turntable")

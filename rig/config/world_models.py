@@ -11,6 +11,7 @@ from rig.config.models import ArmSection, TurnerSection
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import StageMountSection
+from rig.config.world_autopilot import SimulatedAutopilotSection
 from rig.config.world_hand import SimulatedHandSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 from rig.config.world_servo import SimulatedServoSection
@@ -395,6 +396,10 @@ class SimulatedSensorSection(Section):
         default=SimulatedFieldSection(), description="the magnetometer beside it, of a `kvh1775` that sends format C"
     )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
+    autopilot: SimulatedAutopilotSection | None = Field(
+        default=None,
+        description="the autopilot it is in, of a `mavlink`; of several at one port the first says it",
+    )
 
 
 class WorldSection(Section):

@@ -27,6 +27,7 @@ class Channel:
 
     `quantity` is a name in `measured()`, `type` NumPy's of a number. Numbers of `full_scale_counts` and more are
     saturated, None where nothing tells; `range` is the nominal end of scale in the unit, None where it is not known.
+    `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count.
     """
 
     quantity: str
@@ -36,6 +37,7 @@ class Channel:
     offset: Finite = 0.0
     full_scale_counts: Annotated[int, Field(gt=0)] | None = None
     range: Positive | None = None
+    step: Positive | None = None
 
     @property
     def measures(self) -> Quantity | Scalar:
@@ -45,7 +47,7 @@ class Channel:
     @property
     def resolution(self) -> float:
         """The step between neighbouring readings in the quantity's unit; 0 of numbers that are no counts."""
-        return 0.0 if self.type == "<f8" else self.unit_per_count
+        return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """The numbers (n,) or (n, 3) in samples (n,), as they were recorded."""

@@ -30,7 +30,7 @@ from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.sensors import BoardSource, board_source
-from rig.sensors.registry import OWN_PORT
+from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
@@ -111,22 +111,20 @@ class Connector:
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
-        """The sensors with a port of their own; to verify one, its calibration corrects its readings here."""
+        """The sensors with a port of their own; to verify them, their calibrations correct their readings here."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
-        for name, section in config.sensors.items():
-            if section.serial is None:
-                continue
-            kind = OWN_PORT[section.part]
-            calibration = self._calibration(name) if calibrated and name in config.to_calibrate else None
+        for port, kind, sections in by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples
-            if calibration is not None:
-                on_samples = correcting(name, kind.describe(name, section), calibration, on_samples)
+            calibrations = {
+                name: self._calibration(name) for name in sections if calibrated and name in config.to_calibrate
+            }
+            for name, calibration in calibrations.items():
+                on_samples = correcting(name, kind.describe(name, sections[name]), calibration, on_samples)
             with refusing():
-                source = stack.enter_context(kind.connect(name, section, on_samples))
-            self.station.event(
-                SensorConnected(name, section.part, section.serial_number, section.serial.port, source.corrected)
-            )
-            yield source if calibration is None else HostCorrected(source, calibration)
+                source = stack.enter_context(kind.connect(sections, on_samples))
+            for name, section in sections.items():
+                self.station.event(SensorConnected(name, section.part, section.serial_number, port, source.corrected))
+            yield HostCorrected(source, calibrations) if calibrations else source
 
     def _calibration(self, name: str) -> Calibration:
         """Raises Refused `nothing_to_correct_by`."""

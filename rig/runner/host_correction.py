@@ -3,6 +3,7 @@
 So a KVH 1775 is verified by the same movement and the same comparison, though it cannot keep a calibration itself.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,17 +19,17 @@ from rig.sensors.source import OnSamples, SampleSource
 
 @dataclass(frozen=True, slots=True)
 class HostCorrected:
-    """A source of one sensor whose samples pass by `correcting` on their way."""
+    """A source of sensors whose samples pass by `correcting` on their way, by their names."""
 
     source: SampleSource
-    calibration: Calibration
+    calibrations: Mapping[str, Calibration]
 
     @property
     def sensors(self) -> dict[str, RecordedSensor]:
         """Sensors as of `SampleSource`: rates in the same counts, corrected, no accelerations; fields as they come."""
         return {
-            name: corrected(sensor, self.calibration, sensor.channel(RATE).unit_per_count)
-            if sensor.measures(RATE)
+            name: corrected(sensor, self.calibrations[name], sensor.channel(RATE).unit_per_count)
+            if name in self.calibrations
             else sensor
             for name, sensor in self.source.sensors.items()
         }

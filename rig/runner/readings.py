@@ -18,7 +18,7 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.runner.acquisition import SensorCount
 from rig.runner.sensors import board_source
-from rig.sensors.registry import OWN_PORT
+from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples
 
@@ -34,9 +34,8 @@ def connected(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[Sa
         with refusing():
             if config.parts_on_board:
                 sources.append(stack.enter_context(board_source(config, on_samples, calibrated=False)))
-            for name, section in config.sensors.items():
-                if section.serial is not None:
-                    sources.append(stack.enter_context(OWN_PORT[section.part].connect(name, section, on_samples)))
+            for _, kind, sections in by_port(config.sensors):
+                sources.append(stack.enter_context(kind.connect(sections, on_samples)))
         yield tuple(sources)
 
 

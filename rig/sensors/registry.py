@@ -10,7 +10,10 @@ from rig.config.sensor_sections import SensorSection
 from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.source import describe, kvh1775, look
+from rig.sensors.mavlink import source as mavlink
 from rig.sensors.source import OnSamples, SampleSource
+
+Sections = Mapping[str, SensorSection]
 
 
 class Instrument(SampleSource, Protocol):
@@ -24,15 +27,41 @@ class Instrument(SampleSource, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What can be done with a sensor of a part, by its name and its section; errors are SensorErrors.
+    """What can be done with the sensors of a part at one port, by their names and sections; errors are SensorErrors.
 
-    `connect` sets it up, for who takes its samples, which `describe` describes; `look` only looks: yields what is there
-    and what is wrong.
+    `connect` sets them up, for who takes their samples, which `describe` describes of each; `look` only looks: yields
+    what is there and what is wrong.
     """
 
-    connect: Callable[[str, SensorSection, OnSamples], AbstractContextManager[Instrument]]
+    connect: Callable[[Sections, OnSamples], AbstractContextManager[Instrument]]
     describe: Callable[[str, SensorSection], RecordedSensor]
-    look: Callable[[str, SensorSection], Iterator[str | SensorError]]
+    look: Callable[[Sections], Iterator[str | SensorError]]
 
 
-OWN_PORT: Mapping[str, Kind] = MappingProxyType({"kvh1775": Kind(kvh1775, describe, look)})
+def _kvh1775(sections: Sections, on_samples: OnSamples) -> AbstractContextManager[Instrument]:
+    ((name, section),) = sections.items()  # a port of its own is one KVH 1775's
+    return kvh1775(name, section, on_samples)
+
+
+def _look_at_kvh1775(sections: Sections) -> Iterator[str | SensorError]:
+    ((name, section),) = sections.items()
+    return look(name, section)
+
+
+OWN_PORT: Mapping[str, Kind] = MappingProxyType(
+    {
+        "kvh1775": Kind(_kvh1775, describe, _look_at_kvh1775),
+        "mavlink": Kind(mavlink.mavlink, mavlink.describe, mavlink.look),
+    }
+)
+
+
+def by_port(sensors: Sections) -> Iterator[tuple[str, Kind, Sections]]:
+    """Sensors with a port of their own, together by port: the port, what can be done with them, their sections."""
+    at: dict[str, dict[str, SensorSection]] = {}
+    for name, section in sensors.items():
+        if section.own_port is not None:
+            at.setdefault(section.own_port[1], {})[name] = section
+    for port, sections in at.items():
+        (first, *_) = sections.values()
+        yield port, OWN_PORT[first.part], sections

@@ -15,6 +15,8 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
+    autopilot_fault port lost doubled slowest armed deaf camera silent bit_error_rate host_baud   as above
+    autopilot_power port on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
     instruct say face turns again               what the operator reads, where a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
@@ -29,6 +31,7 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
+from rig.world.autopilot.mounting import AutopilotMount
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
@@ -60,6 +63,8 @@ class World(Protocol):
 
     @property
     def kvh_lines(self) -> Mapping[str, SerialLine]: ...
+    @property
+    def autopilot_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
     def close_dashboard(self) -> None: ...
@@ -82,6 +87,8 @@ class ControlSession:
         self._orders: dict[str, Callable[..., Reply | None]] = {
             "kvh_fault": self._kvh_fault,
             "kvh_power": self._kvh_power,
+            "autopilot_fault": self._autopilot_fault,
+            "autopilot_power": self._autopilot_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
@@ -173,7 +180,7 @@ class ControlSession:
             return _line({"ok": False, "error": f"unknown request {name!r}", "known": sorted(self._orders)})
         try:
             reply = order(**request)
-        except (TypeError, ValueError, ArithmeticError) as error:
+        except (TypeError, ValueError, AttributeError, ArithmeticError) as error:
             return _line({"ok": False, "error": f"{name}: {error}"})
         if self._reply_at is not None:
             return b""
@@ -275,6 +282,29 @@ class ControlSession:
         if sensor not in mounts:
             raise ValueError(f"no KVH 1775 {sensor!r}; there are {', '.join(mounts) or 'none'}")
         return mounts[sensor]
+
+    def _autopilot_fault(self, port: str, **wrong: float) -> None:
+        autopilot = self._autopilot(port).autopilot
+        if autopilot is None:
+            raise ValueError(f"the autopilot at {port!r} is switched off")
+        line = self._world.autopilot_lines[port]
+        for name, value in wrong.items():
+            if name == "armed":
+                autopilot.armed = bool(value)
+            elif name in ("silent", "bit_error_rate", "host_baud"):
+                setattr(line, name, value)
+            else:
+                setattr(autopilot.faults, name, value)  # an unknown name is an error: it has slots
+
+    def _autopilot_power(self, port: str, on: bool) -> None:
+        mount = self._autopilot(port)
+        self._world.laboratory.switch_on_autopilot(port) if on else mount.switch_off()
+
+    def _autopilot(self, port: str) -> AutopilotMount:
+        mounts = self._world.laboratory.autopilots
+        if port not in mounts:
+            raise ValueError(f"no autopilot at {port!r}; there are {', '.join(mounts) or 'none'}")
+        return mounts[port]
 
     def _silence_board(self, on: bool) -> None:
         """A cable that carries nothing, with its port still there."""

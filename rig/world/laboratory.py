@@ -10,6 +10,7 @@ from rig.config.models import ArmSection, RigConfig
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import mount_matrix
 from rig.config.world_models import WorldSection
+from rig.world.autopilot.mounting import autopilot_mounts
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
@@ -44,13 +45,20 @@ class Laboratory:
         self._mount = np.eye(3)  # from the flange's frame to the item's
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
+        self.autopilots = autopilot_mounts(config, world)
         self.plug_in()
         for name in self.kvhs:
             self.switch_on(name)
+        for port in self.autopilots:
+            self.switch_on_autopilot(port)
 
     def switch_on(self, name: str) -> None:
         """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
         self.kvhs[name].switch_on(self._motion_of, self._field_of, self._time_s)
+
+    def switch_on_autopilot(self, port: str) -> None:
+        """Give the autopilot at that port power, if it has none."""
+        self.autopilots[port].switch_on(self._motion_of, self._time_s)
 
     @property
     def on_arm(self) -> OnArm:
@@ -148,6 +156,9 @@ class Laboratory:
         for mount in self.kvhs.values():
             if mount.kvh is not None:
                 mount.kvh.advance(self._time_s)
+        for each in self.autopilots.values():
+            if each.autopilot is not None:
+                each.autopilot.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:

@@ -61,9 +61,18 @@ class World:
             name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
             for name, mount in self.laboratory.kvhs.items()
         }
+        self.autopilot_lines = {
+            port: SerialLine(partial(getattr, mount, "autopilot"), section.seed)
+            for port, mount in self.laboratory.autopilots.items()
+        }
         turning = self.laboratory.turning
         self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
-        self.lines = (self.line, *self.kvh_lines.values(), *filter(None, [self.servo_line]))
+        self.lines = (
+            self.line,
+            *self.kvh_lines.values(),
+            *self.autopilot_lines.values(),
+            *filter(None, [self.servo_line]),
+        )
         patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
         self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
@@ -81,6 +90,8 @@ class World:
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
                 self._listen(f"sensors.{name}.serial.port", port, self.kvh_lines[name])
+            for port, line in self.autopilot_lines.items():
+                self._listen("mavlink.port", port, line)
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
@@ -92,7 +103,12 @@ class World:
             for name, line in self.kvh_lines.items()
             if (kvh := section.sensors[name].kvh1775) is not None and kvh.pty
         }
-        self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
+        autopilot_ptys = {
+            port: _open_pty(line, self.network.selector)
+            for port, line in self.autopilot_lines.items()
+            if self.laboratory.autopilots[port].section.pty
+        }
+        self._ptys = [*([pty] if pty else []), *kvh_ptys.values(), *autopilot_ptys.values()]
         self._description = {
             "ready": True,
             "arm": loaded.config.turner.address or None,
@@ -100,6 +116,7 @@ class World:
             "pty": pty.path if pty else None,
             "kvh_ports": kvh_ports,
             "kvh_ptys": {name: each.path for name, each in kvh_ptys.items()},
+            "autopilot_ptys": {port: each.path for port, each in autopilot_ptys.items()},
             "control": f"{host}:{control_port}",
         }
 

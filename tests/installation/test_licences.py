@@ -24,7 +24,7 @@ LOOKED_AT = {
     "allantools": "LGPL-3.0: tests",
     "dcclib": "LGPL-3.0: tests",
     "dcc-json-toolkit": "LGPL-2.1: tests",
-    "pymavlink": "LGPL-3.0: benchmarks",
+    "pymavlink": "LGPL-3.0: extra autopilot",
     "apsw": "any that OSI approves: extra ros2",
 }  # fmt: skip
 

@@ -31,9 +31,14 @@ STATED = UncertaintySection()
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
 BY_SHEET = tuple(name for name, part in PARTS.items() if part.delivered.acceleration_bias_mg is not None)
-PART_WANDERS = {**PART_ERRORS, **dict.fromkeys(("mpu9250", *BY_SHEET), PART_ERRORS["lsm9ds1"])}
+PART_WANDERS = {
+    **PART_ERRORS,
+    **dict.fromkeys(("mpu9250", *BY_SHEET), PART_ERRORS["lsm9ds1"]),
+    "mavlink": {**PART_ERRORS["lsm9ds1"], "bias_per_k": 5e-5, "scale_per_k": 3e-5},
+}
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
+    "mavlink": (0.03, 0.5),
     **{
         name: (1e-2 * (off.acceleration_scale_percent or 1.0), 1e-3 * off.acceleration_bias_mg * STANDARD_GRAVITY_M_S2)
         for name, off in ((name, PARTS[name].delivered) for name in BY_SHEET)
@@ -135,6 +140,29 @@ def _with_mountings(document: dict[str, Any], rng: np.random.Generator) -> dict[
     return mounted
 
 
+def autopilot(seed: int) -> dict[str, Any]:
+    """An autopilot's IMU: ArduPilot's in single precision, or PX4's in whole mrad/s, with corrections to be undone."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("autopilot"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
+    document["world"]["time_scale"] = 8
+    for name in ("autopilot", "temperature_c"):
+        document["world"]["sensors"]["imu1"].pop(name)
+    document["sensors"]["imu1"].pop("acceleration")
+    changed = _with_sensors(document, rng, {"mavlink": 0.001})
+    px4 = seed % 2 == 1
+    stem = "CAL_GYRO0_{}OFF" if px4 else "INS_GYROFFS_{}"
+    offsets = {stem.format(axis): float(rng.uniform(-0.05, 0.05)) for axis in "XYZ"}
+    changed["world"]["sensors"]["imu1"]["autopilot"] = {
+        "firmware": "px4" if px4 else "ardupilot",
+        "clock_ppm": float(rng.uniform(-1, 1)) * STATED.crystal_ppm,
+        "parameters": {**offsets, "SENS_BOARD_ROT" if px4 else "AHRS_ORIENTATION": int(rng.choice([0, 4, 6, 8]))},
+        "doubled": 0.002,
+    }
+    changed["limits"] |= {"scale_deviation": 0.2, "bias_rad_s": 0.2}
+    changed["sensors"]["imu1"]["mavlink"]["imu"] = "SCALED_IMU" if px4 else "HIGHRES_IMU"
+    return changed
+
+
 def on_another_arm(model: str, seed: int) -> dict[str, Any]:
     """As `quiet`, on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
@@ -152,10 +180,18 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         "kvh": kvh,
         **{model: partial(on_another_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
         **{part: partial(by_its_sheet, part) for part in BY_SHEET},
+        "autopilot": autopilot,
     }
 )
 WORLDS = MappingProxyType(
-    {"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10, **dict.fromkeys((*OTHER_ARMS, *BY_SHEET), 6)}
+    {
+        "quiet": 60,
+        "noisy": 40,
+        "pair": 20,
+        "imu": 20,
+        "kvh": 10,
+        **dict.fromkeys((*OTHER_ARMS, *BY_SHEET, "autopilot"), 6),
+    }
 )
 
 
@@ -337,4 +373,6 @@ def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
     for sensor in document["sensors"].values():
         if sensor and "serial" in sensor:
             sensor["serial"]["port"] = f"socket://{host}:7331"
+        if sensor and "mavlink" in sensor:
+            sensor["mavlink"]["port"] = f"socket://{host}:5760"
     return document

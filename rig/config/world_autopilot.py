@@ -1,0 +1,58 @@
+"""The part of a simulated sensor's section that is about the autopilot it is in."""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from rig.config.section import RATIO, Section
+
+
+class SimulatedAutopilotSection(Section):
+    """The simulated autopilot around its IMUs: its firmware, its clock, its parameters."""
+
+    firmware: Literal["ardupilot", "px4"] = Field(default="ardupilot", description="whose rules it goes by")
+    uid: str = Field(
+        default="1c003f000f51383238353439",
+        pattern=r"^([0-9a-f]{2}){4,12}$",
+        description="its own number",
+        json_schema_extra={"allowed": "8 to 24 hexadecimal digits, small letters, two for each byte"},
+    )
+    clock_ppm: float = Field(default=15.0, ge=-1000, le=1000, description="how much too fast its clock runs")
+    on_for_s: float = Field(
+        default=30.0,
+        ge=0,
+        le=5e6,
+        description="how long it has been on; its milliseconds start again at zero after 4294967 s",
+    )
+    armed: bool = Field(default=False, description="whether its motors may turn")
+    parameters: dict[str, float] = Field(
+        default={},
+        description="parameters that differ from those of a new one, by their names",
+        json_schema_extra={"allowed": "parameters that it has", "usual": "`{}`", **RATIO},
+    )
+    parameter_file: Path | None = Field(
+        default=None,
+        description="file that keeps the parameters from one run to the next; without it, they begin anew",
+    )
+    lost: float = Field(
+        default=0.0, ge=0, lt=1, description="fraction of messages that get lost", json_schema_extra=RATIO
+    )
+    doubled: float = Field(
+        default=0.0, ge=0, lt=1, description="fraction of messages that come twice", json_schema_extra=RATIO
+    )
+    slowest: float = Field(
+        default=1.0,
+        gt=0,
+        le=1,
+        description="fraction of the messages asked for that it has time to send",
+        json_schema_extra=RATIO,
+    )
+    baud: int | None = Field(
+        default=None,
+        ge=1200,
+        le=3_000_000,
+        description="speed of its port; if left out, the configured one",
+        json_schema_extra={"unit": "Bd"},
+    )
+    pty: bool = Field(default=False, description="also offer its port as a pseudo-terminal (POSIX)")

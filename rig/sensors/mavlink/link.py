@@ -1,0 +1,362 @@
+"""The host end of an autopilot's link: a thread that reads, a dialogue about parameters, a stream of IMU messages.
+
+The same link talks to an autopilot over a cable and to the simulated one: bytes on a port.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+from firmware_host.serial_port import READ_TIMEOUT_S, why_closed
+from rig.sensors.errors import SensorError
+from rig.sensors.mavlink.counting import LinkCounter
+from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
+from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
+from rig.sensors.mavlink.port import open_port
+
+ATTEMPTS = 4  # times something is asked; each waits twice as long as the one before
+SILENCE_S = 2.0  # without a message, and the link is lost
+HEARTBEAT_S = 1.0
+OURS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
+GROUND_STATION, NO_AUTOPILOT = 6, 8  # MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID
+SET_INTERVAL, REQUEST_MESSAGE = 511, 512  # MAV_CMD
+AUTOPILOT_VERSION = 148
+ACCEPTED = 0  # MAV_RESULT
+_CABLE = "Check its supply and cable, and whether another program, such as a ground station, has the port"
+
+# Messages of pymavlink's in their order, whether none was lost since the one before, and when they were read.
+OnMessages = Callable[[list[tuple[Any, bool]], float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Autopilot:
+    """Who answers: its number in MAVLink's network, its firmware (MAV_AUTOPILOT), its version, its own number."""
+
+    system: int
+    component: int
+    firmware: int
+    version: str = "unknown"
+    uid: str = ""
+
+    @property
+    def words(self) -> str:
+        """Firmware, version and number."""
+        return f"{FIRMWARES[self.firmware]} {self.version}, number {self.uid or 'unknown'}"
+
+
+class Link:
+    """An autopilot at a port; a context manager. `on_messages` gets what is in `wanted`, on the reader's thread.
+
+    What goes wrong is a SensorError; all messages name `sensor`, as the configuration does.
+    """
+
+    def __init__(
+        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, timeout_s: float = 4.0
+    ) -> None:
+        """Opens the port, and waits for the heartbeat of an autopilot that is not armed.
+
+        Raises SensorError: no_port, no_autopilot, mavlink_no_message, mavlink_other_device, autopilot_armed; Refused
+        `missing_extra`.
+        """
+        self._mavlink = dialect()
+        self._sensor, self.port, self._baud, self._timeout_s = sensor, port, baud, timeout_s
+        self._on_messages = on_messages
+        self.wanted: Collection[str] = ()
+        self._parser = self._mavlink.MAVLink(None, srcSystem=OURS[0], srcComponent=OURS[1])
+        self._parser.robust_parsing = True
+        self.counter = LinkCounter()
+        self.autopilot: Autopilot | None = None
+        self.armed = False
+        self._bytes_seen = self._others_seen = self._idle_reads = 0
+        self._parameters: dict[str, Parameter] = {}
+        self._answers: dict[int, int] = {}
+        self._version: Any = None
+        self._streaming = False
+        self._fault: SensorError | None = None
+        self._clock_s: float | None = None
+        self._clock_at_message_s: float | None = None
+        self._news, self._sending = threading.Condition(), threading.Lock()
+        self._closing = threading.Event()
+        try:
+            self._port = open_port(port, baud)
+        except OSError as error:
+            raise SensorError(
+                "no_port",
+                f"{self._where} does not open: {why_closed(port, error)}",
+                "Check mavlink.port and the cable, and that no other program has the port",
+            ) from error
+        self._reader = threading.Thread(target=self._read, name=f"mavlink {port}", daemon=True)
+        self._reader.start()
+        try:
+            self._find()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def known(self) -> Autopilot:
+        """The autopilot that answers."""
+        assert self.autopilot is not None, "there is none without a heartbeat"
+        return self.autopilot
+
+    # -- the dialogue ----------------------------------------------------------------------------------------------
+    def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, Parameter]:
+        """The parameters of those names that it has, asked anew; of `others` it may have none.
+
+        Raises SensorError `autopilot_silent` when it answers nothing at all.
+        """
+        needed = set(needed)
+        names = needed | set(others)
+        with self._news:
+            for name in names:
+                self._parameters.pop(name, None)
+        for wait_s in self._waits():
+            for name in sorted(names - self._parameters.keys()):
+                self._send(self._mavlink.MAVLink_param_request_read_message(*self._address, name.encode(), -1))
+            self._wait(lambda: names <= self._parameters.keys(), wait_s)
+            if needed <= self._parameters.keys() and wait_s > 2 * self._waits()[0]:
+                break
+        found = {name: self._parameters[name] for name in names & self._parameters.keys()}
+        if not found:
+            raise SensorError(
+                "autopilot_silent",
+                f"{self._where} sends, but answers no question for a parameter",
+                "Check the line to its receiver (RX), and that the port is not one that only sends",
+            )
+        return found
+
+    def set_parameter(self, parameter: Parameter) -> Parameter:
+        """Set it to those four bytes, and what the autopilot answers. Raises SensorError `autopilot_not_set`."""
+        with self._news:
+            self._parameters.pop(parameter.name, None)
+        value = field_as_number(parameter.field)
+        for wait_s in self._waits():
+            name = parameter.name.encode()
+            self._send(self._mavlink.MAVLink_param_set_message(*self._address, name, value, parameter.type))
+            if self._wait(lambda: parameter.name in self._parameters, wait_s):
+                return self._parameters[parameter.name]
+        raise SensorError(
+            "autopilot_not_set",
+            f"{self._where} does not answer that {parameter.name} was set",
+            "Check the cable. What was written so far is in the journal; the same command goes on from there",
+        )
+
+    def ask_for(self, message: str, interval_us: float) -> None:
+        """Have a message sent that often. Raises SensorError `autopilot_message_refused`."""
+        number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
+        answer = self._command(SET_INTERVAL, number, interval_us)
+        if answer != ACCEPTED:
+            said = "nothing" if answer is None else f"result {answer}"
+            raise SensorError(
+                "autopilot_message_refused",
+                f"{self._where} answers {said} to the request for {message}",
+                "Choose another message with mavlink.imu: not every firmware has all of them",
+            )
+
+    def identify(self) -> None:
+        """Ask for its version and its own number, which some do not tell."""
+        for wait_s in self._waits()[:2]:
+            self._send(self._command_message(REQUEST_MESSAGE, AUTOPILOT_VERSION, 0.0))
+            if self._wait(lambda: self._version is not None, wait_s):
+                break
+        if self._version is not None:
+            version = self._version.flight_sw_version
+            uid = bytes(self._version.uid2).strip(b"\0").hex() or f"{self._version.uid:016x}".strip("0")
+            said = f"{version >> 24}.{version >> 16 & 255}.{version >> 8 & 255}"
+            known = self.known
+            self.autopilot = Autopilot(known.system, known.component, known.firmware, said, uid)
+
+    def start(self) -> None:
+        """Start to take the stream's silence for a fault."""
+        with self._news:
+            self._streaming, self._idle_reads, self._clock_at_message_s = True, 0, None
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Raises what went wrong meanwhile: `mavlink_link_lost`, `autopilot_armed`, what a consumer raised.
+
+        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        """
+        if self._fault is not None:
+            raise self._fault
+        with self._news:
+            self._clock_s = self._clock_s if clock_s is None else clock_s
+            silent_s = self._silent_s
+        if self._streaming and silent_s > SILENCE_S:
+            raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
+
+    def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
+        """Whether it was so in time. Raises what went wrong meanwhile."""
+        return self._wait(until, timeout_s)
+
+    def close(self) -> None:
+        """Lets messages come as often as they did before, and closes the port. May be called twice."""
+        if self._closing.is_set():
+            return
+        with suppress(SensorError):
+            for message in self.wanted if self.autopilot is not None else ():
+                number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
+                self._send(self._command_message(SET_INTERVAL, number, 0.0))
+        self._closing.set()
+        self._reader.join()
+        self._port.close()
+
+    # -- inside ----------------------------------------------------------------------------------------------------
+    @property
+    def _where(self) -> str:
+        return f"sensors.{self._sensor}: the autopilot at {self.port}"
+
+    @property
+    def _address(self) -> tuple[int, int]:
+        return self.known.system, self.known.component
+
+    @property
+    def _silent_s(self) -> float:
+        """How long no message has come, in time spent reading, nor longer than by another instrument's clock."""
+        silent_s = self._idle_reads * READ_TIMEOUT_S
+        if self._clock_s is None:
+            return silent_s
+        if self._clock_at_message_s is None:
+            self._clock_at_message_s = self._clock_s
+        return min(silent_s, self._clock_s - self._clock_at_message_s)
+
+    def _find(self) -> None:
+        if not self._wait(lambda: self.autopilot is not None, self._timeout_s):
+            if self._others_seen:
+                raise SensorError(
+                    "mavlink_other_device",
+                    f"{self._where}: who speaks MAVLink there is neither ArduPilot nor PX4",
+                    "Connect the autopilot itself, not a radio or a camera",
+                )
+            if self._bytes_seen:
+                raise SensorError(
+                    "mavlink_no_message",
+                    f"{self._bytes_seen} bytes came from {self._where} at {self._baud} Bd, and no message in them",
+                    "Set mavlink.baud to the speed of that port of the autopilot (SERIALn_BAUD, SER_TELn_BAUD), and "
+                    "see that the port speaks MAVLink 2",
+                )
+            raise SensorError("no_autopilot", f"{self._where}: nothing came within {self._timeout_s:g} s", _CABLE)
+        if self.armed:
+            raise self._armed()
+
+    def _armed(self) -> SensorError:
+        return SensorError(
+            "autopilot_armed",
+            f"{self._where} is armed: its motors may turn",
+            "Disarm it, and take the propellers off before anything else",
+        )
+
+    def _waits(self) -> list[float]:
+        return [self._timeout_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
+
+    def _wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
+        with self._news:
+            done = self._news.wait_for(lambda: until() or self._fault is not None, timeout_s)
+            if self._fault is not None:
+                raise self._fault
+            return done
+
+    def _command(self, command: int, first: float, second: float) -> int | None:
+        with self._news:
+            self._answers.pop(command, None)
+        for wait_s in self._waits():
+            self._send(self._command_message(command, first, second))
+            if self._wait(lambda: command in self._answers, wait_s):
+                return self._answers[command]
+        return None
+
+    def _command_message(self, command: int, first: float, second: float) -> Any:
+        return self._mavlink.MAVLink_command_long_message(*self._address, command, 0, first, second, 0, 0, 0, 0, 0)
+
+    def _send(self, message: Any) -> None:
+        try:
+            with self._sending:
+                self._port.write(message.pack(self._parser))
+                self._parser.seq = (self._parser.seq + 1) % 256
+        except OSError as error:
+            raise self._port_closed(error) from error
+
+    def _port_closed(self, error: Exception) -> SensorError:
+        return SensorError("mavlink_link_lost", f"{self._where}: the port closed: {error}", _CABLE)
+
+    # -- the reader's thread ---------------------------------------------------------------------------------------
+    def _read(self) -> None:
+        beaten_s = 0.0
+        heartbeat = self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3)
+        try:
+            while not self._closing.is_set():
+                if time.monotonic() - beaten_s > HEARTBEAT_S:
+                    beaten_s = time.monotonic()
+                    self._send(heartbeat)
+                self._take(self._port.read(), time.monotonic())
+        except OSError as error:
+            self._fault = self._fault or self._port_closed(error)
+        except SensorError as error:
+            self._fault = self._fault or error
+        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
+            failed = SensorError("mavlink_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
+            self._fault = self._fault or failed
+        with self._news:
+            self._news.notify_all()
+
+    def _take(self, data: bytes, host_time_s: float) -> None:
+        found: list[tuple[Any, bool]] = []
+        with self._news:
+            self._bytes_seen += len(data)
+            heard = False
+            for message in (self._parser.parse_buffer(data) or []) if data else []:
+                if message.get_type() == "BAD_DATA" or not self._is_its(message):
+                    continue
+                heard, lost = True, self.counter.lost
+                if not self.counter.is_new(message.get_seq(), bytes(message.get_msgbuf())):
+                    continue
+                self._note(message)
+                if message.get_type() in self.wanted:
+                    found.append((message, self.counter.lost == lost))
+            # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
+            if found if self._streaming else heard:
+                self._idle_reads, self._clock_at_message_s = 0, self._clock_s
+            else:
+                self._idle_reads += 1
+            if self.armed and self._streaming:
+                raise self._armed()
+            if data:
+                self._news.notify_all()
+        if found and self._on_messages is not None:
+            self._on_messages(found, host_time_s)
+            with self._news:
+                self._news.notify_all()
+
+    def _is_its(self, message: Any) -> bool:
+        """Whether the autopilot sent it; the first heartbeat of one says which it is."""
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if self.autopilot is None and message.get_type() == "HEARTBEAT":
+            if message.autopilot in FIRMWARES:
+                self.autopilot = Autopilot(*source, message.autopilot)
+            else:
+                self._others_seen += 1
+        return self.autopilot is not None and source == self._address
+
+    def _note(self, message: Any) -> None:
+        match message.get_type():
+            case "HEARTBEAT":
+                self.armed = bool(message.base_mode & ARMED)
+            case "PARAM_VALUE":
+                name = message.param_id
+                field = payload_field(bytes(message.get_msgbuf()))
+                self._parameters[name] = Parameter(name, message.param_type, field, self.known.firmware)
+            case "COMMAND_ACK":
+                self._answers[message.command] = message.result
+            case "AUTOPILOT_VERSION":
+                self._version = message

@@ -1,0 +1,242 @@
+"""The configured IMUs of one autopilot as a source of samples: rates asked for, corrections undone."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from math import radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.mavlink_section import MavlinkSection
+from rig.config.sensor_catalogue import PARTS
+from rig.config.sensor_sections import SensorSection
+from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.sensors.errors import SensorError
+from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals
+from rig.sensors.mavlink.counting import ImuCounter
+from rig.sensors.mavlink.link import Link
+from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
+from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.source import OnSamples
+
+FULL_SCALE_COUNTS = 1 << 30  # what a channel's range is divided into: far finer than what is sent
+DEGREES_PER_COUNT = 0.01
+RATE_LOOK = 40  # messages by which the rate is judged
+RATE_WAIT_S = 20.0
+RATE_TOLERANCE = 0.05
+WIDEST = 0.98  # of what 16 bits hold, where undoing a correction may have shifted the end of the scale
+
+
+class _Imu:
+    """One configured IMU of the stream: its correction, its numbers, the intervals of its first messages."""
+
+    def __init__(self, name: str, section: SensorSection) -> None:
+        self.name, self.section, self.line = name, section, line_of(section)
+        self.described = describe(name, section)
+        self.correction = Correction()
+        self.counter = ImuCounter(name, 1e6 / section.rate_hz, UNIT_US[self.line.imu])
+        self.intervals_us: list[int] = []
+
+    def take(self, message: Any, *, whole: bool) -> tuple[int, int, Reading] | None:
+        """Number, time and reading; None of a copy. `whole`: none was lost since the message before."""
+        reading = reading_of(message)
+        before_us, first = self.counter.time_us, self.counter.number < 0
+        if not self.counter.count(reading.time):
+            return None
+        if whole and not first and len(self.intervals_us) < RATE_LOOK:
+            self.intervals_us.append(self.counter.time_us - before_us)
+        return self.counter.number, self.counter.time_us, reading
+
+    def samples(self, taken: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
+        """Samples of the readings, numbered from the number `first`."""
+        samples = np.zeros(len(taken), self.described.sample_dtype)
+        samples["sequence"] = [number - first for number, _, _ in taken]
+        samples["board_time_us"] = [time_us for _, time_us, _ in taken]
+        samples["host_time_s"] = host_time_s
+        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for _, _, each in taken]
+        rates = self.correction.raw_rate(np.array([each.rate_rad_s for _, _, each in taken]))
+        samples["counts"] = _counts(rates, self.described.channel(RATE))
+        if self.described.measures(ACCELERATION):
+            forces = self.correction.raw_force(np.array([each.force_m_s2 for _, _, each in taken]))
+            samples["acceleration_counts"] = _counts(forces, self.described.channel(ACCELERATION))
+        return samples
+
+
+class MavlinkSource:
+    """The autopilot's configured IMUs, set up: parameters read, rates asked for and seen to come."""
+
+    def __init__(self, sections: Mapping[str, SensorSection], on_samples: OnSamples) -> None:
+        """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
+        self._on_samples, self._started = on_samples, False
+        self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
+        self._first: dict[str, int] = {}
+        (name, section), *_ = sections.items()
+        line = line_of(section)
+        self.link = Link(name, line.port, line.baud, self._take)
+        try:
+            self.link.identify()
+            for refusal in (*unfinished(self.link), *self._judge()):
+                raise refusal
+            self.link.wanted = frozenset(self._imus)
+            for message, imu in self._imus.items():
+                self.link.ask_for(message, imu.counter.interval_us)
+            self._see_rates()
+        except BaseException:
+            self.link.close()
+            raise
+
+    @property
+    def corrected(self) -> Mapping[str, str]:
+        """Settings that were changed: none, to read an autopilot."""
+        return {}
+
+    @property
+    def sensors(self) -> Mapping[str, RecordedSensor]:
+        """The configured IMUs by name."""
+        return {imu.name: imu.described for imu in self._imus.values()}
+
+    def start(self) -> None:
+        """Start to hand samples on, as of `SampleSource`."""
+        self._started = True
+        self.link.start()
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Check the autopilot, as of `SampleSource`. Raises SensorError as `Link.check`."""
+        self.link.check(clock_s)
+
+    def _judge(self) -> Iterator[SensorError]:
+        for imu in self._imus.values():
+            found, problems = judged(self.link, imu.name, imu.section)
+            yield from problems
+            if not problems:
+                imu.correction = correction_of(names_of(self.link.known.firmware, imu.line), found)
+
+    def _see_rates(self) -> None:
+        imus = self._imus.values()
+        self.link.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
+        for imu in imus:
+            asked_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
+            came_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
+            if abs(came_hz / asked_hz - 1.0) > RATE_TOLERANCE:
+                raise SensorError(
+                    "autopilot_rate",
+                    f"sensors.{imu.name}: {imu.line.imu} was asked for {asked_hz:g} times a second and comes "
+                    f"{came_hz:.1f} times",
+                    "Lower rate_hz: the autopilot sends no faster than its main loop and its line allow",
+                )
+
+    def _take(self, messages: list[tuple[Any, bool]], host_time_s: float) -> None:
+        """Hand over samples of each IMU, on the reader's thread; before the start only the rates are seen."""
+        taken: dict[str, list[tuple[int, int, Reading]]] = {}
+        for message, whole in messages:
+            kind = message.get_type()
+            found = self._imus[kind].take(message, whole=whole)
+            if found is not None and self._started:
+                self._first.setdefault(kind, found[0])
+                taken.setdefault(kind, []).append(found)
+        for kind, each in taken.items():
+            imu = self._imus[kind]
+            self._on_samples(imu.name, imu.samples(each, self._first[kind], host_time_s))
+
+
+def judged(link: Link, name: str, section: SensorSection) -> tuple[Mapping[str, float], list[SensorError]]:
+    """The parameters' values of the configured IMU, and what speaks against reading it."""
+    line = line_of(section)
+    known = link.known
+    names = names_of(known.firmware, line)
+    several = names.others if line.imu == "HIGHRES_IMU" else ()
+    asked = link.parameters(names.needed, [*names.off, *several])
+    found = {each: parameter.value for each, parameter in asked.items()}
+    problems = list(refusals(f"sensors.{name}", names, found))
+    if line.uid is not None and known.uid != line.uid:
+        problems.append(
+            SensorError(
+                "autopilot_other_uid",
+                f"sensors.{name}: the autopilot at {line.port} has the number {known.uid or 'unknown'}, the "
+                f"configuration says {line.uid}",
+                "Correct mavlink.uid in the configuration, or connect that autopilot",
+            )
+        )
+    if any(found.get(each, 0.0) for each in several):
+        problems.append(
+            SensorError(
+                "autopilot_several_imus",
+                f"sensors.{name}: this autopilot has several IMUs, and HIGHRES_IMU is of whichever it prefers just now",
+                "Read them by SCALED_IMU, SCALED_IMU2 and SCALED_IMU3",
+            )
+        )
+    return found, problems
+
+
+def describe(name: str, section: SensorSection) -> RecordedSensor:
+    """What a reader of its samples must know."""
+    cut = is_cut(line_of(section).imu)
+    channels = [
+        _channel(RATE, radians(section.range_deg_s), MILLI if cut else None),
+        of_thermometer(DEGREES_PER_COUNT, 0.0),
+    ]
+    if section.acceleration is not None:
+        range_m_s2 = (section.acceleration.range_g or PARTS[section.part].ranges_g[0]) * STANDARD_GRAVITY_M_S2
+        step = MILLI * STANDARD_GRAVITY_M_S2 if cut else None
+        channels.append(_channel(ACCELERATION, range_m_s2, step))
+    return RecordedSensor(
+        part=section.part,
+        serial_number=section.serial_number,
+        rate_hz=section.rate_hz,
+        channels=tuple(channels),
+        mounting=recorded_mounting(section.mounting),
+        clock=name,
+    )
+
+
+@contextmanager
+def mavlink(sections: Mapping[str, SensorSection], on_samples: OnSamples) -> Iterator[MavlinkSource]:
+    """The IMUs at one port for the length of the `with` block. Raises SensorError as `MavlinkSource`."""
+    source = MavlinkSource(sections, on_samples)
+    try:
+        yield source
+    finally:
+        source.link.close()
+
+
+def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
+    """What there is and what is wrong with it; nothing is changed. Raises SensorError as `Link`."""
+    (first, section), *_ = sections.items()
+    line = line_of(section)
+    with Link(first, line.port, line.baud) as link:
+        link.identify()
+        yield f"{link.known.words}, at {line.port}"
+        yield from unfinished(link)
+        for name, each in sections.items():
+            names = names_of(link.known.firmware, line_of(each))
+            found, problems = judged(link, name, each)
+            yield from problems
+            if not problems:
+                undone = [f"{each}: {found[each]:g}" for each in names.needed if each in found]
+                yield f"{name}: {line_of(each).imu}; undone: {', '.join(undone)}"
+                yield f"{name}: the low-pass delays rates by {1e3 * delay_s(names, found):.1f} ms"
+
+
+def line_of(section: SensorSection) -> MavlinkSection:
+    """The section that says which IMU it is."""
+    if section.mavlink is None:
+        raise ValueError("the configuration lets no IMU of an autopilot pass without its section")
+    return section.mavlink
+
+
+def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Channel:
+    """The channel of three axes; `sent` is the unit of the whole numbers that are sent, None where none are."""
+    per_count = end_of_scale / FULL_SCALE_COUNTS
+    widest = end_of_scale if sent is None else min(end_of_scale, WIDEST * INT16_MAX * sent)
+    channel = of_three_axes(quantity, per_count, round(widest / per_count), end_of_scale)
+    return channel if sent is None else replace(channel, step=CUT_STEPS * sent)
+
+
+def _counts(values: NDArray[np.float64], channel: Channel) -> NDArray[np.float64]:
+    limit = 2.0 * FULL_SCALE_COUNTS - 1
+    return np.clip(np.rint(values / channel.unit_per_count), -limit, limit)

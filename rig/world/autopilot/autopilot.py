@@ -1,0 +1,208 @@
+"""The simulated autopilot: heartbeat, parameter protocol, message intervals, bytes in and out.
+
+Sources: the services of mavlink.io; ArduPilot, libraries/GCS_MAVLink/GCS_Common.cpp and GCS_Param.cpp; PX4,
+src/modules/mavlink.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from rig.errors.extras import missing_extra
+from rig.world.autopilot.imu import RATE_HZ, Imu
+from rig.world.autopilot.parameters import Parameters
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+HEARTBEAT_S, ATTITUDE_S = 1.0, 0.1
+QUADROTOR, ACTIVE, STANDBY = 2, 4, 3
+AUTOPILOTS = {"ardupilot": 3, "px4": 12}
+VERSIONS = {"ardupilot": 0x04050700, "px4": 0x010E03FF}
+ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
+SCALED = {26: 0, 116: 1, 129: 2}  # SCALED_IMU, SCALED_IMU2, SCALED_IMU3: which IMU
+RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
+IMUS_FIRST = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
+FASTEST_S = 1.0 / RATE_HZ
+
+
+@dataclass(slots=True)
+class Faults:
+    """What a test can make wrong: fractions of messages `lost` and `doubled`, and of the asked that are sent."""
+
+    lost: float = 0.0
+    doubled: float = 0.0
+    slowest: float = 1.0
+    deaf: bool = False
+    camera: bool = False  # it says that it is none of the two autopilots
+
+
+class SimulatedAutopilot:
+    """The autopilot, switched on at the virtual time `time_s`, by when it has counted `on_for_s` seconds."""
+
+    def __init__(
+        self,
+        firmware: str,
+        imus: Sequence[Imu],
+        parameters: Parameters,
+        *,
+        baud: float,
+        uid: str,
+        clock_ppm: float,
+        on_for_s: float,
+        armed: bool,
+        seed: int,
+        time_s: float,
+    ) -> None:
+        try:
+            from pymavlink.dialects.v20 import ardupilotmega
+        except ImportError as error:
+            raise missing_extra(error, "autopilot") from error
+        self._mavlink: Any = ardupilotmega
+        self._out = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._in = ardupilotmega.MAVLink(None)
+        self._in.robust_parsing = True
+        self._firmware, self._imus, self.parameters = firmware, imus, parameters
+        self._baud = baud
+        self._uid, self.armed = bytes.fromhex(uid), armed
+        self.faults = Faults()
+        self._speed, self._began_s, self._on_for_s = 1.0 + 1e-6 * clock_ppm, time_s, on_for_s
+        self._random = Random(f"autopilot {seed}")
+        self._sent = bytearray()
+        self._steps = 0
+        self._due_s = {"heartbeat": 0.0, "attitude": 0.0}  # by its own clock since it was switched on
+        self._intervals_s: dict[int, float] = {}
+        self._next_s: dict[int, float] = {}
+
+    @property
+    def baud_rate(self) -> float:
+        """The speed of its port."""
+        return self._baud
+
+    def transmitted(self) -> bytes:
+        """What it has sent since it was asked last."""
+        data = bytes(self._sent)
+        self._sent.clear()
+        return data
+
+    def receive(self, data: bytes) -> None:
+        """Messages to it, in pieces of any size."""
+        for message in self._in.parse_buffer(data) or []:
+            if not self.faults.deaf and message.get_type() != "BAD_DATA":
+                self._obey(message)
+
+    def advance(self, time_s: float) -> None:
+        """Live until this virtual time, which lies in the laboratory's last tick."""
+        while (at_s := self._began_s + (self._steps + 1) / RATE_HZ / self._speed) <= time_s:
+            self._steps += 1
+            own_s = self._steps / RATE_HZ
+            now_us = round((self._on_for_s + own_s) * 1e6)
+            for imu in self._imus:
+                imu.step(at_s, now_us)
+            self._send_due(own_s, now_us)
+
+    # -- what it sends -----------------------------------------------------------------------------------------------
+    def _send_due(self, own_s: float, now_us: int) -> None:
+        if own_s >= self._due_s["heartbeat"]:
+            self._due_s["heartbeat"] += HEARTBEAT_S
+            mode, state = (128, ACTIVE) if self.armed else (0, STANDBY)
+            kind = 0 if self.faults.camera else AUTOPILOTS[self._firmware]
+            self._send(self._mavlink.MAVLink_heartbeat_message(QUADROTOR, kind, mode | 1, 0, state, 3))
+        if own_s >= self._due_s["attitude"]:
+            self._due_s["attitude"] += ATTITUDE_S
+            self._send(self._mavlink.MAVLink_attitude_message(now_us // 1000 % 2**32, 0, 0, 0, 0, 0, 0))
+        for number, interval_s in self._intervals_s.items():
+            if own_s >= self._next_s[number] - 1e-9:
+                late = own_s - self._next_s[number] > interval_s
+                self._next_s[number] = (own_s if late else self._next_s[number]) + interval_s / self.faults.slowest
+                self._send_imu(number, now_us)
+
+    def _send_imu(self, number: int, now_us: int) -> None:
+        imu = self._imus[IMUS_FIRST[number]]
+        px4 = self._firmware == "px4"
+        time_us = imu.time_us if px4 else now_us
+        if number == HIGHRES_IMU:
+            values = (*imu.force.tolist(), *imu.rate.tolist(), 0, 0, 0, 1013.0, 0, 0, imu.temperature_c + 3.0, 0x3F, 0)
+            self._send(self._mavlink.MAVLink_highres_imu_message(time_us, *values))
+            return
+        # A float handed to an integer is cut toward zero.
+        forces = [_int16(1000 * each / STANDARD_GRAVITY_M_S2) for each in imu.force]
+        rates = [_int16(1000 * each) for each in imu.rate]
+        centi = _int16(100 * imu.temperature_c)
+        if number == RAW_IMU:
+            message = self._mavlink.MAVLink_raw_imu_message(time_us, *forces, *rates, 0, 0, 0, 0, centi)
+        else:
+            kind = self._mavlink.mavlink_map[number]
+            message = kind(time_us // 1000 % 2**32, *forces, *rates, 0, 0, 0, centi)
+        self._send(message)
+
+    def _send(self, message: Any) -> None:
+        data = message.pack(self._out)
+        self._out.seq = (self._out.seq + 1) % 256
+        if self.faults.lost and self._random.random() < self.faults.lost:
+            return
+        self._sent += data
+        if self.faults.doubled and self._random.random() < self.faults.doubled:
+            self._sent += data
+
+    # -- what it is told ---------------------------------------------------------------------------------------------
+    def _obey(self, message: Any) -> None:
+        match message.get_type():
+            case "PARAM_REQUEST_READ" if message.param_index < 0:
+                self._tell(message.param_id)
+            case "PARAM_REQUEST_LIST":
+                for name in self.parameters.names:
+                    self._tell(name)
+            case "PARAM_SET" if message.param_id in self.parameters:
+                field = _field_of(message)
+                self.parameters.set_field(message.param_id, field)
+                self._tell(message.param_id)
+            case "COMMAND_LONG":
+                result = self._command(message)
+                self._send(self._mavlink.MAVLink_command_ack_message(message.command, result))
+
+    def _tell(self, name: str) -> None:
+        """A parameter that it does not have it says nothing of, as both do."""
+        if name not in self.parameters:
+            return
+        names = self.parameters.names
+        number = np.frombuffer(self.parameters.field(name), "<f4")[0]
+        kind, place = self.parameters.types[name], names.index(name)
+        message = self._mavlink.MAVLink_param_value_message(name.encode(), float(number), kind, len(names), place)
+        self._send(message)
+
+    def _command(self, message: Any) -> int:
+        if message.command == 512 and int(message.param1) == AUTOPILOT_VERSION:
+            uid = list(self._uid.ljust(18, b"\0"))
+            zeros = [0] * 8
+            version = VERSIONS[self._firmware]
+            self._send(
+                self._mavlink.MAVLink_autopilot_version_message(0, version, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0, uid)
+            )
+            return ACCEPTED
+        if message.command != 511:
+            return UNSUPPORTED
+        number, interval_us = int(message.param1), message.param2
+        if number not in IMUS_FIRST or IMUS_FIRST[number] >= len(self._imus) or isnan(interval_us):
+            return DENIED
+        if number == RAW_IMU and self._firmware == "px4":
+            return DENIED
+        if interval_us <= 0:  # never, or as often as it would by itself, which is never
+            self._intervals_s.pop(number, None)
+            return ACCEPTED
+        self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)
+        self._next_s[number] = self._steps / RATE_HZ
+        return ACCEPTED
+
+
+def _int16(value: float) -> int:
+    return int(np.clip(value, -32768, 32767))
+
+
+def _field_of(message: Any) -> bytes:
+    """The four bytes of the value of a PARAM_SET."""
+    frame = bytes(message.get_msgbuf())
+    begin = 10 if frame[0] == 0xFD else 6
+    return frame[begin : begin + 4]

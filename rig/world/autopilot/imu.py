@@ -1,0 +1,108 @@
+"""One IMU of a simulated autopilot: what its part reads, what the firmware makes of it before it is sent."""
+
+from collections.abc import Callable, Sequence
+from math import cos, pi, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.emulator.accelerometer import Accelerometer
+from firmware_host.emulator.gyroscope import Gyroscope
+from rig.world.autopilot.parameters import Parameters
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.ur10e.forward_kinematics import rotation_from_vector
+
+RATE_HZ = 400.0  # at which it is read: a quick main loop's
+AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
+TURNS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
+Vector = NDArray[np.float64]
+
+
+class LowPass:
+    """ArduPilot's LowPassFilter2p: a Butterworth of second order, at zero cut-off none."""
+
+    def __init__(self) -> None:
+        self._cutoff_hz = -1.0
+        self._before: list[Vector] = []
+
+    def apply(self, value: Vector, cutoff_hz: float) -> Vector:
+        """What comes out of it for the next reading."""
+        if cutoff_hz <= 0:
+            return value
+        if cutoff_hz != self._cutoff_hz:
+            self._cutoff_hz, self._before = cutoff_hz, []
+            ohm = tan(pi * cutoff_hz / RATE_HZ)
+            whole = 1 + 2 * cos(pi / 4) * ohm + ohm**2
+            self._b0 = ohm**2 / whole
+            self._a1, self._a2 = 2 * (ohm**2 - 1) / whole, (1 - 2 * cos(pi / 4) * ohm + ohm**2) / whole
+        if not self._before:
+            settled = value / (1 + self._a1 + self._a2)  # as if it had been so for ever
+            self._before = [settled, settled]
+        first, second = self._before
+        held = value - self._a1 * first - self._a2 * second
+        self._before = [held, first]
+        filtered: Vector = self._b0 * (held + 2 * first + second)
+        return filtered
+
+
+class Imu:
+    """An IMU, the `place`-th of its autopilot. `step` reads it; `rate` and `force` are what the firmware has of it."""
+
+    def __init__(
+        self,
+        place: int,
+        truth: SensorTruth,
+        motion_at: Callable[[float], Sequence[float]],
+        parameters: Parameters,
+        *,
+        px4: bool,
+        seed: np.random.SeedSequence,
+    ) -> None:
+        self._place, self._parameters, self._px4 = place, parameters, px4
+        self._gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        assert truth.accelerometer is not None, "an autopilot's IMU always has one"
+        self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
+        self._low_passes = (LowPass(), LowPass())
+        self._sum, self._summed = np.zeros((2, 3)), 0
+        self.rate, self.force = np.zeros(3), np.zeros(3)
+        self.temperature_c = 25.0
+        self.time_us = 0  # of the reading, by the autopilot's clock
+        nth = str(place + 1) if place else ""
+        if px4:
+            stems = (f"CAL_GYRO{place}_{{}}OFF", f"CAL_ACC{place}_{{}}OFF", f"CAL_ACC{place}_{{}}SCALE")
+        else:
+            gyro = f"INS_GYR{nth}OFFS" if place else "INS_GYROFFS"
+            stems = (f"{gyro}_{{}}", f"INS_ACC{nth}OFFS_{{}}", f"INS_ACC{nth}SCAL_{{}}")
+        self._names = [[stem.format(axis) for axis in "XYZ"] for stem in stems]
+
+    def step(self, at_s: float, time_us: int) -> None:
+        """Read it once at the virtual time, which is `time_us` by the autopilot's clock."""
+        offset, force_offset, force_scale = (
+            np.array([self._parameters[name] for name in names]) for names in self._names
+        )
+        self.temperature_c = self._gyroscope.temperature_c(at_s)
+        turned = board_turn(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
+        rate = turned @ (np.array(self._gyroscope.read(at_s)) - offset)
+        force = turned @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
+        if self._px4:
+            self._sum += (rate, force)
+            self._summed += 1
+            if self._summed == AVERAGED:
+                self.rate, self.force = self._sum / AVERAGED
+                self._sum, self._summed, self.time_us = np.zeros((2, 3)), 0, time_us
+            return
+        self.rate = self._low_passes[0].apply(rate, self._parameters["INS_GYRO_FILTER"])
+        self.force = self._low_passes[1].apply(force, self._parameters["INS_ACCEL_FILTER"])
+        self.time_us = time_us
+
+
+def board_turn(number: float) -> Vector:
+    """(3, 3) what an orientation of a few that are known turns readings by. Raises ValueError of another."""
+    if int(number) not in TURNS:
+        raise ValueError(f"the simulated autopilot has no orientation {number:g}")
+    turned = np.eye(3)
+    for axis, degrees in TURNS[int(number)]:
+        vector = [0.0, 0.0, 0.0]
+        vector[axis] = np.radians(degrees)
+        turned = np.array(rotation_from_vector((vector[0], vector[1], vector[2]))) @ turned
+    return turned

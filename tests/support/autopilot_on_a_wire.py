@@ -1,0 +1,132 @@
+"""A simulated autopilot on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
+
+import selectors
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rig.config.sensor_sections import SensorSection
+from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
+from rig.world.autopilot.autopilot import SimulatedAutopilot
+from rig.world.autopilot.imu import Imu
+from rig.world.autopilot.parameters import Parameters
+from rig.world.board.pty_port import PtyPort
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.board.serial_line import SerialLine
+
+UID = "0a0b0c0d0e0f"
+TICK_S = 0.0025
+STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+BIAS_RAD_S = (0.02, -0.03, 0.05)
+PERFECT = SimulatedSensorSection(
+    scale=(1, 1, 1),
+    bias_rad_s=BIAS_RAD_S,
+    noise_rad_s=1e-5,
+    accelerometer=SimulatedAccelerometerSection(noise_m_s2=1e-4),
+)
+
+
+def section(port: str, imu: str = "HIGHRES_IMU", **changes: Any) -> SensorSection:
+    """A configured IMU of the autopilot at `port`."""
+    line = {"port": port, "baud": changes.pop("baud", 921600), "imu": imu, "uid": changes.pop("uid", None)}
+    sensor = {"part": "mavlink", "serial_number": "FC-1", "mavlink": line, "acceleration": {"range_g": 16}, **changes}
+    return SensorSection.model_validate(sensor)
+
+
+class AutopilotOnAWire:
+    """The autopilot, `pace` times as fast as the clock on the wall."""
+
+    def __init__(
+        self,
+        firmware: Literal["ardupilot", "px4"],
+        left: Mapping[str, float],
+        motion_at: Callable[[float], Sequence[float]],
+        *,
+        imus: int = 1,
+        pace: float = 4.0,
+        on_for_s: float = 5.0,
+        file: Path | None = None,
+        dead: bool = False,
+        armed: bool = False,
+    ) -> None:
+        self.parameters = Parameters(firmware, imus, left, file)
+        self._firmware, self._motion_at, self._imus, self._pace = firmware, motion_at, imus, pace
+        self._on_for_s, self._armed = on_for_s, armed
+        self.time_s = 0.0
+        self.autopilot: SimulatedAutopilot | None = None
+        self.line = SerialLine(lambda: self.autopilot, seed=5)
+        self.line.silent = dead
+        self._selector = selectors.DefaultSelector()
+        self._pty = PtyPort(self.line, self._selector)
+        self.port = self._pty.path
+        self._ending = threading.Event()
+        self.switch_on()
+        self._thread = threading.Thread(target=self._live, daemon=True)
+        self._thread.start()
+
+    def switch_on(self) -> None:
+        truth = SensorTruth(section("x"), PERFECT)
+        px4 = self._firmware == "px4"
+        imus = [
+            Imu(place, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(place))
+            for place in range(self._imus)
+        ]
+        self.autopilot = SimulatedAutopilot(
+            self._firmware,
+            imus,
+            self.parameters,
+            baud=921600,
+            uid=UID,
+            clock_ppm=0.0,
+            on_for_s=self._on_for_s,
+            armed=self._armed,
+            seed=3,
+            time_s=self.time_s,
+        )
+
+    def switch_off(self) -> None:
+        self.autopilot = None
+
+    @property
+    def faults(self) -> Any:
+        assert self.autopilot is not None
+        return self.autopilot.faults
+
+    def close(self) -> None:
+        self._ending.set()
+        self._thread.join()
+        self._pty.close()
+        self._selector.close()
+
+    def _live(self) -> None:
+        began_s = time.monotonic()
+        while not self._ending.is_set():
+            behind = self.time_s < (time.monotonic() - began_s) * self._pace
+            for key, events in self._selector.select(0.0 if behind else 0.001):
+                key.data(events)
+            if behind:
+                self.time_s += TICK_S
+                if (alive := self.autopilot) is not None:
+                    alive.advance(self.time_s)
+                self.line.tick()
+                self._pty.tick()
+
+
+@contextmanager
+def autopilot_on_a_wire(
+    firmware: Literal["ardupilot", "px4"] = "ardupilot",
+    left: Mapping[str, float] | None = None,
+    motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
+    **of_it: Any,
+) -> Iterator[AutopilotOnAWire]:
+    """For the length of the `with` block; over a `dead` line nothing has ever come."""
+    wire = AutopilotOnAWire(firmware, left or {}, motion_at, **of_it)
+    try:
+        yield wire
+    finally:
+        wire.close()
