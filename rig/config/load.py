@@ -319,6 +319,9 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     for name in sorted(config.on_board.keys() & world.sensors.keys()):
         if world.sensors[name].kvh1775 is not None:
             yield f"world.sensors.{name}.kvh1775: no such instrument; the sensor is on the board"
+    for name in sorted(config.sensors.keys() & world.sensors.keys()):
+        if world.sensors[name].lines is not None and config.sensors[name].part != "lines":
+            yield f"world.sensors.{name}.lines: no such device; the sensor is a {config.sensors[name].part}"
 
 
 def _is_loopback(host: str) -> bool:

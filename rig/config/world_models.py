@@ -7,6 +7,7 @@ from pydantic import Field
 
 from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
 from rig.config.stage_section import StageMountSection
+from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
@@ -383,6 +384,7 @@ class SimulatedSensorSection(Section):
         default=SimulatedFieldSection(), description="the magnetometer beside it, of a `kvh1775` that sends format C"
     )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
+    lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
 
 
 class WorldSection(Section):

@@ -9,7 +9,8 @@ from typing import Protocol
 from rig.config.sensor_sections import SensorSection
 from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.source import describe, kvh1775, look
+from rig.sensors.kvh1775 import source as kvh1775
+from rig.sensors.lines import source as lines
 from rig.sensors.source import OnSamples, SampleSource
 
 
@@ -35,4 +36,9 @@ class Kind:
     look: Callable[[str, SensorSection], Iterator[str | SensorError]]
 
 
-OWN_PORT: Mapping[str, Kind] = MappingProxyType({"kvh1775": Kind(kvh1775, describe, look)})
+OWN_PORT: Mapping[str, Kind] = MappingProxyType(
+    {
+        "kvh1775": Kind(kvh1775.kvh1775, kvh1775.describe, kvh1775.look),
+        "lines": Kind(lines.lines, lines.describe, lines.look),
+    }
+)

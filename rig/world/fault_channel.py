@@ -15,6 +15,8 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
+    printer_fault sensor bit_error_rate lose stuck silent host_baud   of a device that prints lines, as above
+    printer_power sensor on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
@@ -27,6 +29,7 @@ from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
+from rig.world.lines.mounting import PrinterMount
 
 Reply = dict[str, Any]
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
@@ -41,6 +44,8 @@ class World(Protocol):
 
     @property
     def kvh_lines(self) -> Mapping[str, SerialLine]: ...
+    @property
+    def printer_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
     def close_dashboard(self) -> None: ...
@@ -85,6 +90,8 @@ class ControlSession:
             "silence_arm": self._silence_arm,
             "kvh_fault": self._kvh_fault,
             "kvh_power": self._kvh_power,
+            "printer_fault": self._printer_fault,
+            "printer_power": self._printer_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
@@ -215,6 +222,25 @@ class ControlSession:
         mounts = self._world.laboratory.kvhs
         if sensor not in mounts:
             raise ValueError(f"no KVH 1775 {sensor!r}; there are {', '.join(mounts) or 'none'}")
+        return mounts[sensor]
+
+    def _printer_fault(self, sensor: str, *, lose: int = 0, stuck: bool | None = None, **of_line: float) -> None:
+        printer = self._printer(sensor).printer
+        if printer is None:
+            raise ValueError(f"the device {sensor!r} is switched off")
+        printer.faults.lose += int(lose)
+        printer.faults.stuck = printer.faults.stuck if stuck is None else bool(stuck)
+        for name in of_line.keys() & {"bit_error_rate", "silent", "host_baud"}:
+            setattr(self._world.printer_lines[sensor], name, of_line[name])
+
+    def _printer_power(self, sensor: str, on: bool) -> None:
+        mount = self._printer(sensor)
+        self._world.laboratory.switch_on_printer(sensor) if on else mount.switch_off()
+
+    def _printer(self, sensor: str) -> PrinterMount:
+        mounts = self._world.laboratory.printers
+        if sensor not in mounts:
+            raise ValueError(f"no device that prints lines {sensor!r}; there are {', '.join(mounts) or 'none'}")
         return mounts[sensor]
 
     def _silence_board(self, on: bool) -> None:

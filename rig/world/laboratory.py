@@ -18,6 +18,7 @@ from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_u
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
+from rig.world.lines.mounting import printer_mounts
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.site import site_of
 from rig.world.ur10e.flange_motion import Felt
@@ -74,13 +75,20 @@ class Laboratory:
         self._mount = np.eye(3)  # from the flange's frame to the item's
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
+        self.printers = printer_mounts(config, world)
         self.plug_in()
         for name in self.kvhs:
             self.switch_on(name)
+        for name in self.printers:
+            self.switch_on_printer(name)
 
     def switch_on(self, name: str) -> None:
         """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
         self.kvhs[name].switch_on(self._motion_of, self._field_of, self._time_s)
+
+    def switch_on_printer(self, name: str) -> None:
+        """Give the device that prints lines of that name power, if it has none."""
+        self.printers[name].switch_on(self._motion_of, self._field_of, self._time_s)
 
     @property
     def _time_s(self) -> float:
@@ -148,6 +156,9 @@ class Laboratory:
         for mount in self.kvhs.values():
             if mount.kvh is not None:
                 mount.kvh.advance(self._time_s)
+        for place in self.printers.values():
+            if place.printer is not None:
+                place.printer.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:

@@ -59,7 +59,14 @@ class World:
             name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
             for name, mount in self.laboratory.kvhs.items()
         }
-        self.lines = (self.line, *self.kvh_lines.values())
+        self.printer_lines = {
+            name: SerialLine(partial(getattr, mount, "printer"), section.seed)
+            for name, mount in self.laboratory.printers.items()
+        }
+        for name, line in self.printer_lines.items():
+            if (printing := section.sensors[name].lines) is not None:
+                line.bit_error_rate = printing.bit_error_rate
+        self.lines = (self.line, *self.kvh_lines.values(), *self.printer_lines.values())
         self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
@@ -77,7 +84,7 @@ class World:
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
-                self._listen(f"sensors.{name}.serial.port", port, self.kvh_lines[name])
+                self._listen(f"sensors.{name}.serial.port", port, (self.kvh_lines | self.printer_lines)[name])
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
@@ -89,7 +96,12 @@ class World:
             for name, line in self.kvh_lines.items()
             if (kvh := section.sensors[name].kvh1775) is not None and kvh.pty
         }
-        self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
+        printer_ptys = {
+            name: _open_pty(line, self.network.selector)
+            for name, line in self.printer_lines.items()
+            if (printing := section.sensors[name].lines) is not None and printing.pty
+        }
+        self._ptys = [*([pty] if pty else []), *kvh_ptys.values(), *printer_ptys.values()]
         self._description = {
             "ready": True,
             "arm": host,
@@ -97,6 +109,7 @@ class World:
             "pty": pty.path if pty else None,
             "kvh_ports": kvh_ports,
             "kvh_ptys": {name: each.path for name, each in kvh_ptys.items()},
+            "printer_ptys": {name: each.path for name, each in printer_ptys.items()},
             "control": f"{host}:{control_port}",
         }
 

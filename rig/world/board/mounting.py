@@ -111,5 +111,7 @@ def _sensor(
             )
         case "kvh1775":
             raise ValueError("a KVH 1775 is on no board")
+        case "lines":
+            raise ValueError("a device that prints lines is on no board")
         case unmodelled:  # a new part: the type checker says so too
             assert_never(unmodelled)
