@@ -169,7 +169,10 @@ def _solve_sensor(
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
         uncertainty=(
-            budget(explained, unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate)))
+            budget(
+                explained,
+                unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate), sensor.stamp_std_s),
+            )
             if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
             else None
         ),

@@ -1,13 +1,11 @@
 """The section `lines` of a sensor: what stands in the lines that a device prints, one sample each."""
 
 from collections import Counter
-from math import pi
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.section import Positive, Section
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 ColumnName = Literal[
     "time", "sequence", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my", "mz", "temperature", "-"
@@ -15,11 +13,6 @@ ColumnName = Literal[
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
 SEPARATORS = {"comma": b",", "semicolon": b";", "tab": b"\t", "space": b" "}
 SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "ns": 1e-9}
-UNITS = {
-    "rad/s": 1.0, "deg/s": pi / 180, "mdeg/s": pi / 180e3, "mrad/s": 1e-3,
-    "m/s2": 1.0, "g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 * 1e-3,
-    "T": 1.0, "uT": 1e-6, "nT": 1e-9, "gauss": 1e-4, "mgauss": 1e-7,
-}  # fmt: skip
 GAP = "?"  # what `rig lines` writes where the readings do not tell it
 LONGEST_GAP_S = 2.0  # a device that is silent for longer is lost
 PRINTABLE = r"^[ -~]*$"
@@ -96,11 +89,20 @@ class LineFieldSection(Section):
 
 
 class LineTemperatureSection(Section):
-    """The column `temperature`, in °C: printed value × scale + offset."""
+    """The column `temperature`, in °C: printed value × scale + offset; or what is known of it where there is none."""
 
     scale: Scale = 1.0
     offset_c: float = Field(default=0.0, description="temperature at a printed 0")
     decimals: Decimals = None
+    stated_c: float | None = Field(
+        default=None,
+        ge=-40,
+        le=85,
+        description="without a column `temperature`: how warm the sensor is, stated",
+    )
+    stated_within_k: Positive = Field(
+        default=5.0, le=60, description="… and by how much that may change in the course of a run"
+    )
 
 
 class LinesSection(Section):
@@ -125,7 +127,7 @@ class LinesSection(Section):
     keys: tuple[Annotated[str, Field(min_length=1, max_length=40, pattern=PRINTABLE)], ...] = Field(
         default=(),
         max_length=40,
-        description="text before each number, if the device prints names: `[\"gx:\", \"gy:\", \"gz:\"]`; brackets and "
+        description='text before each number, if the device prints names: `["gx:", "gy:", "gz:"]`; brackets and '
         "separators between them do not matter",
         json_schema_extra={"allowed": "as many as `columns`"} | NOTHING,
     )
@@ -166,7 +168,9 @@ class LinesSection(Section):
     field: LineFieldSection | None = Field(
         default=None, description="the magnetometer's columns; recorded as the magnetometer `<sensor>_field`"
     )
-    temperature: LineTemperatureSection = Field(default=LineTemperatureSection(), description="the thermometer's column")
+    temperature: LineTemperatureSection = Field(
+        default=LineTemperatureSection(), description="the thermometer's column, or what is known without one"
+    )
 
     @field_validator("columns")
     @classmethod
@@ -195,6 +199,12 @@ class LinesSection(Section):
                 raise ValueError(f"give the column {column} and the section {key} both, or neither")
         if self.acceleration is not None and "ax" not in self.columns:
             raise ValueError("there is a section acceleration, but no columns ax ay az")
+        if ("temperature" in self.columns) == (self.temperature.stated_c is not None):
+            raise ValueError(
+                "it prints no temperature: state it as temperature: {stated_c: …}, a warm-up before the run keeps it"
+                if self.temperature.stated_c is None
+                else "it prints its temperature, so leave temperature.stated_c out"
+            )
         if self.clock == "device" and self.time is None:
             raise ValueError(
                 "the clock is the device's, but there is no column time: write clock: counted if the device samples by "

@@ -220,7 +220,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ),
             own_port=True,
         ),
-        "lines": Part(  # any device that prints lines: assumed to be as bad as the parts above; `uncertainty` says better
+        "lines": Part(  # any device: assumed to be as bad as the worst of the parts above; `uncertainty` says better
             rates_hz=(),
             rates_rule="any; what the device prints",
             ranges_deg_s=(),

@@ -6,8 +6,8 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
 from rig.config.lines_section import LinesSection
+from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
 from rig.config.section import (
     RATIO,
     Positive,
@@ -59,14 +59,14 @@ class OwnPortSection(Section):
     )
     message: Literal["A", "B", "C"] = Field(
         default="B",
-        description="of a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show without doubt "
-        "how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
+        description="of a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show "
+        "without doubt how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
         "field, recorded as the magnetometer `<sensor>_field`",
     )
     rotation: Literal["delta", "rate"] = Field(
         default="delta",
-        description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate after the "
-        "sensor's own filter",
+        description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
+        "after the sensor's own filter",
     )
 
     @field_validator("port")
@@ -113,7 +113,9 @@ class AccelerationSection(Section):
 class SensorSection(Section):
     """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
-    part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775", "lines"] = Field(description="which gyroscope it is; `lines` is any that prints its samples as lines")
+    part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775", "lines"] = Field(
+        description="which gyroscope it is; `lines` is any that prints its samples as lines"
+    )
     serial_number: str = Field(
         description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
         "its own, and another number is refused",

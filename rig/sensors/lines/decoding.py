@@ -103,7 +103,7 @@ class LineReader:
             text = self._keys_marked(text)
         classes = self._classes[text]
         good &= _hold_nothing_else(classes, line_starts, line_ends)
-        values, decimals = self._values(text, classes, line_starts, line_ends, good, right)
+        values, decimals = self._values(text, classes, (line_starts, line_ends), good, right)
         wrong_sums = int(np.count_nonzero(good & ~right))
         taken = good & right
         before = np.cumsum(taken)[~taken]
@@ -150,12 +150,12 @@ class LineReader:
         self,
         text: NDArray[np.uint8],
         classes: NDArray[np.uint8],
-        line_starts: NDArray[np.intp],
-        line_ends: NDArray[np.intp],
+        lines: tuple[NDArray[np.intp], NDArray[np.intp]],
         good: NDArray[np.bool_],
         right: NDArray[np.bool_],
     ) -> tuple[Array, Array]:
         """The numbers of lines that hold as many as there are columns, in order; `good` says afterwards which do."""
+        line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
         edges = np.flatnonzero(number[1:] != number[:-1])
         starts, ends = edges[::2], edges[1::2]
@@ -178,9 +178,7 @@ class LineReader:
             starts, ends = starts[ordered], ends[ordered]
         summed = right[good]
         starts, ends = starts[summed], ends[summed]
-        values, decimals = (
-            each.reshape(-1, self._columns) for each in numbers_at(text, starts.ravel(), ends.ravel())
-        )
+        values, decimals = (each.reshape(-1, self._columns) for each in numbers_at(text, starts.ravel(), ends.ravel()))
         numbers = np.isfinite(values).all(axis=1)
         good[np.flatnonzero(good & right)[~numbers]] = False
         return values[numbers], decimals[numbers]
@@ -199,9 +197,7 @@ def _hold_nothing_else(
     return good
 
 
-def _count(
-    places: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
-) -> NDArray[np.intp]:
+def _count(places: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
     """How many of `places`, which increase, lie in each line."""
     found: NDArray[np.intp] = np.searchsorted(places, line_ends) - np.searchsorted(places, line_starts)
     return found
@@ -227,9 +223,7 @@ def _of_lines(
 def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
     """What stands for each key while a line is looked at, of the same length; long keys first, that may hold others."""
     by_length = sorted(enumerate(keys), key=lambda each: -len(each[1]))
-    return MappingProxyType(
-        {key.encode(): bytes([_KEYS + place]) + b" " * (len(key) - 1) for place, key in by_length}
-    )
+    return MappingProxyType({key.encode(): bytes([_KEYS + place]) + b" " * (len(key) - 1) for place, key in by_length})
 
 
 def _classes(separator: bytes, *, keyed: bool) -> NDArray[np.uint8]:

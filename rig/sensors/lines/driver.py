@@ -77,6 +77,7 @@ class LinesDevice:
         section: LinesSection,
         rate_hz: float,
         on_values: OnValues | None = None,
+        *,
         timeout_s: float = FIRST_LINE_S,
     ) -> None:
         """Opens the port, and reads until samples come at the rate that is stated.

@@ -13,7 +13,6 @@ from rig.config.lines_section import (
     GYROSCOPE,
     MAGNETOMETER,
     SECONDS,
-    UNITS,
     LineAccelerationSection,
     LineFieldSection,
     LineRateSection,
@@ -30,6 +29,11 @@ from rig.sensors.lines.driver import LinesDevice
 from rig.sensors.lines.stamping import COARSE
 from rig.sensors.source import OnSamples
 
+UNITS = {
+    "rad/s": 1.0, "deg/s": radians(1), "mdeg/s": radians(1e-3), "mrad/s": 1e-3,
+    "m/s2": 1.0, "g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 * 1e-3,
+    "T": 1.0, "uT": 1e-6, "nT": 1e-9, "gauss": 1e-4, "mgauss": 1e-7,
+}  # fmt: skip
 FULL_SCALE_COUNTS = 1 << 30  # of numbers whose resolution nobody states: half of what 32 bits hold
 AT_THE_END = 1 - 1e-4  # of the range, where readings count as saturated: a count of 16 bits below it is none
 FIELD_FULL_SCALE_T = 1e-3
@@ -72,9 +76,7 @@ class LinesSource:
         """Ends the thread and closes the port."""
         self._device.close()
 
-    def _take(
-        self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float
-    ) -> None:
+    def _take(self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float) -> None:
         """Hand over the lines' numbers as samples, on the reader's thread."""
         columns = self._section.columns
         for name, sensor in self.sensors.items():
@@ -93,7 +95,7 @@ class LinesSource:
 
     def _temperatures(self, values: Array, channel: Channel) -> Any:
         if "temperature" not in self._section.columns:
-            return np.nan
+            return 0  # counts above what is stated
         told = self._section.temperature
         celsius = values[:, self._section.columns.index("temperature")] * told.scale + told.offset_c
         most = np.iinfo(np.int16).max
@@ -181,9 +183,9 @@ def _channel(quantity: Quantity, section: _OfTriad, full_scale: float) -> Channe
 
 
 def _thermometer(section: LinesSection) -> Channel:
-    if "temperature" not in section.columns:
-        return Channel(TEMPERATURE.name, "temperature_c", "<f8", 1.0)  # of numbers that are none
     told = section.temperature
+    if told.stated_c is not None:  # a thermometer whose steps are so wide that it shows no change
+        return of_thermometer(told.stated_within_k, told.stated_c)
     step = 0.0 if told.decimals is None else told.scale * 10.0**-told.decimals
     return of_thermometer(max(step, DEGREES_PER_COUNT), 0.0)
 

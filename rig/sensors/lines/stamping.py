@@ -1,4 +1,4 @@
-"""Which sample is which, and when it was taken: by the device's time, by counting, or by when its line arrived. Pure."""
+"""Which sample is which, and when it was taken: by the device's time, by counting, or by when a line arrived. Pure."""
 
 from dataclasses import dataclass, field
 from math import exp

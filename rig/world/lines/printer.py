@@ -6,19 +6,26 @@ It formats as C's and Python's own `%.3f` do, one number after another; nothing 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from math import fmod
+from math import fmod, radians
 from operator import xor
 
 import numpy as np
 
-from firmware_host.emulator.accelerometer import Accelerometer
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
 from firmware_host.emulator.gyroscope import Gyroscope
-from firmware_host.emulator.magnetometer import Magnetometer, MagnetometerTruth
-from rig.config.lines_section import GAP, SECONDS, UNITS, LinesSection
+from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
+from rig.config.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
 from rig.config.world_lines import SimulatedLinesSection
 from rig.world.board.sensor_truth import SensorTruth
 
 BETWEEN = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+# What one of each unit is, in rad/s, m/s² and T; and of each unit of time in one second.
+SIZES = {
+    "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": radians(1.0), "mdeg/s": radians(1e-3),
+    "g": STANDARD_GRAVITY_M_S2, "mg": 1e-3 * STANDARD_GRAVITY_M_S2, "m/s2": 1.0,
+    "gauss": GAUSS_T, "mgauss": 1e-3 * GAUSS_T, "uT": 1e-6, "nT": 1e-9, "T": 1.0,
+}  # fmt: skip
+IN_A_SECOND = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 USUAL_DECIMALS = 5
 LINE_END = b"\r\n"
 
@@ -125,13 +132,14 @@ class Printer:
         time = self._prints.time
         if time is None:
             return "0"
-        counted = (at_s - self._counted_from_s) * self._speed / SECONDS[time.unit]
+        counted = (at_s - self._counted_from_s) * self._speed * IN_A_SECOND[time.unit]
         counted = fmod(counted, time.wrap) if time.wrap else counted
         return f"{counted:.6f}" if time.unit == "s" else str(int(counted))
 
 
-def _printed(value: float, section: object) -> str:
+def _printed(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
     """A reading in SI units as the program formats it."""
-    unit, scale = getattr(section, "unit", GAP), getattr(section, "scale", 1.0)
-    decimals = getattr(section, "decimals", None)
-    return f"{value / scale / UNITS.get(unit, 1.0):.{USUAL_DECIMALS if decimals is None else decimals}f}"
+    if section is None:  # it prints them in SI units, and the rig does not read them
+        return f"{value:.{USUAL_DECIMALS}f}"
+    decimals = USUAL_DECIMALS if section.decimals is None else section.decimals
+    return f"{value / section.scale / SIZES[section.unit]:.{decimals}f}"
