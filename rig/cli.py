@@ -42,6 +42,7 @@ _COMMANDS = {
     "study": "Monte-Carlo studies of the papers' figures and tables; without a name, list them",
     "board": "look at the board, read and change its stored calibrations, flash its firmware",
     "kvh": "look at a KVH 1775",
+    "lines": "look at a device that prints lines, and write its section of a configuration",
     "world": "only the simulated laboratory, in the foreground, for any client",
 }
 _AT_ONCE = {  # what a command that begins by loading libraries for a second says before

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from rig.config.lines_section import LinesSection
+from rig.config.lines_section import GAP, LinesSection
 from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
 from rig.config.section import (
     RATIO,
@@ -243,6 +243,8 @@ class SensorSection(Section):
 
 def checked_serial_number(value: str) -> str:
     """Raises ValueError when the board could not keep it."""
+    if value == GAP:
+        raise ValueError("nobody but you knows it: write the number of this specimen here")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
         raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
     return value

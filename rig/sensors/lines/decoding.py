@@ -98,7 +98,7 @@ class LineReader:
             good &= self._begin_with(raw, line_starts, self._prefix)
             places = line_starts[good][:, None] + np.arange(len(self._prefix))
             text[places] = _BLANK
-        right = self._sums(raw, text, line_starts, line_ends) if self._summed else good
+        right = self._sums(raw, text, line_starts, line_ends) if self._summed else np.ones_like(good)
         if self._keys:
             text = self._keys_marked(text)
         classes = self._classes[text]
@@ -162,13 +162,13 @@ class LineReader:
         good &= _count(starts, line_starts, line_ends) == self._columns
         between = np.flatnonzero(classes == (_KEY if self._keys else _SEPARATOR))
         divided = bool(self._keys or self._separator)
+        wanted = self._columns if self._keys else self._columns - 1
         if divided:
-            wanted = self._columns if self._keys else self._columns - 1
             good &= _count(between, line_starts, line_ends) == wanted
         mine = _of_lines(starts, line_starts, line_ends, good)
         starts, ends = starts[mine].reshape(-1, self._columns), ends[mine].reshape(-1, self._columns)
         if divided:
-            between = between[_of_lines(between, line_starts, line_ends, good)].reshape(len(starts), -1)
+            between = between[_of_lines(between, line_starts, line_ends, good)].reshape(-1, wanted)
             if self._keys:
                 named = (text[between] == _KEYS + np.arange(self._columns)).all(axis=1)
                 ordered = (between < starts).all(axis=1) & (ends[:, :-1] <= between[:, 1:]).all(axis=1) & named
