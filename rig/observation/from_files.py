@@ -1,6 +1,5 @@
 """A recording of readings that were made elsewhere, from a file of them and one that tells their motion."""
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -11,13 +10,13 @@ import numpy as np
 from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
 from rig.data.quantity import RATE
-from rig.data.result_file import FileEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_import import read_sweeps
 from rig.observation.csv_samples import read_samples
+from rig.observation.sample_files import entry_of, whole
 
 NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
 
@@ -42,7 +41,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         for quantity, readings in samples.readings.items()
         for i, name in enumerate(quantity.columns)
     }
-    began = files.recorded or datetime.fromtimestamp(files.readings.stat().st_mtime, UTC)
+    began = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     read_elsewhere = ReadElsewhere(files.item, columns, files.tells, read(files.motion))
     return RunData(
         config="",
@@ -60,7 +59,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             reckoning=RECKONING,
             elsewhere=asked,
         ),
-        provenance=provenance_of_files(_named(files.readings), _named(files.motion), files.item, began),
+        provenance=provenance_of_files(entry_of(files.readings), entry_of(files.motion), files.item, began),
         sensors={files.item.name: read_elsewhere.sensor},
         samples={files.item.name: read_elsewhere.samples},
         turner=None,
@@ -68,8 +67,3 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         events=(),
         elsewhere=read_elsewhere,
     )
-
-
-def _named(path: Path) -> FileEntry:
-    with path.open("rb") as file:
-        return FileEntry(name=path.name, sha256=hashlib.file_digest(file, "sha256").hexdigest())

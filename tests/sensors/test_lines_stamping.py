@@ -63,7 +63,7 @@ def test_one_time_that_cannot_be_is_damage_three_are_a_restart() -> None:
 
 def test_coarse_times_are_made_even_and_never_meet() -> None:
     true_us = np.arange(20_000) * 1000 * (1 + 3e-5) + 300
-    stamper, numbers, times_us = stamped(rows(true_us // 1000), 1000, columns=FOUR, time={"unit": "ms"})
+    stamper, _, times_us = stamped(rows(true_us // 1000), 1000, columns=FOUR, time={"unit": "ms"})
     assert stamper.lost == 0 and (np.diff(times_us) > 0).all()
     off = (times_us - true_us)[5000:]
     assert off.std() < 150, "a millisecond is divided"
@@ -80,12 +80,11 @@ def test_arrival_times_are_made_even() -> None:
     """Bytes come in heaps, 0 to 16 ms late, as from an adapter that collects."""
     rng = np.random.default_rng(4)
     section = lines_section(acceleration=None, time=None, columns=("gx", "gy", "gz"), clock="arrival")
-    stamper, at = Stamper(section, 200.0), []
+    stamper = Stamper(section, 200.0)
     arrived = np.arange(12_000) / 200 + rng.uniform(0, 0.016, 12_000)
     heaps = np.split(np.arange(12_000), np.sort(rng.choice(12_000, 4000, replace=False)))
-    for heap in heaps:
-        if len(heap):
-            at.append(stamper.stamp(np.zeros((len(heap), 3)), 0, 50.0 + float(arrived[heap].max()))[2])
+    came = [(len(heap), 50.0 + float(arrived[heap].max())) for heap in heaps if len(heap)]
+    at = [stamper.stamp(np.zeros((count, 3)), 0, when_s)[2] for count, when_s in came]
     times_s = np.concatenate(at)[2000:] * 1e-6
     line = np.polyfit(np.arange(len(times_s)), times_s, 1)
     assert line[0] == pytest.approx(1 / 200, rel=1e-4)

@@ -1,4 +1,4 @@
-"""`rig lines` looks at a device that lies still and is then turned: the section is right, or says what it cannot tell."""
+"""`rig lines` looks at a device that lies still, then is turned: the section is right, or says what it cannot tell."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -132,7 +132,9 @@ FORMATS = {
         lambda r: text("%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", *deg(r), *g(r)), IMU,
         {"clock": "arrival"} | DEG | G_UNIT, ("when it took a sample",)),
     "NMEA": Format(
-        lambda r: summed("$IMU,%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f" % (1e6 * r["t"], *deg(r), *g(r))), f"time {IMU}",
+        lambda r: summed(
+            text("$IMU,%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", 1e6 * r["t"], *deg(r), *g(r)).decode().strip()
+        ), f"time {IMU}",
         US | {"prefix": "$IMU,", "checksum": "nmea"} | DEG | G_UNIT),
     "the serial plotter's names": Format(
         lambda r: text("gx:%.3f,gy:%.3f,gz:%.3f,ax:%.4f,ay:%.4f,az:%.4f,ms:%d", *deg(r), *g(r), 1e3 * r["t"]),

@@ -35,7 +35,7 @@ def sensor_section(port: str, *, rate_hz: float = 100, **changes: Any) -> Sensor
     read = {"acceleration": {"range_g": 8}} if lines.acceleration is not None else {}
     document = {
         "part": "lines", "serial_number": "L-1", "rate_hz": rate_hz, "range_deg_s": 500,
-        "serial": {"port": port, "baud": 115200}, "lines": lines.model_dump(), **read,
+        "serial": {"port": port, "baud": 921600}, "lines": lines.model_dump(), **read,
     }  # fmt: skip
     return SensorSection.model_validate(document)
 

@@ -128,7 +128,7 @@ class LinesDevice:
 
     @property
     def seen(self) -> Array:
-        """(n, columns) of what was read while it was looked at."""
+        """The values (n, columns) that were read while the device was looked at."""
         return np.concatenate(self._seen)
 
     def start(self) -> None:
@@ -217,7 +217,7 @@ class LinesDevice:
         return float(passed.sum()) * SECONDS[self._section.time.unit]
 
     def _measured_hz(self) -> float:
-        """By the median step of its time where that is fine, else by all of it."""
+        """Samples a second, by the median step of the device's time where that is fine, else by all of it."""
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")

@@ -19,7 +19,7 @@ COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
 COUNTS = (1 / 131, 1 / 65.5, 1 / 32.8, 1 / 16.4, 0.00875, 0.0175, 0.035, 0.07, 0.00625, 0.025, 0.1)
 SAME_SCALE = 0.03
 TURNED = 10.0  # times what a gyroscope does at rest it must do while it is turned
-FLAT_S = 0.2  # over which gravity's way round is looked at
+FLAT_S = 0.02  # over which gravity's way round is looked at: twice as long it is turned by a fifth of a radian at most
 TIMES = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 _NAMES = {
     "time": r"(time|timestamp|t|ts|ms|us|millis|micros|tick|ticks|uptime)(_?(us|ms|s|ns))?",
@@ -121,7 +121,7 @@ def _find_time(shape: Shape, found: Guess) -> None:
 
 def _tell_time(found: Guess, place: int, column: Array, unit: str) -> None:
     seen = _wrap(column)
-    if seen is None and (unit == "s" or unit == "ns" or column.max() >= 2**32):
+    if seen is None and (unit in {"s", "ns"} or column.max() >= 2**32):
         seen = 0
     if seen is None:
         found.told.append("the time did not wrap while it was looked at: 2^32 is taken, as of an Arduino")
@@ -179,7 +179,10 @@ def _kind(values: Array, still: Array) -> str | None:
     sizes = np.linalg.norm(values, axis=1)
     level = float(np.median(sizes[still]))
     scatter = float(np.linalg.norm(rest.std(axis=0)))
-    if np.linalg.norm(turned.std(axis=0)) > TURNED * max(scatter, 1e-9) and np.percentile(sizes[~still], 90) > 4 * level:
+    if (
+        np.linalg.norm(turned.std(axis=0)) > TURNED * max(scatter, 1e-9)
+        and np.percentile(sizes[~still], 90) > 4 * level
+    ):
         return "g"
     if level > 5 * scatter and abs(float(np.median(sizes[~still])) / level - 1) < 0.25:
         return "a" if _gravity(level) is not None else "m" if _field(level) is not None else None
@@ -227,7 +230,7 @@ def _unit(shape: Shape, found: Guess, kind: str, still: Array) -> dict[str, obje
 
 
 def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Array) -> tuple[str, float] | None:
-    """By how far gravity went round while the gyroscope read so much: its unit, whatever that is."""
+    """Unit and scale of the gyroscope, by how far gravity went round while it read so much."""
     if "ax" not in found.columns or not found.rate_hz:
         return None
     forces = shape.values[:, [found.columns.index("a" + axis) for axis in "xyz"]]

@@ -38,7 +38,9 @@ def listen(
             arrived_s = time.monotonic() - began_s
             lines += [Line(arrived_s, each.decode("ascii", "replace")) for each in whole if each]
     except OSError as error:
-        raise SensorError("lines_link_lost", f"the port {port} closed: {error}", "Check its supply and cable") from error
+        raise SensorError(
+            "lines_link_lost", f"the port {port} closed: {error}", "Check its supply and cable"
+        ) from error
     finally:
         serial.close()
     if not lines:

@@ -55,7 +55,7 @@ class LinesSource:
 
     @property
     def corrected(self) -> Mapping[str, str]:
-        """Nothing: there is no setting of the device that anybody could correct."""
+        """Settings that were corrected: none, for nothing is sent to the device."""
         return {}
 
     @property

@@ -1,4 +1,4 @@
-"""The section of a sensor as `rig lines` writes it: what the lines told, and a marked gap for what they did not. Pure."""
+"""The section of a sensor as `rig lines` writes it: what the lines told, and a gap for what they did not. Pure."""
 
 from collections.abc import Mapping
 

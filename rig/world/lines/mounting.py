@@ -37,7 +37,7 @@ class PrinterMount:
         sensor, simulated = self.config.sensors[self.name], self.world.sensors[self.name]
         if sensor.lines is None or sensor.serial is None:
             raise ValueError(f"{self.name} prints no lines")
-        section = simulated.lines or SimulatedLinesSection()
+        section, baud = simulated.lines or SimulatedLinesSection(), sensor.serial.baud
         prints = section.prints or sensor.lines
         if "ax" in prints.columns:  # it prints accelerations whether the rig reads them or not
             sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
@@ -53,7 +53,7 @@ class PrinterMount:
             field_at=field_of(magnetometer),
             magnetometer=magnetometer.truth,
             rate_hz=sensor.rate_hz,
-            baud_rate=float(sensor.serial.baud),
+            baud_rate=float(baud),
             seed=np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(self.name)]),
             time_s=time_s,
         )

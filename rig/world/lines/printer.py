@@ -83,7 +83,7 @@ class Printer:
         return data
 
     def receive(self, data: bytes) -> None:
-        """It reads nothing."""
+        """Bytes to the device, which reads none."""
 
     def advance(self, time_s: float) -> None:
         """Live until this virtual time, which lies in the laboratory's last tick."""
