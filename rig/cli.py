@@ -43,6 +43,7 @@ _COMMANDS = {
     "board": "look at the board, read and change its stored calibrations, flash its firmware",
     "kvh": "look at a KVH 1775",
     "autopilot": "write a calibration into an autopilot's parameters, and bring the old ones back",
+    "lines": "look at a device that prints lines, and write its section of a configuration",
     "world": "only the simulated laboratory, in the foreground, for any client",
 }
 _AT_ONCE = {  # what a command that begins by loading libraries for a second says before

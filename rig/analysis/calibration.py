@@ -178,7 +178,7 @@ def _solve_sensor(
             solution,
             explained,
             surroundings,
-            unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate)),
+            unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate), sensor.stamp_std_s),
             (name, sensor.part),
         ),
         six_observation=six_observation,

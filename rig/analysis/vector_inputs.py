@@ -64,6 +64,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
+        ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
         sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
     )
 
@@ -198,8 +199,13 @@ def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
     )
 
 
-def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Unknown:
-    """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found."""
+def unknown_of(
+    surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
+) -> Unknown:
+    """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found.
+
+    `stamp_std_s` is as of `RecordedSensor`.
+    """
     known, clock = surroundings.uncertainty, surroundings.clock
     found = Unknown(
         clock_std=clock.std,
@@ -212,6 +218,7 @@ def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: Ear
         repeatability_rad=float(np.radians(known.repeatability_deg)),
         angle_std_rad=0.0 if known.angle_std_deg is None else known.angle_std_rad,
         mount_rad=float(np.radians(known.mount_deg)),
+        stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=known.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,

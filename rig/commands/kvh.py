@@ -46,7 +46,7 @@ def run(options: Namespace) -> int:
             places = {
                 name: (section.serial.port, baud or section.serial.baud)
                 for name, section in loaded.config.sensors.items()
-                if section.serial is not None
+                if section.serial is not None and section.part == "kvh1775"
             }
             if not places:
                 raise Refused("no_kvh_section", f"{target} has no KVH 1775", "Give a port, or another configuration")

@@ -334,10 +334,12 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
             yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
-        if world.sensors[name].kvh1775 is not None and config.sensors[name].serial is None:
+        if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":
             yield f"world.sensors.{name}.kvh1775: no such instrument; {where}"
         if world.sensors[name].autopilot is not None and config.sensors[name].mavlink is None:
             yield f"world.sensors.{name}.autopilot: no such instrument; {where}"
+        if world.sensors[name].lines is not None and config.sensors[name].part != "lines":
+            yield f"world.sensors.{name}.lines: no such device; the sensor is a {config.sensors[name].part}"
 
 
 def _is_loopback(host: str) -> bool:

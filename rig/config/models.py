@@ -332,8 +332,8 @@ class RigConfig(SensorsConfig):
 
 
 def _fields_of_kvhs(sensors: Mapping[str, SensorSection]) -> set[str]:
-    """The names of the magnetometers that format C brings along."""
-    return {field_name(name) for name, each in sensors.items() if each.serial and each.serial.message == "C"}
+    """The names of the magnetometers that instruments on a port of their own bring along."""
+    return {field_name(name) for name, each in sensors.items() if each.brings_field}
 
 
 def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:

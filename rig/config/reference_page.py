@@ -141,10 +141,10 @@ def _parts() -> Iterator[str]:
         (
             f"`{name}`",
             part.rates_rule,
-            f"{part.default_rate_hz:g}",
-            ", ".join(f"{range_deg_s:g}" for range_deg_s in part.ranges_deg_s),
-            f"{part.default_range_deg_s:g}",
-            ", ".join(f"{range_g:g}" for range_g in part.ranges_g),
+            "–" if part.any_rate else f"{part.default_rate_hz:g}",
+            ", ".join(f"{range_deg_s:g}" for range_deg_s in part.ranges_deg_s) or "any",
+            "–" if part.any_rate else f"{part.default_range_deg_s:g}",
+            ", ".join(f"{range_g:g}" for range_g in part.ranges_g) or "any",
         )
         for name, part in PARTS.items()
     )

@@ -49,7 +49,8 @@ class Part:
     of its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
     `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what else is known of
     it; `delivered` is what calibrating finds. A part with a port of its own stands beside the board, with a clock
-    of its own.
+    of its own. `any_rate` says that it may be any sensor: its rates and ranges are what its section says, and the
+    half-widths are those of a consumer part.
     """
 
     rates_hz: tuple[float, ...]
@@ -70,6 +71,7 @@ class Part:
     accelerometer: AccelerometerSheet
     delivered: Delivered = Delivered()
     own_port: bool = False
+    any_rate: bool = False
 
     @property
     def acceleration_nonlinearity_percent(self) -> float:
@@ -94,11 +96,13 @@ class Part:
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+        if self.any_rate:
+            return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
 
     def accept_range(self, range_deg_s: float) -> float:
         """`range_deg_s` if the part has it. Raises ValueError naming the nearest otherwise."""
-        return one_of(range_deg_s, self.ranges_deg_s)
+        return positive(range_deg_s) if self.any_rate else one_of(range_deg_s, self.ranges_deg_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +127,13 @@ def one_of(value: float, allowed: Sequence[float]) -> float:
     if value not in allowed:
         nearest = min(allowed, key=lambda candidate: abs(candidate - value))
         raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {in_words(allowed)}")
+    return value
+
+
+def positive(value: float) -> float:
+    """`value` if it is above zero. Raises ValueError otherwise."""
+    if not value > 0:
+        raise ValueError("must be above 0")
     return value
 
 
@@ -309,6 +320,28 @@ PARTS: Mapping[str, Part] = MappingProxyType(
                 nonlinearity_percent=0.1, nonlinear_over_g=2, bias_mg_k=0.15, scale_ppm_k=50, bias_instability_ug=30
             ),
             own_port=True,
+        ),
+        "lines": Part(  # any device: assumed to be as bad as the worst of the parts above; `uncertainty` says better
+            rates_hz=(),
+            rates_rule="any; what the device prints",
+            ranges_deg_s=(),
+            default_rate_hz=100,
+            default_range_deg_s=250,
+            g_sensitivity_deg_s_g=0.1,
+            nonlinearity_percent=0.2,
+            asymmetry_percent=0.02,
+            bias_deg_s_k=30 / 65,
+            scale_ppm_k=4e4 / 65,
+            angle_random_walk_deg_sqrt_h=0.42,
+            bias_instability_deg_h=10,
+            non_orthogonality_deg=1.15,
+            ranges_g=(),
+            acceleration_noise_ug_sqrt_hz=300,
+            accelerometer=AccelerometerSheet(
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260, bias_instability_ug=30
+            ),
+            own_port=True,
+            any_rate=True,
         ),
     }
 )

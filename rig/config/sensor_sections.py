@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from rig.config.lines_section import GAP, LinesSection
 from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
 from rig.config.mavlink_section import MavlinkSection
 from rig.config.section import (
@@ -40,8 +41,16 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
 
 
 def field_name(sensor: str) -> str:
-    """The name of the magnetometer in the KVH 1775 called `sensor`."""
+    """The name of the magnetometer in the instrument on a port of its own called `sensor`."""
     return f"{sensor}_field"
+
+
+# The speeds that a KVH 1775 knows, and those that microcontrollers are set to beside them.
+KVH1775_BAUDS = (9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200)
+Baud = Literal[
+    9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 500000, 576000, 921600, 1000000, 1500000, 2000000,
+    3000000, 4147200,
+]  # fmt: skip
 
 
 class OwnPortSection(Section):
@@ -52,21 +61,21 @@ class OwnPortSection(Section):
         max_length=255,
         description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
     )
-    baud: Literal[9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200] = Field(
+    baud: Baud = Field(
         default=921600,
         description="speed to which the sensor is set; the rig does not change it in the sensor",
         json_schema_extra={"unit": "Bd"},
     )
     message: Literal["A", "B", "C"] = Field(
         default="B",
-        description="format of its messages: `B` contains the sensor's own microseconds, which show without doubt "
-        "how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
+        description="of a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show "
+        "without doubt how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
         "field, recorded as the magnetometer `<sensor>_field`",
     )
     rotation: Literal["delta", "rate"] = Field(
         default="delta",
-        description="`delta`: the angle since the message before, without aliasing; `rate`: the rate after the "
-        "sensor's own filter",
+        description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
+        "after the sensor's own filter",
     )
 
     @field_validator("port")
@@ -113,7 +122,7 @@ class AccelerationSection(Section):
 class SensorSection(Section):
     """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
-    part: PartName = Field(description="which gyroscope it is")
+    part: PartName = Field(description="which gyroscope it is; `lines` is any that prints its samples as lines")
     serial_number: str = Field(
         description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
         "its own, and another number is refused",
@@ -144,11 +153,12 @@ class SensorSection(Section):
         default=None, description="its accelerometer; left out, only the gyroscope is read"
     )
     serial: OwnPortSection | None = Field(
-        default=None, description="its own serial port, of a `kvh1775`; the other parts are on the board"
+        default=None, description="its own serial port, of a `kvh1775` or `lines`; the other parts are on the board"
     )
     mavlink: MavlinkSection | None = Field(
         default=None, description="the autopilot that the IMU is in, of a `mavlink`; other parts have none"
     )
+    lines: LinesSection | None = Field(default=None, description="what it prints, of `lines`")
 
     @property
     def on_board(self) -> bool:
@@ -162,6 +172,13 @@ class SensorSection(Section):
             return "serial.port", self.serial.port
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
+    @property
+    def brings_field(self) -> bool:
+        """Whether its port brings the readings of a magnetometer along."""
+        if self.lines is not None:
+            return self.lines.field is not None
+        return self.serial is not None and self.serial.message == "C"
+
     @model_validator(mode="before")
     @classmethod
     def usual_of_the_part(cls, data: Any) -> Any:
@@ -171,6 +188,8 @@ class SensorSection(Section):
         name = data.get("part")
         # A part that is not known is an error of its own, whatever stands in for it here.
         part = PARTS[name] if isinstance(name, str) and name in PARTS else next(iter(PARTS.values()))
+        if part.any_rate:  # nothing is usual of a part that may be any
+            return data
         usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
         return {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
 
@@ -198,6 +217,10 @@ class SensorSection(Section):
         part = PARTS.get(info.data.get("part", ""))
         if value is None or part is None:
             return value
+        if part.any_rate:
+            if value.range_g is None or value.range_g <= 0:
+                raise ValueError("state range_g, the full scale to which its program sets the accelerometer")
+            return value
         if value.range_g is None:
             return value.model_copy(update={"range_g": part.ranges_g[0]})
         if value.range_g not in part.ranges_g:
@@ -215,8 +238,14 @@ class SensorSection(Section):
                 f"{self.part} is {'not on the board: give its section serial' if own_port else 'on the board: leave'}"
                 f"{'' if own_port else ' serial out'}"
             )
+        if (self.part == "lines") != (self.lines is not None):
+            raise ValueError("part lines and a section lines go together: it says what the device prints")
+        if self.lines is not None and self.acceleration is not None and self.lines.acceleration is None:
+            raise ValueError("its accelerometer is to be read: give lines.acceleration, and the columns ax ay az")
         if self.serial is not None:
-            size = KVH1775_MESSAGE_BYTES[self.serial.message]
+            if self.part == "kvh1775" and self.serial.baud not in KVH1775_BAUDS:
+                raise ValueError(f"a kvh1775 knows serial.baud {', '.join(map(str, KVH1775_BAUDS))}")
+            size = KVH1775_MESSAGE_BYTES[self.serial.message] if self.lines is None else self.lines.least_bytes
             problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
             if problem is not None:
                 raise ValueError(problem)
@@ -240,6 +269,8 @@ class SensorSection(Section):
 
 def checked_serial_number(value: str) -> str:
     """Raises ValueError when the board could not keep it."""
+    if value == GAP:
+        raise ValueError("nobody but you knows it: write the number of this specimen here")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
         raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
     return value

@@ -13,6 +13,7 @@ from rig.config.servo_section import ServoSection
 from rig.config.stage_section import StageMountSection
 from rig.config.world_autopilot import SimulatedAutopilotSection
 from rig.config.world_hand import SimulatedHandSection
+from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 from rig.config.world_servo import SimulatedServoSection
 
@@ -400,6 +401,7 @@ class SimulatedSensorSection(Section):
         default=None,
         description="the autopilot it is in, of a `mavlink`; of several at one port the first says it",
     )
+    lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
 
 
 class WorldSection(Section):

@@ -29,7 +29,8 @@ class RecordedSensor:
 
     `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's; what has no axes leaves it.
     `mode` is "calibrated" when the rates were corrected before they were recorded. `clock` names the sensor whose clock
-    stamps the samples: itself, or the one it is in; None where the board's does.
+    stamps the samples: itself, or the one it is in; None where the board's does. `stamp_std_s` is the standard
+    uncertainty of a time stamp, None where it is nothing beside the interval between samples.
     """
 
     part: str
@@ -39,6 +40,7 @@ class RecordedSensor:
     mounting: Mounting = AS_THE_FLANGE
     mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
     clock: str | None = None
+    stamp_std_s: Positive | None = None
 
     @property
     def on_board(self) -> bool:

@@ -21,6 +21,7 @@ from rig.estimation.vector_fit import Explained, Seen
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
 AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "mounting anew"  # what directions may be off by
+STAMPS = "times of the samples"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -109,8 +110,8 @@ class Unknown:
     angle that is come back to, `angle_std_rad` that of a joint about what its encoder tells, at the ends of arcs,
     `mount_rad` (half of a width) how far an item sits off a stage's mount about each axis,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
-    how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
-    `counts_freedom` says whether they make the coverage factor.
+    how well it was found where it was; `stamp_std_s` is that of the times of the sensor's samples. `…_freedom` are the
+    degrees of freedom of what was found from readings, `counts_freedom` says whether they make the coverage factor.
     """
 
     clock_std: float
@@ -129,6 +130,7 @@ class Unknown:
     repeatability_rad: float = 0.0
     angle_std_rad: float = 0.0
     mount_rad: float = 0.0
+    stamp_std_s: float = 0.0
 
 
 def uncounted(unknown: Unknown) -> Unknown:
@@ -166,10 +168,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
     else:
         yield assumed(CLOCK, 1e6 * wide, "ppm", said, wide * turned[None])
-    jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
-    each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
-    source = "scatter of the joint angles"
-    yield _found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
+    yield from _of_times(seen, unknown, turned, of)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
     yield assumed(AXES, float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if seen.return_errors_rad_s is not None:
@@ -222,6 +221,20 @@ def _of_marks_and_mounts(explained: Explained, unknown: Unknown, of: Callable[[A
         spread = of(seen.mount_errors_rad_s @ matrix.T) + of_mount_squares(explained)
         half_width = float(np.degrees(unknown.mount_rad))
         yield Contributor(MOUNTS, "B", "rectangular", half_width, "°", "uncertainty.mount_deg", np.inf, spread)
+
+
+def _of_times(seen: Seen, unknown: Unknown, turned: Array, of: Callable[[Array], Array]) -> Iterator[Contributor]:
+    """What the times do at which the arm's states were, and the sensor's samples."""
+    each_end = np.sqrt(2) / np.diff(seen.windows_s).T[0]
+    each_turn = np.eye(len(turned))[:, :, None]
+    jitter = each_turn * (unknown.state_jitter_s * each_end[:, None] * turned)[None]
+    source = "scatter of the joint angles"
+    yield _found("times of the arm's states", source, of(jitter), unknown.state_jitter_freedom)
+    if unknown.stamp_std_s:
+        # A mean over a window that lies elsewhere holds other rates at its ends: those of the ripple.
+        moved = each_turn * ((unknown.stamp_std_s * each_end * seen.ripples)[:, None] * turned)[None]
+        source, half_width = "how the lines of the sensor are timed", 1e3 * np.sqrt(3) * unknown.stamp_std_s
+        yield Contributor(STAMPS, "B", "rectangular", float(half_width), "ms", source, np.inf, of(moved))
 
 
 def _noise_freedom(explained: Explained) -> float:

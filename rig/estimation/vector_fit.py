@@ -40,7 +40,8 @@ class Seen:
     where it stayed: of the stages but the first, which the first sweep is of, then of the first; `arms_m`
     (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
     motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
-    what is known of the sensor beforehand, None in recordings of before.
+    what is known of the sensor beforehand, None in recordings of before. `ripples` (N,) are how unevenly each turned,
+    RMS as a share of its rate.
     """
 
     means_rad_s: Array
@@ -59,6 +60,7 @@ class Seen:
     noise_freedom: Array | float = np.inf
     sensor: KnownSensor | None = None
     encoder_errors_rad_s: Array | None = None
+    ripples: Array | float = 0.0
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ from rig.observation.csv_table import Mapped, read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
 from rig.observation.placements import Placements, find_placements
+from rig.observation.sample_files import attitudes_in
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
@@ -74,11 +75,12 @@ class PlacedReadings:
 
 
 def read_attitudes(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
-    """The columns (N,) of a file of attitudes.
+    """The columns (N,) of a file of attitudes, in whichever format it is; `mapped` where its columns are others'.
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Raises as `attitudes_in`; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
-    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped)
+    found = attitudes_in(path)
+    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped) if found is None else dict(found)
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:

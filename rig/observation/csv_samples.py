@@ -19,6 +19,7 @@ from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import Mapped, read_columns
 from rig.observation.csv_windows import check_times
+from rig.observation.sample_files import readings_in
 
 SAMPLES_MB = 256  # an hour at 1 kHz
 
@@ -32,11 +33,15 @@ class Samples:
 
 
 def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
-    """The readings of a file, those `needed` and whatever others it holds; `mapped` where its columns are others'.
+    """The readings of a file, in whichever format it is: those `needed` and whatever others it holds.
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
+    `mapped` is for a table whose columns are others'.
+
+    Raises as `readings_in`; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
-    table = read_columns(path, samples_header(needed), SAMPLES_MB, mapped)
+    table = readings_in(path)
+    if table is None:
+        table = read_columns(path, samples_header(needed), SAMPLES_MB, mapped)
     return samples_in(table, str(path))
 
 

@@ -1,6 +1,5 @@
 """A recording of readings that were made elsewhere, from a file of them and, mostly, one of their motion."""
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,7 +11,6 @@ from rig.config.column_map import ColumnMap, ColumnSection
 from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
 from rig.data.quantity import RATE
-from rig.data.result_file import FileEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
@@ -21,6 +19,7 @@ from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_import import read_sweeps
 from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import Mapped
+from rig.observation.sample_files import entry_of, whole
 from rig.observation.table_log import read_table_log
 
 AS_NAMED_HERE = ColumnMap()
@@ -53,7 +52,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         for quantity, readings in samples.readings.items()
         for i, name in enumerate(quantity.columns)
     }
-    began = files.recorded or datetime.fromtimestamp(files.readings.stat().st_mtime, UTC)
+    began = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     read_elsewhere = ReadElsewhere(files.item, columns, files.tells, _motion(files))
     return RunData(
         config="",
@@ -72,7 +71,10 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             elsewhere=asked,
         ),
         provenance=provenance_of_files(
-            _named(files.readings), _named(files.motion) if isinstance(files.motion, Path) else None, files.item, began
+            entry_of(files.readings),
+            entry_of(files.motion) if isinstance(files.motion, Path) else None,
+            files.item,
+            began,
         ),
         sensors={files.item.name: read_elsewhere.sensor},
         samples={files.item.name: read_elsewhere.samples},
@@ -101,8 +103,3 @@ def _mapped(columns: Mapping[str, ColumnSection], skip_lines: int) -> Mapped | N
     if not columns and not skip_lines:
         return None
     return Mapped({name: (each.column, each.factor) for name, each in columns.items()}, skip_lines)
-
-
-def _named(path: Path) -> FileEntry:
-    with path.open("rb") as file:
-        return FileEntry(name=path.name, sha256=hashlib.file_digest(file, "sha256").hexdigest())

@@ -46,8 +46,8 @@ class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
 
     Or an arc of `angle_rad` at Δθ/T; `arc_rad` are the joint's angles at its ends, the lower first, None of whole
-    turns, over which no encoder errs. Of a mean beside lines, `speed_rad_s` and `axis_flange` are beside what the
-    encoders see of the same lines.
+    turns, over which no encoder errs. `ripple` is how unevenly it turned, RMS as a share of the rate. Of a mean beside
+    lines, `speed_rad_s` and `axis_flange` are beside what the encoders see of the same lines.
 
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
@@ -73,6 +73,7 @@ class Observation:
     acceleration: SweptAcceleration | None = None
     angle_rad: float | None = None
     arc_rad: tuple[float, float] | None = None
+    ripple: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,6 +253,7 @@ def _observation(
         arm_m=turn.arm_m,
         angle_rad=turn.angle_rad,
         arc_rad=None if turn.closed else sweep.revolution_rad,
+        ripple=float(passing.rate_rad_s[covered].std()) / turn.speed_rad_s,
     )
 
 

@@ -9,7 +9,8 @@ from typing import Protocol
 from rig.config.sensor_sections import SensorSection
 from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
-from rig.sensors.kvh1775.source import describe, kvh1775, look
+from rig.sensors.kvh1775 import source as kvh1775
+from rig.sensors.lines import source as lines
 from rig.sensors.mavlink import source as mavlink
 from rig.sensors.source import OnSamples, SampleSource
 
@@ -38,19 +39,28 @@ class Kind:
     look: Callable[[Sections], Iterator[str | SensorError]]
 
 
-def _kvh1775(sections: Sections, on_samples: OnSamples) -> AbstractContextManager[Instrument]:
-    ((name, section),) = sections.items()  # a port of its own is one KVH 1775's
-    return kvh1775(name, section, on_samples)
+def _alone(
+    connect: Callable[[str, SensorSection, OnSamples], AbstractContextManager[Instrument]],
+    describe: Callable[[str, SensorSection], RecordedSensor],
+    look: Callable[[str, SensorSection], Iterator[str | SensorError]],
+) -> Kind:
+    """Of a part that has its port for itself."""
 
+    def only(sections: Sections) -> tuple[str, SensorSection]:
+        (one,) = sections.items()
+        return one
 
-def _look_at_kvh1775(sections: Sections) -> Iterator[str | SensorError]:
-    ((name, section),) = sections.items()
-    return look(name, section)
+    return Kind(
+        lambda sections, on_samples: connect(*only(sections), on_samples),
+        describe,
+        lambda sections: look(*only(sections)),
+    )
 
 
 OWN_PORT: Mapping[str, Kind] = MappingProxyType(
     {
-        "kvh1775": Kind(_kvh1775, describe, _look_at_kvh1775),
+        "kvh1775": _alone(kvh1775.kvh1775, kvh1775.describe, kvh1775.look),
+        "lines": _alone(lines.lines, lines.describe, lines.look),
         "mavlink": Kind(mavlink.mavlink, mavlink.describe, mavlink.look),
     }
 )

@@ -17,6 +17,8 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_power sensor on
     autopilot_fault port lost doubled slowest armed deaf camera silent bit_error_rate host_baud   as above
     autopilot_power port on
+    printer_fault sensor bit_error_rate lose stuck silent host_baud   of a device that prints lines, as above
+    printer_power sensor on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
     instruct say face turns again               what the operator reads, where a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
@@ -36,6 +38,7 @@ from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
+from rig.world.lines.mounting import PrinterMount
 from rig.world.servo.bench import ServoBench
 from rig.world.servo.drive import Faults
 from rig.world.servo.wire_format import WRITE, Packet
@@ -65,6 +68,8 @@ class World(Protocol):
     def kvh_lines(self) -> Mapping[str, SerialLine]: ...
     @property
     def autopilot_lines(self) -> Mapping[str, SerialLine]: ...
+    @property
+    def printer_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
     def close_dashboard(self) -> None: ...
@@ -89,6 +94,8 @@ class ControlSession:
             "kvh_power": self._kvh_power,
             "autopilot_fault": self._autopilot_fault,
             "autopilot_power": self._autopilot_power,
+            "printer_fault": self._printer_fault,
+            "printer_power": self._printer_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
@@ -305,6 +312,25 @@ class ControlSession:
         if port not in mounts:
             raise ValueError(f"no autopilot at {port!r}; there are {', '.join(mounts) or 'none'}")
         return mounts[port]
+
+    def _printer_fault(self, sensor: str, *, lose: int = 0, stuck: bool | None = None, **of_line: float) -> None:
+        printer = self._printer(sensor).printer
+        if printer is None:
+            raise ValueError(f"the device {sensor!r} is switched off")
+        printer.faults.lose += int(lose)
+        printer.faults.stuck = printer.faults.stuck if stuck is None else bool(stuck)
+        for name in of_line.keys() & {"bit_error_rate", "silent", "host_baud"}:
+            setattr(self._world.printer_lines[sensor], name, of_line[name])
+
+    def _printer_power(self, sensor: str, on: bool) -> None:
+        mount = self._printer(sensor)
+        self._world.laboratory.switch_on_printer(sensor) if on else mount.switch_off()
+
+    def _printer(self, sensor: str) -> PrinterMount:
+        mounts = self._world.laboratory.printers
+        if sensor not in mounts:
+            raise ValueError(f"no device that prints lines {sensor!r}; there are {', '.join(mounts) or 'none'}")
+        return mounts[sensor]
 
     def _silence_board(self, on: bool) -> None:
         """A cable that carries nothing, with its port still there."""

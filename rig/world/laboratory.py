@@ -17,6 +17,7 @@ from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_u
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
+from rig.world.lines.mounting import printer_mounts
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.operator import Operator
 from rig.world.servo.bench import ServoBench
@@ -46,15 +47,22 @@ class Laboratory:
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
         self.autopilots = autopilot_mounts(config, world)
+        self.printers = printer_mounts(config, world)
         self.plug_in()
         for name in self.kvhs:
             self.switch_on(name)
         for port in self.autopilots:
             self.switch_on_autopilot(port)
+        for name in self.printers:
+            self.switch_on_printer(name)
 
     def switch_on(self, name: str) -> None:
         """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
         self.kvhs[name].switch_on(self._motion_of, self._field_of, self._time_s)
+
+    def switch_on_printer(self, name: str) -> None:
+        """Give the device that prints lines of that name power, if it has none."""
+        self.printers[name].switch_on(self._motion_of, self._field_of, self._time_s)
 
     def switch_on_autopilot(self, port: str) -> None:
         """Give the autopilot at that port power, if it has none."""
@@ -159,6 +167,9 @@ class Laboratory:
         for each in self.autopilots.values():
             if each.autopilot is not None:
                 each.autopilot.advance(self._time_s)
+        for place in self.printers.values():
+            if place.printer is not None:
+                place.printer.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:

@@ -65,12 +65,20 @@ class World:
             port: SerialLine(partial(getattr, mount, "autopilot"), section.seed)
             for port, mount in self.laboratory.autopilots.items()
         }
+        self.printer_lines = {
+            name: SerialLine(partial(getattr, mount, "printer"), section.seed)
+            for name, mount in self.laboratory.printers.items()
+        }
+        for name, line in self.printer_lines.items():
+            if (printing := section.sensors[name].lines) is not None:
+                line.bit_error_rate = printing.bit_error_rate
         turning = self.laboratory.turning
         self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
         self.lines = (
             self.line,
             *self.kvh_lines.values(),
             *self.autopilot_lines.values(),
+            *self.printer_lines.values(),
             *filter(None, [self.servo_line]),
         )
         patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
@@ -89,7 +97,7 @@ class World:
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
             for name, port in kvh_ports.items():
-                self._listen(f"sensors.{name}.serial.port", port, self.kvh_lines[name])
+                self._listen(f"sensors.{name}.serial.port", port, (self.kvh_lines | self.printer_lines)[name])
             for port, line in self.autopilot_lines.items():
                 self._listen("mavlink.port", port, line)
             control_port = section.control_port
@@ -108,7 +116,12 @@ class World:
             for port, line in self.autopilot_lines.items()
             if self.laboratory.autopilots[port].section.pty
         }
-        self._ptys = [*([pty] if pty else []), *kvh_ptys.values(), *autopilot_ptys.values()]
+        printer_ptys = {
+            name: _open_pty(line, self.network.selector)
+            for name, line in self.printer_lines.items()
+            if (printing := section.sensors[name].lines) is not None and printing.pty
+        }
+        self._ptys = [*([pty] if pty else []), *kvh_ptys.values(), *autopilot_ptys.values(), *printer_ptys.values()]
         self._description = {
             "ready": True,
             "arm": loaded.config.turner.address or None,
@@ -117,6 +130,7 @@ class World:
             "kvh_ports": kvh_ports,
             "kvh_ptys": {name: each.path for name, each in kvh_ptys.items()},
             "autopilot_ptys": {port: each.path for port, each in autopilot_ptys.items()},
+            "printer_ptys": {name: each.path for name, each in printer_ptys.items()},
             "control": f"{host}:{control_port}",
         }
 

@@ -65,7 +65,7 @@ class Mount:
 def mounts(config: RigConfig, world: WorldSection) -> dict[str, Mount]:
     """Instruments by sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what is none."""
     found = {}
-    for name in sorted(name for name, sensor in config.sensors.items() if sensor.serial is not None):
+    for name in sorted(name for name, sensor in config.sensors.items() if sensor.part == "kvh1775"):
         try:
             found[name] = Mount(name, config, world, Memory(_section(world, name).settings))
         except ValueError as error:

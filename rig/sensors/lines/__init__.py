@@ -1,0 +1,1 @@
+"""Any device that prints its samples as lines of text, on a serial port of its own."""

@@ -1,0 +1,303 @@
+"""The host end of a device that prints lines: a thread that reads, and names for all that can be wrong with it.
+
+Nothing is sent to the device. It says nothing of itself, so that it is what the configuration says shows in its lines.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, why_closed
+from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection
+from rig.config.sensor_sections import OwnPortSection
+from rig.errors.quoting import quote
+from rig.estimation.arrays import Array
+from rig.sensors.errors import SensorError
+from rig.sensors.lines.decoding import Decoded, LineReader
+from rig.sensors.lines.stamping import Stamper
+
+FIRST_LINE_S = 4.0  # in which a device must have begun: an Arduino starts anew when its port is opened
+LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
+SHOWN = 60  # characters of a line that is quoted
+UNPRINTABLE = 0.05  # share of bytes from which on the speed of the line is wrong
+DAMAGED = 0.5  # share of lines that are no samples from which on a stream is no use
+DAMAGED_LINES = 200  # that are looked at for that
+RATE_TOLERANCE = 0.03
+_CABLE = "Check its supply and cable, and whether another program has the port"
+
+# Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and when they were read.
+OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
+
+
+@dataclass(slots=True)
+class Counts:
+    """What came: samples, comments, lines before the first sample, lines that were none after it, and why not.
+
+    `wrong_sums` of the lines that were none had a wrong checksum, `odd` a time that cannot be.
+    """
+
+    samples: int = 0
+    comments: int = 0
+    before: int = 0
+    damaged: int = 0
+    wrong_sums: int = 0
+    odd: int = 0
+    first_other: bytes = b""
+    decimals: Array = field(default_factory=lambda: np.zeros(0))
+
+    def add(self, decoded: Decoded) -> None:
+        """Count what one read brought."""
+        begun = self.samples > 0
+        boot = 0 if begun else int(np.count_nonzero(decoded.before == 0))
+        self.before += boot
+        self.damaged += len(decoded.before) - boot
+        self.samples += len(decoded.values)
+        self.comments += decoded.comments
+        self.wrong_sums += decoded.wrong_sums
+        self.first_other = self.first_other or decoded.why
+        self.decimals = np.maximum(self.decimals, decoded.decimals) if len(self.decimals) else decoded.decimals
+
+
+class LinesDevice:
+    """A device on a serial port or `socket://host:port`; a context manager. `on_values` runs on its thread.
+
+    What goes wrong is a SensorError whose name begins with `lines_`; all messages name `sensor`.
+    """
+
+    def __init__(
+        self,
+        sensor: str,
+        line: OwnPortSection,
+        section: LinesSection,
+        rate_hz: float,
+        on_values: OnValues | None = None,
+        *,
+        timeout_s: float = FIRST_LINE_S,
+    ) -> None:
+        """Opens the port, and reads until samples come at the rate that is stated.
+
+        Raises SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
+        """
+        self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
+        self._on_values = on_values
+        self._reader = LineReader(section)
+        self.counts = Counts()
+        self._stamper: Stamper | None = None  # while it streams
+        self._skipped = 0  # lines that were no samples since the last that was
+        self._seen: list[Array] = []  # until it is known what comes
+        self._idle_reads = 0
+        self._fault: SensorError | None = None
+        self._news = threading.Condition()
+        self._closing = threading.Event()
+        self._clock_s: float | None = None  # what another instrument's clock showed at the last check,
+        self._clock_at_sample_s: float | None = None  # … and when the last sample came
+        try:
+            self._serial = SerialPort(line.port, line.baud)
+        except OSError as error:
+            raise SensorError(
+                "no_port",
+                f"sensors.{sensor}: the port {line.port} does not open: {why_closed(line.port, error)}",
+                "Check serial.port and the cable, and that no other program has the port",
+            ) from error
+        self._thread = threading.Thread(target=self._read, name=f"lines {line.port}", daemon=True)
+        self._thread.start()
+        try:
+            self.rate_hz = self._look(timeout_s)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def where(self) -> str:
+        """The device as messages name it."""
+        return f"sensors.{self._sensor}: the device on {self._line.port}"
+
+    @property
+    def seen(self) -> Array:
+        """The values (n, columns) that were read while the device was looked at."""
+        return np.concatenate(self._seen)
+
+    def start(self) -> None:
+        """Start to hand everything to `on_values`, from the next line on."""
+        with self._news:
+            self._stamper = Stamper(self._section, self._rate_hz)
+            self._idle_reads = self._skipped = 0
+
+    @property
+    def lost(self) -> int:
+        """Samples lost in the stream."""
+        return 0 if self._stamper is None else self._stamper.lost
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Raises what went wrong meanwhile: `lines_link_lost`, `lines_damaged`, `lines_time_jumped`.
+
+        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        """
+        if self._fault is not None:
+            raise self._fault
+        with self._news:
+            self._clock_s = self._clock_s if clock_s is None else clock_s
+            silent_s = self._silent_s
+        if self._stamper is not None and silent_s > LONGEST_GAP_S + 2 / self._rate_hz:
+            raise SensorError("lines_link_lost", f"{self.where} has sent no sample for {silent_s:.1f} s", _CABLE)
+
+    def fail(self, error: SensorError) -> None:
+        """Makes `error` what `check` raises, unless there is one already."""
+        self._fault = self._fault or error
+
+    def close(self) -> None:
+        """Ends the thread and closes the port. May be called twice."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        self._thread.join()
+        self._serial.close()
+
+    @property
+    def _silent_s(self) -> float:
+        """How long no sample has come, in time spent reading: when the reader was held up, nobody was silent.
+
+        Nor was anybody while another instrument's clock stood still, if there is one: it may be a simulated one's.
+        """
+        silent_s = self._idle_reads * READ_TIMEOUT_S
+        if self._clock_s is None:
+            return silent_s
+        if self._clock_at_sample_s is None:
+            self._clock_at_sample_s = self._clock_s
+        return min(silent_s, self._clock_s - self._clock_at_sample_s)
+
+    # -- what comes at all -----------------------------------------------------------------------------------------
+    def _look(self, timeout_s: float) -> float:
+        """The rate of its samples by its own time, NaN where it has none. Raises as the constructor does."""
+        enough = LOOK_SAMPLES if self._section.time is not None else 3
+        with self._news:
+            came = self._news.wait_for(
+                lambda: self.counts.samples >= enough or self._fault is not None or self._lasted(), timeout_s
+            )
+            if self._fault is not None:
+                raise self._fault
+            if not came and not self.counts.samples:
+                raise self._why_no_sample(timeout_s)
+        rate_hz = self._measured_hz()
+        if abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+            raise SensorError(
+                "lines_other_rate",
+                f"{self.where} sends {rate_hz:.4g} samples a second, sensors.{self._sensor}.rate_hz is "
+                f"{self._rate_hz:g}",
+                "Set rate_hz to what it sends; if that is too little, its program prints for too long: raise the speed "
+                "of the line, or print less",
+            )
+        return rate_hz
+
+    def _lasted(self) -> bool:
+        """Whether so few samples are enough of a slow device."""
+        return self.counts.samples >= 5 and self._span_s() >= LOOK_S
+
+    def _span_s(self) -> float:
+        if self._section.time is None or not self._seen:
+            return 0.0
+        printed = np.concatenate(self._seen)[:, self._section.columns.index("time")]
+        passed = np.diff(printed)
+        if self._section.time.wrap:
+            passed %= self._section.time.wrap
+        return float(passed.sum()) * SECONDS[self._section.time.unit]
+
+    def _measured_hz(self) -> float:
+        """Samples a second, by the median step of the device's time where that is fine, else by all of it."""
+        time_section = self._section.time
+        if time_section is None or self.counts.samples < 5:
+            return float("nan")
+        span_s, count = self._span_s(), len(self.seen) - 1
+        unit_s = SECONDS[time_section.unit]
+        printed = self.seen[:, self._section.columns.index("time")]
+        typical_s = float(np.median(np.diff(printed))) * unit_s
+        if span_s <= 0:
+            raise SensorError(
+                "lines_time_stands",
+                f"{self.where} prints the same time {printed[0]:.15g} again and again",
+                "See which column is the time, and in which unit: docs/how-to/lines.md",
+            )
+        coarse = time_section.unit != "s" and typical_s < 50 * unit_s
+        return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s
+
+    def _why_no_sample(self, timeout_s: float) -> SensorError:
+        reader, counts = self._reader, self.counts
+        if not reader.bytes_seen:
+            return SensorError("lines_silent", f"{self.where} has sent nothing within {timeout_s:g} s", _CABLE)
+        if reader.unprintable > UNPRINTABLE * reader.bytes_seen or not (counts.before or counts.comments):
+            return SensorError(
+                "lines_wrong_baud_rate",
+                f"{reader.bytes_seen} bytes came from {self.where} at {self._line.baud} Bd, and they are no lines of "
+                "text",
+                "Set serial.baud to what the device's program sets; `rig lines` finds it",
+            )
+        first = counts.first_other[:SHOWN].decode("ascii", "replace")
+        return SensorError(
+            "lines_other_format",
+            f"{self.where} prints other lines than sensors.{self._sensor}.lines says, such as {quote(first)}",
+            "Correct the section, or let `rig lines` write one; if it is another device, correct serial.port",
+        )
+
+    # -- the reader's thread ---------------------------------------------------------------------------------------
+    def _read(self) -> None:
+        try:
+            while not self._closing.is_set():
+                self._take(self._serial.read(), time.monotonic())
+        except OSError as error:
+            self.fail(SensorError("lines_link_lost", f"{self.where}: the port closed: {error}", _CABLE))
+        except SensorError as error:
+            self.fail(SensorError(error.name, f"{self.where}: {error.what}", error.remedy))
+        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
+            self.fail(SensorError("lines_not_taken", f"{self.where}: {error!r}", "See the run's log"))
+        with self._news:
+            self._news.notify_all()
+
+    def _take(self, data: bytes, host_time_s: float) -> None:
+        decoded = self._reader.feed(data)
+        with self._news:
+            if len(decoded.values):
+                self._idle_reads, self._clock_at_sample_s = 0, self._clock_s
+            else:
+                self._idle_reads += 1
+            if not data:
+                return
+            self.counts.add(decoded)
+            stamper = self._stamper
+            if stamper is None and len(decoded.values):
+                self._seen.append(decoded.values)
+            self._news.notify_all()
+        if stamper is None:
+            return
+        self._refuse_damage()
+        self._skipped += len(decoded.before)
+        if not len(decoded.values):
+            return
+        kept, numbers, times_us = stamper.stamp(decoded.values, self._skipped, host_time_s)
+        self._skipped = 0
+        self.counts.odd = stamper.odd
+        if self._on_values is not None and len(numbers):
+            self._on_values(decoded.values[kept], numbers, times_us, host_time_s)
+
+    def _refuse_damage(self) -> None:
+        counts = self.counts
+        if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
+            raise SensorError(
+                "lines_damaged",
+                f"{counts.damaged} of {counts.samples + counts.damaged} lines are no samples, such as "
+                f"{quote(counts.first_other[:SHOWN].decode('ascii', 'replace'))}",
+                "Check the cable and the speed of the line; see that nothing else prints there",
+            )

@@ -1,0 +1,1 @@
+"""The simulated device that prints its samples as lines, on a serial line of its own."""

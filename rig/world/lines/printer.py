@@ -1,0 +1,145 @@
+"""The simulated device: it samples by an oscillator of its own, and prints what its program formats.
+
+It formats as C's and Python's own `%.3f` do, one number after another; nothing here knows how lines are read.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import fmod, radians
+from operator import xor
+
+import numpy as np
+
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
+from firmware_host.emulator.gyroscope import Gyroscope
+from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
+from rig.config.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
+from rig.config.world_lines import SimulatedLinesSection
+from rig.world.board.sensor_truth import SensorTruth
+
+BETWEEN = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+# What one of each unit is, in rad/s, m/s² and T; and of each unit of time in one second.
+SIZES = {
+    "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": radians(1.0), "mdeg/s": radians(1e-3),
+    "g": STANDARD_GRAVITY_M_S2, "mg": 1e-3 * STANDARD_GRAVITY_M_S2, "m/s2": 1.0,
+    "gauss": GAUSS_T, "mgauss": 1e-3 * GAUSS_T, "uT": 1e-6, "nT": 1e-9, "T": 1.0,
+}  # fmt: skip
+IN_A_SECOND = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
+USUAL_DECIMALS = 5
+LINE_END = b"\r\n"
+
+
+@dataclass(slots=True)
+class Faults:
+    """What a test can make wrong: the next samples to `lose`; `stuck`: it prints the same line again and again."""
+
+    lose: int = 0
+    stuck: bool = False
+
+
+class Printer:
+    """A device switched on at the virtual time `time_s`, by when it has counted `on_for_s`.
+
+    `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
+    `magnetometer` the errors of what reads that.
+    """
+
+    def __init__(
+        self,
+        truth: SensorTruth,
+        motion_at: Callable[[float], Sequence[float]],
+        section: SimulatedLinesSection,
+        prints: LinesSection,
+        *,
+        field_at: Callable[[float], Sequence[float]],
+        magnetometer: MagnetometerTruth,
+        rate_hz: float,
+        baud_rate: float,
+        seed: np.random.SeedSequence,
+        time_s: float,
+    ) -> None:
+        self.faults = Faults()
+        self.baud_rate = baud_rate
+        self._section, self._prints, self._motion_at = section, prints, motion_at
+        self._speed = 1.0 + 1e-6 * section.oscillator_ppm
+        self._counted_from_s = time_s - section.on_for_s / self._speed
+        self._step_s = 1.0 / rate_hz / self._speed
+        self._began_s, self._samples, self._printed = time_s, 0, 0
+        self._gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        self._accelerometer = None
+        if truth.accelerometer is not None:
+            self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
+        other = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1))
+        self._magnetometer = Magnetometer(field_at, magnetometer, other)
+        self._lost = np.random.default_rng(other.spawn(1)[0])
+        self._sent = bytearray(b"".join(line.encode() + LINE_END for line in section.boot_text))
+        self._line = b""
+
+    def transmitted(self) -> bytes:
+        """What it has sent since it was asked last."""
+        data = bytes(self._sent)
+        self._sent.clear()
+        return data
+
+    def receive(self, data: bytes) -> None:
+        """Bytes to the device, which reads none."""
+
+    def advance(self, time_s: float) -> None:
+        """Live until this virtual time, which lies in the laboratory's last tick."""
+        while (at_s := self._began_s + (self._samples + 1) * self._step_s) <= time_s:
+            self._samples += 1
+            line = self._sampled(at_s)
+            if self.faults.lose > 0:
+                self.faults.lose -= 1
+            elif not (self._section.lost_fraction and self._lost.random() < self._section.lost_fraction):
+                self._line = self._line if self.faults.stuck else line
+                self._sent += self._line
+                self._printed += 1
+                if self._section.comment_every and self._printed % self._section.comment_every == 0:
+                    self._sent += f"{self._prints.comment} still here".encode() + LINE_END
+
+    def _sampled(self, at_s: float) -> bytes:
+        """The line of a sample."""
+        prints = self._prints
+        rates = self._gyroscope.read(at_s)
+        values = {axis: _printed(each, prints.rate) for axis, each in zip(("gx", "gy", "gz"), rates, strict=True)}
+        if self._accelerometer is not None:
+            forces = self._accelerometer.read(at_s)
+            for axis, each in zip(("ax", "ay", "az"), forces, strict=True):
+                values[axis] = _printed(each, prints.acceleration)
+        if prints.field is not None:
+            for axis, each in zip(("mx", "my", "mz"), self._magnetometer.read(at_s), strict=True):
+                values[axis] = _printed(each, prints.field)
+        told = prints.temperature
+        celsius = self._gyroscope.temperature_c(at_s)
+        decimals = 2 if told.decimals is None else told.decimals
+        values["temperature"] = f"{(celsius - told.offset_c) / told.scale:.{decimals}f}"
+        values["time"] = self._time(at_s)
+        sequence = self._samples % prints.sequence_wrap if prints.sequence_wrap else self._samples
+        values["sequence"] = str(sequence)
+        numbers = [values.get(name, "0") for name in prints.columns]
+        if prints.keys:
+            text = ",".join(key + number for key, number in zip(prints.keys, numbers, strict=True))
+        else:
+            text = BETWEEN[prints.separator].join(numbers)
+        text = prints.prefix + text
+        if prints.checksum == "nmea":
+            text += f"*{reduce(xor, text.lstrip('$!').encode(), 0):02X}"
+        return text.encode() + LINE_END
+
+    def _time(self, at_s: float) -> str:
+        time = self._prints.time
+        if time is None:
+            return "0"
+        counted = (at_s - self._counted_from_s) * self._speed * IN_A_SECOND[time.unit]
+        counted = fmod(counted, time.wrap) if time.wrap else counted
+        return f"{counted:.6f}" if time.unit == "s" else str(int(counted))
+
+
+def _printed(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
+    """A reading in SI units as the program formats it."""
+    if section is None:  # it prints them in SI units, and the rig does not read them
+        return f"{value:.{USUAL_DECIMALS}f}"
+    decimals = USUAL_DECIMALS if section.decimals is None else section.decimals
+    return f"{value / section.scale / SIZES[section.unit]:.{decimals}f}"

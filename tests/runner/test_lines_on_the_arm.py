@@ -1,0 +1,77 @@
+"""Runs with a device that prints lines: its calibration is the truth within U, and a time by arrival has its cost."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from support.commands import rig
+from support.paths import CONFIGS
+from support.worlds import fresh_host, merge
+
+LINES = CONFIGS / "lines.yaml"
+TRUTH = np.array([1.011, 0.993, 1.006, 0.012, -0.02, 0.007])
+
+
+def configuration(folder: Path, *changes: dict[str, Any]) -> Path:
+    """lines.yaml so changed, on an address of its own."""
+    host = fresh_host()
+    document = yaml.safe_load(LINES.read_text(encoding="utf-8"))
+    for change in changes:
+        document = merge(document, change)
+    document["arm"]["host"] = host
+    document["sensors"]["imu"]["serial"]["port"] = f"socket://{host}:7341"
+    path = folder / "config.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return path
+
+
+def calibrated(folder: Path, *changes: dict[str, Any]) -> dict[str, Any]:
+    """The sensor's entry in `result.json` of a run."""
+    done = rig("run", configuration(folder, *changes), "--out", folder / "run")
+    assert done.returncode == 0, done.stderr + done.stdout
+    result: dict[str, Any] = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
+    entry: dict[str, Any] = result["sensors"]["imu"]
+    return entry
+
+
+def off(entry: dict[str, Any]) -> np.ndarray:
+    """(6,) errors of scale and bias, each by its standard uncertainty."""
+    std = np.sqrt(np.diag(entry["covariance_combined"]))
+    found: np.ndarray = (np.array(entry["scale"] + entry["bias_rad_s"]) - TRUTH) / std
+    return found
+
+
+@pytest.mark.slow
+def test_a_device_that_prints_lines_is_calibrated_on_the_arm(tmp_path: Path) -> None:
+    assert np.abs(off(calibrated(tmp_path))).max() < 4
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(3000)
+def test_its_uncertainty_is_what_its_errors_are(tmp_path: Path) -> None:
+    """Bias is left out: what is assumed of any device's warming is far more than a steady simulated one does."""
+    errors = []
+    for seed in range(6):
+        (tmp_path / str(seed)).mkdir()
+        told = {"world": {"seed": 100 + seed}, "uncertainty": {"scale_ppm_k": 0, "nonlinearity_percent": 0}}
+        errors.append(off(calibrated(tmp_path / str(seed), told))[:3])
+    assert 0.8 < np.sqrt(np.mean(np.square(errors))) < 1.2
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(600)
+def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
+    """The laboratory goes at the computer's pace, for its clock is the sensor's."""
+    lines = {"columns": ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"], "time": None, "clock": "arrival"}
+    entry = calibrated(tmp_path, {"sensors": {"imu": {"lines": lines}}, "world": {"time_scale": 1}})
+    assert np.abs(off(entry)).max() < 4
+    text = json.dumps(entry)
+    assert "times of the samples" in text

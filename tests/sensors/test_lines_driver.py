@@ -1,0 +1,154 @@
+"""A device that prints lines on a pseudo-terminal: its samples come whole, and whatever is wrong with it has a name."""
+
+import time
+from collections.abc import Iterator
+from itertools import chain, count, repeat
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
+from rig.sensors.errors import SensorError
+from rig.sensors.lines.source import LinesSource, describe, lines, look
+from rig.sensors.source import SampleSource
+from support.printed_lines import SEVEN, pty_printing, sensor_section
+
+BOOT = b"ets Jul 29 2019\r\nrst:0x1\r\n"
+
+
+def printed(number: int) -> bytes:
+    return b"%d,1.5,-2.25,3,0.5,-0.25,1\r\n" % (number * 10_000)
+
+
+def stream(begin: int = 0) -> Iterator[bytes]:
+    return (printed(number) for number in count(begin))
+
+
+class Taken:
+    """What a source handed on."""
+
+    def __init__(self) -> None:
+        self.parts: list[NDArray[Any]] = []
+
+    def __call__(self, sensor: str, samples: NDArray[Any]) -> None:
+        self.parts.append(samples)
+
+    def wait(self, source: SampleSource, samples: int, timeout_s: float = 60.0) -> NDArray[Any]:
+        until_s = time.monotonic() + timeout_s
+        while sum(map(len, self.parts)) < samples and time.monotonic() < until_s:
+            source.check()
+            time.sleep(0.01)
+        return np.concatenate(self.parts)
+
+
+def raised(source: LinesSource, timeout_s: float = 60.0) -> SensorError:
+    until_s = time.monotonic() + timeout_s
+    while time.monotonic() < until_s:
+        try:
+            source.check()
+        except SensorError as error:
+            return error
+        time.sleep(0.01)
+    raise AssertionError("nothing was raised")
+
+
+def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
+    taken = Taken()
+    with pty_printing(chain([BOOT], stream())) as (port, _), lines("imu", sensor_section(port), taken) as source:
+        source.start()
+        samples = taken.wait(source, 50)
+        described = source.sensors["imu"]
+    assert (samples["sequence"] == np.arange(len(samples))).all()
+    assert (np.diff(samples["board_time_us"].astype(int)) == 10_000).all()
+    assert described.channel(RATE).values(samples)[0] == pytest.approx(np.radians([1.5, -2.25, 3]), abs=1e-8)
+    assert described.channel(ACCELERATION).values(samples)[0] == pytest.approx(
+        np.array([0.5, -0.25, 1]) * 9.80665, abs=1e-6
+    )
+    thermometer = described.channel(TEMPERATURE)
+    assert (thermometer.values(samples)[0], thermometer.resolution) == (22.0, 5.0), "it has none: as it is stated"
+
+
+def test_a_look_says_what_comes() -> None:
+    with pty_printing(chain([BOOT], stream())) as (port, _):
+        told = [str(each) for each in look("imu", sensor_section(port))]
+    assert any("100 a second" in each for each in told) and any("+1.5 -2.25 +3 deg/s" in each for each in told)
+
+
+@pytest.mark.parametrize(
+    ("chunks", "name"),
+    [
+        (list, "lines_silent"),
+        (lambda: repeat(b"\xf8\x9c\x01\xfe\x80" * 20), "lines_wrong_baud_rate"),
+        (lambda: repeat(b"\x00" * 100), "lines_wrong_baud_rate"),
+        (lambda: repeat(b"$GPGGA,1234,N,11*47\r\n"), "lines_other_format"),
+        (lambda: (printed(2 * number) for number in count()), "lines_other_rate"),
+        (lambda: repeat(printed(7)), "lines_time_stands"),
+    ],
+)
+def test_what_is_wrong_with_it_has_a_name(chunks: Any, name: str) -> None:
+    with (
+        pty_printing(chunks()) as (port, _),
+        pytest.raises(SensorError, match=name) as refused,
+        lines("imu", sensor_section(port), Taken()),
+    ):
+        pass
+    assert "sensors.imu" in str(refused.value)
+
+
+def test_no_port_is_no_port(tmp_path: Path) -> None:
+    with pytest.raises(SensorError, match="no_port"), lines("imu", sensor_section(str(tmp_path / "none")), Taken()):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("then", "name"),
+    [
+        (lambda: stream(0), "lines_time_jumped"),
+        (lambda: repeat(b"Guru Meditation Error\r\n" * 20), "lines_damaged"),
+        pytest.param(list, "lines_link_lost", marks=pytest.mark.slow),
+    ],
+)
+def test_what_happens_in_a_stream_has_a_name(then: Any, name: str) -> None:
+    chunks = chain((printed(number) for number in range(10**4, 10**4 + 150)), then())
+    with pty_printing(chunks) as (port, _), lines("imu", sensor_section(port), Taken()) as source:
+        source.start()
+        assert raised(source).name == name
+
+
+def test_an_unplugged_device_is_a_lost_link() -> None:
+    with pty_printing(stream()) as (port, unplugged), lines("imu", sensor_section(port), Taken()) as source:
+        source.start()
+        unplugged.set()
+        assert raised(source).name == "lines_link_lost"
+
+
+def test_arrival_times_are_recorded_as_less_certain() -> None:
+    section = sensor_section("/dev/null", columns=SEVEN[1:], time=None, clock="arrival", jitter_ms=30)
+    assert describe("imu", section).stamp_std_s == pytest.approx(0.03 / np.sqrt(3))
+    assert describe("imu", sensor_section("/dev/null")).stamp_std_s is None
+
+
+@pytest.mark.parametrize("count", [12_000, pytest.param(600_000, marks=[pytest.mark.proof, pytest.mark.thorough])])
+@pytest.mark.timeout(1200)
+def test_1000_hz_of_seven_columns_lose_nothing(count: int) -> None:
+    """Ten minutes of it; as fast as they are read, for a pseudo-terminal keeps some thousand bytes."""
+    taken = [0]
+    last = [-1]
+
+    def take(sensor: str, samples: NDArray[Any]) -> None:
+        assert (np.diff(samples["sequence"], prepend=last[0]) == 1).all()
+        last[0] = int(samples["sequence"][-1])
+        taken[0] += len(samples)
+
+    rows = b"".join(b"%d,%.3f,-2.25,3.125,0.5012,-0.2512,1.0012\r\n" % (1000 * n, n % 90) for n in range(count + 500))
+    chunks = (rows[at : at + 2000] for at in range(0, len(rows), 2000))
+    with pty_printing(chunks, 0.001) as (port, _), lines("imu", sensor_section(port, rate_hz=1000), take) as source:
+        source.start()
+        until_s = time.monotonic() + 1000
+        while last[0] < count - 3000 and time.monotonic() < until_s:
+            source.check()
+            time.sleep(0.02)
+    assert last[0] >= count - 3000, "the first ones are looked at before it begins"
