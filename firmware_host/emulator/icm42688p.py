@@ -95,6 +95,7 @@ class Icm42688P:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
+        self._pulse_end_s = math.inf
         motion = Remembered(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)

@@ -94,6 +94,7 @@ class Lsm6dsv16x:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
+        self._pulse_end_s = math.inf
         motion = Remembered(motion_at)
         self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
         self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
@@ -176,7 +177,7 @@ class Lsm6dsv16x:
     def _read_output(self, address: int) -> int:
         """One of the registers from the status on; what is between them and behind them reads 0."""
         if address < _OUTX_L_G:
-            return (self._status, 0, *self._temperature)[address - _STATUS_REG]
+            return int((self._status, 0, *self._temperature)[address - _STATUS_REG])
         if address == _EIS_X_L:
             return 0
         outputs, first, flag = (

@@ -16,7 +16,8 @@ def stamped(values: np.ndarray, rate_hz: float = 100, **section: Any) -> tuple[S
     """Numbers and times of `values` that come ten at a time."""
     stamper = Stamper(lines_section(acceleration=None, **section), rate_hz)
     found = [stamper.stamp(values[at : at + 10], 0, 0.1 * at / 10) for at in range(0, len(values), 10)]
-    return stamper, *(np.concatenate([each[place] for each in found]) for place in (1, 2))
+    _, numbers, times_us = (np.concatenate([each[place] for each in found]) for place in (0, 1, 2))
+    return stamper, numbers, times_us
 
 
 def rows(first: np.ndarray) -> np.ndarray:
@@ -71,8 +72,8 @@ def test_coarse_times_are_made_even_and_never_meet() -> None:
 
 def test_by_counting_the_clock_is_the_devices_rate() -> None:
     values = np.column_stack([np.delete(np.arange(500), 77), np.zeros((499, 3))])
-    section = {"columns": ("sequence", "gx", "gy", "gz"), "time": None, "clock": "counted"}
-    _, numbers, times_us = stamped(values, **section)
+    section: dict[str, Any] = {"columns": ("sequence", "gx", "gy", "gz"), "time": None, "clock": "counted"}
+    _, numbers, times_us = stamped(values, 100, **section)
     assert np.array_equal(times_us, numbers * 10_000) and numbers[-1] == 499
 
 

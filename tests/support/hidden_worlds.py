@@ -27,6 +27,7 @@ from support.worlds import merge
 JOINTS = 6
 WRISTS = np.array([0, 0, 0, 1, 1, 1])
 QUIET_RAD_S, NOISY_RAD_S = 0.002, 0.035
+MILLI_G_M_S2 = 1e-3 * STANDARD_GRAVITY_M_S2
 STATED = UncertaintySection()
 ASKEW_DEG = 8.0
 WARMER_K = 0.3
@@ -40,7 +41,7 @@ ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
     "mavlink": (0.03, 0.5),
     **{
-        name: (1e-2 * (off.acceleration_scale_percent or 1.0), 1e-3 * off.acceleration_bias_mg * STANDARD_GRAVITY_M_S2)
+        name: (1e-2 * (off.acceleration_scale_percent or 1.0), MILLI_G_M_S2 * (off.acceleration_bias_mg or 0.0))
         for name, off in ((name, PARTS[name].delivered) for name in BY_SHEET)
     },
 }  # fmt: skip
@@ -115,6 +116,7 @@ def by_its_sheet(part: str, seed: int) -> dict[str, Any]:
     document["sensors"] = {name: each for name, each in document["sensors"].items() if each is not None}
     ((name, section),) = document["sensors"].items()
     sheet, off = PARTS[part], PARTS[part].delivered
+    assert off.bias_deg_s is not None and off.scale_percent is not None and off.rate_percent is not None
     half_band_hz = section["rate_hz"] / 2
     noise_rad_s = np.radians(sheet.angle_random_walk_deg_sqrt_h / 60) * np.sqrt(2 * half_band_hz)
     noise_m_s2 = 1e-6 * sheet.acceleration_noise_ug_sqrt_hz * np.sqrt(half_band_hz) * STANDARD_GRAVITY_M_S2

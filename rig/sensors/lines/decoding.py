@@ -106,7 +106,7 @@ class LineReader:
         values, decimals = self._values(text, classes, (line_starts, line_ends), good, right)
         wrong_sums = int(np.count_nonzero(good & ~right))
         taken = good & right
-        before = np.cumsum(taken)[~taken]
+        before = np.cumsum(taken, dtype=np.int64)[~taken]
         why = b""
         if len(before):
             place = int(np.argmin(taken))
@@ -130,7 +130,7 @@ class LineReader:
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         begun = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
-        right = (ends - starts > 3) & (raw[star] == _STAR) & (high < 16) & (low < 16)
+        right: NDArray[np.bool_] = (ends - starts > 3) & (raw[star] == _STAR) & (high < 16) & (low < 16)
         up_to = np.concatenate([[0], np.bitwise_xor.accumulate(raw)])  # of all bytes before each
         right &= (up_to[star] ^ up_to[np.minimum(begun, star)]) == (high << 4 | low)
         for back in (1, 2, 3):
@@ -168,12 +168,12 @@ class LineReader:
         mine = _of_lines(starts, line_starts, line_ends, good)
         starts, ends = starts[mine].reshape(-1, self._columns), ends[mine].reshape(-1, self._columns)
         if divided:
-            between = between[_of_lines(between, line_starts, line_ends, good)].reshape(-1, wanted)
+            parts = between[_of_lines(between, line_starts, line_ends, good)].reshape(-1, wanted)
             if self._keys:
-                named = (text[between] == _KEYS + np.arange(self._columns)).all(axis=1)
-                ordered = (between < starts).all(axis=1) & (ends[:, :-1] <= between[:, 1:]).all(axis=1) & named
+                named = (text[parts] == _KEYS + np.arange(self._columns)).all(axis=1)
+                ordered = (parts < starts).all(axis=1) & (ends[:, :-1] <= parts[:, 1:]).all(axis=1) & named
             else:
-                ordered = ((ends[:, :-1] <= between) & (between < starts[:, 1:])).all(axis=1)
+                ordered = ((ends[:, :-1] <= parts) & (parts < starts[:, 1:])).all(axis=1)
             good[np.flatnonzero(good)[~ordered]] = False
             starts, ends = starts[ordered], ends[ordered]
         summed = right[good]

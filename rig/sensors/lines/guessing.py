@@ -8,10 +8,12 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 from rig.sensors.lines.shape import Shape
 
+Flags = NDArray[np.bool_]
 G = 9.80665
 ON_HAND = 0.12  # of a size that is known, as far as an accelerometer that nobody calibrated and a hand may be off
 COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
@@ -152,7 +154,7 @@ def _unit_of_time(steps: Array, apart_s: float) -> str | None:
     return None
 
 
-def _find_triads(shape: Shape, found: Guess, still: Array) -> None:
+def _find_triads(shape: Shape, found: Guess, still: Flags) -> None:
     """Three columns after one another that nobody named: by their sizes at rest and while it is turned."""
     for start in range(shape.values.shape[1] - 2):
         places = slice(start, start + 3)
@@ -172,7 +174,7 @@ def _find_triads(shape: Shape, found: Guess, still: Array) -> None:
         found.untold.append("which columns are the gyroscope: none reads nothing at rest, and much when it is turned")
 
 
-def _kind(values: Array, still: Array) -> str | None:
+def _kind(values: Array, still: Flags) -> str | None:
     rest, turned = values[still], values[~still]
     if len(rest) < 10 or len(turned) < 10:
         return None
@@ -207,7 +209,7 @@ def _field(level: float) -> tuple[str, float] | None:
     return None
 
 
-def _unit(shape: Shape, found: Guess, kind: str, still: Array) -> dict[str, object]:
+def _unit(shape: Shape, found: Guess, kind: str, still: Flags) -> dict[str, object]:
     """Unit and scale of a triad: as its names say, else as the readings do."""
     places = [found.columns.index(kind + axis) for axis in "xyz"]
     name = shape.names[places[0]].lower() if shape.names else ""
@@ -229,7 +231,7 @@ def _unit(shape: Shape, found: Guess, kind: str, still: Array) -> dict[str, obje
     return {"unit": unit} if scale == 1 else {"unit": unit, "scale": float(f"{scale:.9g}")}
 
 
-def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Array) -> tuple[str, float] | None:
+def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Flags) -> tuple[str, float] | None:
     """Unit and scale of the gyroscope, by how far gravity went round while it read so much."""
     if "ax" not in found.columns or not found.rate_hz:
         return None
@@ -262,7 +264,7 @@ def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Array) -> tuple[
     return None
 
 
-def _find_temperature(shape: Shape, found: Guess, still: Array) -> None:
+def _find_temperature(shape: Shape, found: Guess, still: Flags) -> None:
     if "temperature" in found.columns:
         return
     for place, name in enumerate(found.columns):

@@ -198,13 +198,12 @@ class Evened:
         last, before, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self._number
         if self._number < 0:
             self._number, self._time_s = last, told_s
-            found: Array = told_s - (last - numbers) * self._period_s
-            return found
+            return np.asarray(told_s - (last - numbers) * self._period_s, np.float64)
         wrong_s = told_s - self.ahead_s(count)
         share = 1 - exp(-count * self._period_s / SMOOTHED_S)
         self._time_s = max(self.ahead_s(count) + share * wrong_s, before + 1e-6 * count)
         self._period_s = max(self._period_s + share**2 / 4 * wrong_s / count, 1e-6)
-        found = before + (self._time_s - before) * (numbers - self._number) / count
+        found: Array = before + (self._time_s - before) * (numbers - self._number) / count
         self._number = last
         return found
 
