@@ -34,7 +34,7 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     assert list(new["provenance"]) == list(old["provenance"])
     assert list(new["sensors"]["gyro"]) == [
         *old["sensors"]["gyro"],
-        *("correction", "correction_matrix", "scale_at", "bias_at"),
+        *("correction", "correction_matrix", "scale_at", "bias_at", "by_hand"),
     ]
 
 

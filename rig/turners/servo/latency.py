@@ -7,16 +7,18 @@ rights) the driver sets it to 1 ms. Other ports have no such file and nothing to
 
 from contextlib import suppress
 from pathlib import Path
-
-import serial
+from typing import TYPE_CHECKING
 
 from rig.errors import Refused
+
+if TYPE_CHECKING:
+    import serial
 
 DEVICES = Path("/sys/bus/usb-serial/devices")
 BEARABLE_MS = 2
 
 
-def lower_latency(port: serial.Serial, path: str, devices: Path = DEVICES) -> None:
+def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> None:
     """Have what comes handed on at once. Raises Refused `servo_adapter_slow` where the timer stays long."""
     timer = devices / Path(path).resolve().name / "latency_timer"
     with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port that has no such thing
