@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured
-from rig.commands.laboratory import SimulatedOperator, hands_of, simulated_laboratory
+from rig.commands.laboratory import hands_of, simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
+from rig.commands.simulated_operator import SimulatedOperator
 from rig.data.run_folder import CONFIG, LOG, WORLD_LATE
 from rig.report.document import document_of
 from rig.report.table import print_kept

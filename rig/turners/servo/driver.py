@@ -35,7 +35,6 @@ HUNG_S = 1.0  # the thread that has the line comes round at least this often
 KEPT_S = 1.0  # of states, to tell rest from motion
 NOT_HELD = StopOutcome(True, "the servo was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
-BEFORE_THE_FIRST_MOVE = f"The servo has no brake and no emergency stop: {SURE}. Have it within reach."
 
 
 def _nothing() -> None:

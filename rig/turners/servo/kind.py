@@ -13,9 +13,6 @@ from rig.motion.preflight import step_problems
 from rig.motion.state import Made
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Words
-from rig.turners.servo import driver
-from rig.turners.servo.bus import Bus
-from rig.turners.servo.looking import look_at
 from rig.turners.servo.models import MAKER, named
 from rig.turners.servo.moves import move_problems
 from rig.turners.servo.preflight import servo_problems
@@ -30,7 +27,9 @@ FARTHEST_RAD = 2 * pi
 
 
 def _connect(section: ServoSection, on_state: OnState, log: Path) -> AbstractContextManager[Turner]:
-    return driver.Servo(
+    from rig.turners.servo.driver import Servo
+
+    return Servo(
         section.port,
         section.model,
         on_state,
@@ -42,6 +41,9 @@ def _connect(section: ServoSection, on_state: OnState, log: Path) -> AbstractCon
 
 
 def _look(section: ServoSection) -> ServoReport:
+    from rig.turners.servo.bus import Bus
+    from rig.turners.servo.looking import look_at
+
     bus = Bus(section.port, section.baud, section.id)
     try:
         return look_at(bus, section.port, section.id)
@@ -115,7 +117,8 @@ SERVO = TurnerKind(
         "each axis",
         briefly="{turns} and rests on the shaft of a servo",
         directions="how the item is mounted on the shaft",
-        beware=driver.BEFORE_THE_FIRST_MOVE,
+        beware="The servo has no brake and no emergency stop: only the switch of its supply is sure. "
+        "Have it within reach.",
         stands="stands still and holds its shaft as long as it has its supply",
         clock="this computer's oscillator, by a clock that nobody sets",
         told="as the stages of the procedure say",
