@@ -12,10 +12,13 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.check import Check
 from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
+from rig.config.load import parse
+from rig.config.world_models import SimulatedSensorSection
 from rig.errors import RigError
 from rig.estimation.budget import Budget
 from rig.observation.observed_run import ObservedRun
 from rig.plans.recorded import judged, open_run
+from rig.world.section import world_section
 from support.drawn_laboratory import bias_at_0_g, truth
 
 SCALE, BIAS = "gyroscope scale", "gyroscope bias"
@@ -92,20 +95,20 @@ def true_accelerometer(document: Mapping[str, Any], name: str, found: Accelerome
     Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. A bias that wanders is its mean
     over the dwells.
     """
-    sensor = document["world"]["sensors"][name]
-    drawn = sensor["accelerometer"]
+    sensor = world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
+    drawn = sensor.accelerometer
     at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
     warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))
-    scale = np.array(drawn["scale"]) * (1 + warmer_k * np.array(drawn.get("scale_per_k", 0.0)))
+    scale = np.array(drawn.scale) * (1 + warmer_k * np.array(drawn.scale_per_k))
     windows_s = sorted((dwell.window.start_s, dwell.window.end_s) for dwell in found.dwells)
     return np.concatenate([scale, bias_at_0_g(document, name, windows_s)])
 
 
-def _warmer_k(sensor: Mapping[str, Any], time_s: float) -> float:
+def _warmer_k(sensor: SimulatedSensorSection, time_s: float) -> float:
     """Than where its errors hold, `temperature_c`, of a part that gets power at zero."""
-    if sensor.get("start_temperature_c") is None:
+    if sensor.start_temperature_c is None:
         return 0.0
-    return float((sensor["start_temperature_c"] - sensor["temperature_c"]) * np.exp(-time_s / sensor["warm_up_s"]))
+    return float((sensor.start_temperature_c - sensor.temperature_c) * np.exp(-time_s / sensor.warm_up_s))
 
 
 def _split(part: str, names: Sequence[str], error: np.ndarray, budget: Budget) -> Iterable[Stated]:

@@ -1,7 +1,7 @@
 /* ADIS16465 data sheet; the same registers, times and checksum in Linux's drivers/iio/imu/adis16475.c, which serves this
    part, in PX4's src/drivers/imu/analog_devices/adis16470 and in ArduPilot's AP_InertialSensor_ADIS1647x.cpp. */
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define WRITE 0x80u /* first bit of a frame of 16 bits, the high byte first */

@@ -1,8 +1,8 @@
 /* ICM-42688-P data sheet (DS-000347, revision 1.8). Linux's drivers/iio/imu/inv_icm42600 and PX4's
    src/drivers/imu/invensense/icm42688p have the same registers, bits and times. */
 #include "byte_registers.h"
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x47u /* section 14.58 */

@@ -1,8 +1,8 @@
 /* LSM6DSV16X data sheet (DS13510, revision 4): registers section 9, SPI section 5. ST's own lsm6dsv16x_reg.c and Zephyr's
    drivers/sensor/st/lsm6dsv16x have the same registers and bits. */
 #include "byte_registers.h"
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x70u /* section 9.13 */

@@ -1,7 +1,7 @@
 /* LSM9DS1 datasheet (DocID025715): register map section 6, registers section 7, SPI section 5. */
 #include "byte_registers.h"
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x68u

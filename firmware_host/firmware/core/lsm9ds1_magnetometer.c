@@ -2,8 +2,8 @@
 #include <stddef.h>
 
 #include "byte_registers.h"
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x3Du

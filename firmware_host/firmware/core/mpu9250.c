@@ -1,8 +1,8 @@
 /* MPU-9250 register map (RM-MPU-9250A-00, "map") and product specification (PS-MPU-9250A-01, "specification"). Linux's
    drivers/iio/imu/inv_mpu6050 and PX4's src/drivers/imu/invensense/mpu9250 have the same registers, bits and speeds. */
 #include "byte_registers.h"
+#include "drivers.h"
 #include "port.h"
-#include "sensors.h"
 #include "settings.h"
 
 #define IDENTITY 0x71u /* the MPU-9255 says 0x73, the MPU-6500 0x70: other parts with other figures */

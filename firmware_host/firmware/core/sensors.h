@@ -5,17 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "board_parts.h"
-#include "sensor.h"
-
-/* Devices of the bus and data-ready lines are numbered as the sensors are. */
-#define NUMBER(driver, ...) SENSOR_##driver,
-enum sensor_number { SENSORS(NUMBER) };
-#undef NUMBER
-
-#define DECLARE(driver, ...) extern const struct sensor_driver driver;
-SENSORS(DECLARE)
-#undef DECLARE
+#include "drivers.h"
 
 extern const struct sensor_driver *const drivers[SENSOR_COUNT];
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from firmware_host.frames import Frame
-from firmware_host.parts import BOARD_PARTS
+from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
@@ -102,7 +102,7 @@ def test_whole_blocks_within_the_span_are_averaged_whatever_their_length(
     times_us = begun_us + PERIOD_US * np.arange(600)
     start_us, end_us = int(times_us[first]) - phase_us, int(times_us[first + length]) + phase_us
     frames = sweeps.ask("observe", sensor=0, index=0, start_us=max(start_us, begun_us), end_us=end_us, speed_rad_s=1.0)
-    block = 1 + int(duration_s * 238 * 1.1 / (1024 - 9))
+    block = 1 + int(duration_s * 238 * 1.1 / (1024 - 3 * len(GYROSCOPES)))
     if frames[0].name == "error":
         too_long = first + length + 1 > (int(duration_s * 238 * 1.1) // block + 3) * block - block
         assert error_of(frames) == "not_kept" and (length < 2 * block or too_long)

@@ -1,0 +1,17 @@
+/* The drivers of the board's sensors, by number: they know one another by this, and nothing of what is done with them. */
+#ifndef DRIVERS_H
+#define DRIVERS_H
+
+#include "board_parts.h"
+#include "sensor.h"
+
+/* Devices of the bus and data-ready lines are numbered as the sensors are. */
+#define NUMBER(driver, ...) SENSOR_##driver,
+enum sensor_number { SENSORS(NUMBER) };
+#undef NUMBER
+
+#define DECLARE(driver, ...) extern const struct sensor_driver driver;
+SENSORS(DECLARE)
+#undef DECLARE
+
+#endif
