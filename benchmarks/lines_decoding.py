@@ -68,8 +68,8 @@ def split_from_a_port(stream: bytes) -> float:
             os.write(master, stream[at : at + 2000])
 
     filling = threading.Thread(target=fill, daemon=True)
-    filling.start()
-    with serial.Serial(os.ttyname(slave), 921600, timeout=1) as port:
+    with serial.Serial(os.ttyname(slave), 921600) as port:
+        filling.start()  # not before: what has come when it opens is thrown away
         found = split(port, len(stream))
     filling.join()
     os.close(slave)

@@ -146,7 +146,7 @@ class Lsm6dsv16x:
         return 0xFF
 
     def foretell(self) -> bytes:
-        """Nothing: reading the outputs lowers flags, and a conversion may come in between."""
+        """No bytes: reading the outputs lowers flags, and a conversion may come in between."""
         return b""
 
     # --- registers

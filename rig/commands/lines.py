@@ -4,6 +4,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from rig.errors import Refused, raised_as
+from rig.errors.quoting import printable_lines
 from rig.station.plain_text import say
 
 
@@ -48,7 +49,7 @@ def run(options: Namespace) -> int:
     for untold in found.untold:
         _tell(f"CANNOT TELL {untold}")
     _tell('write what is known in place of "?"; rig check refuses the section until then')
-    print(section(shape, found, options.port, baud, options.name), end="")
+    sys.stdout.write(printable_lines(section(shape, found, options.port, baud, options.name)))
     return 0
 
 

@@ -33,6 +33,7 @@ Decimals = Annotated[
         ge=0,
         le=9,
         description="digits after the point that the device prints: the resolution; left out, it counts as fine enough",
+        json_schema_extra={"unit": "1"},
     ),
 ]
 
@@ -101,7 +102,10 @@ class LineTemperatureSection(Section):
         description="without a column `temperature`: how warm the sensor is, stated",
     )
     stated_within_k: Positive = Field(
-        default=5.0, le=60, description="… and by how much that may change in the course of a run"
+        default=5.0,
+        le=60,
+        description="… and by how much that may change in the course of a run",
+        json_schema_extra={"unit": "K"},
     )
 
 

@@ -61,7 +61,10 @@ class HandRestRefused:
 
 @dataclass(frozen=True, slots=True)
 class HandBegunAnew:
-    """Nothing before `begin_us` counts any more, by the error's name `again`: the table, or the sensor, is another."""
+    """The session begins anew: nothing before `begin_us` counts any more.
+
+    `again` is the error's name: the table, or the sensor, is another.
+    """
 
     begin_us: Microseconds
     again: Reason

@@ -44,7 +44,7 @@ def _alone(
     describe: Callable[[str, SensorSection], RecordedSensor],
     look: Callable[[str, SensorSection], Iterator[str | SensorError]],
 ) -> Kind:
-    """Of a part that has its port for itself."""
+    """The kind of a part that has its port for itself."""
 
     def only(sections: Sections) -> tuple[str, SensorSection]:
         (one,) = sections.items()

@@ -102,7 +102,7 @@ class Operator:
                 self._told = replace(action, mistake=None), self.time_s + SKIPPED_S
 
     def rate_at(self, time_s: float) -> Components:
-        """Nothing is ideal here: see `felt_at`."""
+        """Angular rate of what is carried, rad/s, as `felt_at` has it: a hand is never ideal."""
         return self.felt_at(time_s).rate_rad_s
 
     def felt_at(self, time_s: float) -> Felt:

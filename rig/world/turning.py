@@ -7,7 +7,10 @@ from rig.world.ur10e.flange_motion import Components, Felt
 
 
 class Turning(Protocol):
-    """It goes by ticks. Times are the world's, inside the last tick or the memory that delayed sensors need."""
+    """What turns the sensors, tick by tick.
+
+    Times are the world's, inside the last tick or the memory that delayed sensors need.
+    """
 
     @property
     def time_s(self) -> float:

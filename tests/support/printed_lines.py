@@ -1,6 +1,7 @@
 """Lines as devices print them, and a pseudo-terminal that they come from."""
 
 import os
+import select
 import threading
 import time
 import tty
@@ -50,15 +51,22 @@ def pty_printing(chunks: Iterable[bytes], pace_s: float = 0.01) -> Iterator[tupl
     """A port from which a chunk comes every `pace_s`, until they are at an end, and an event that unplugs it."""
     master, slave = os.openpty()
     tty.setraw(slave)
+    os.set_blocking(master, False)  # it is full when nobody reads, which must not hold up the end
     ending, unplugged = threading.Event(), threading.Event()
+
+    def over() -> bool:
+        return ending.is_set() or unplugged.is_set()
 
     def run() -> None:
         for chunk in chunks:
-            if ending.is_set() or unplugged.is_set():
+            rest = chunk
+            while rest and not over():
+                if select.select([], [master], [], 0.01)[1]:
+                    rest = rest[os.write(master, rest) :]
+            if over():
                 break
-            os.write(master, chunk)
             time.sleep(pace_s)
-        while not (ending.is_set() or unplugged.is_set()):
+        while not over():
             time.sleep(0.01)
         os.close(slave)
         os.close(master)

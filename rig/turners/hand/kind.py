@@ -64,7 +64,7 @@ class HandReport:
 
     @property
     def words(self) -> str:
-        """It in a line of text."""
+        """The turner in a line of text."""
         return "none, an operator's hand turns the item"
 
 
@@ -80,11 +80,11 @@ class Hand:
         return HandState(now_s, now_s)
 
     def report(self) -> HandReport:
-        """Nothing but that it is one."""
+        """A report that says no more than that a hand turns."""
         return HandReport(self.latest)
 
     def check(self) -> None:
-        """Nothing of it can go wrong."""
+        """A hand has nothing that can go wrong."""
 
     def take_control(self, carried: Carried) -> None:
         """There is nothing to take."""

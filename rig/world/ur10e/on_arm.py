@@ -76,15 +76,15 @@ class OnArm:
         self.arm.step(self.robot.time_s)
 
     def rate_at(self, time_s: float) -> Components:
-        """As of `Turning`."""
+        """Angular rate of the flange, rad/s, as `Turning` says."""
         return self.arm.rate_at(time_s)
 
     def felt_at(self, time_s: float) -> Felt:
-        """As of `Turning`."""
+        """All that a body on the flange feels, as `Turning` says."""
         return self.arm.felt_at(time_s)
 
     def frames_at(self, time_s: float) -> Frames:
-        """As of `Turning`."""
+        """Rotations and places of the arm's bodies, as `Turning` says."""
         return self.arm.frames_at(time_s)
 
 
