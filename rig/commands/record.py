@@ -11,6 +11,11 @@ from rig.commands.laboratory import simulated_laboratory
 from rig.errors import Refused
 from rig.station.plain_text import say
 
+NO_CRYSTAL = (
+    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can mend them "
+    "(rig solve --attitudes FILE --find-clock); rig solve --turns cannot use them"
+)
+
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig record`."""
@@ -39,7 +44,10 @@ def run(options: Namespace) -> int:
                 config, simulated = load_sensors(options.config, [*options.overrides, *moved])
             assert simulated is not None
             stack.enter_context(simulated_laboratory(simulated))
-        for path, seen in record_readings(config, options.out, options.duration_s).items():
-            say(f"{path}: {seen.samples} samples, {seen.lost} lost")
+        recorded = record_readings(config, options.out, options.duration_s)
+    for path, each in recorded.items():
+        say(f"{path}: {each.seen.samples} samples, {each.seen.lost} lost")
+    if any(each.follows_crystal is False for each in recorded.values()):
+        say(NO_CRYSTAL, file=sys.stderr)
     say(f"If they lay still: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
     return 0

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from types import TracebackType
@@ -11,13 +12,15 @@ from typing import Any, Self, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.board.crystal import follows_crystal
 from rig.board.identify import refusing
 from rig.config.models import SensorsConfig
 from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
+from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import SensorCount
-from rig.runner.sensors import board_source
+from rig.runner.sensors import BoardSource, board_source
 from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples
@@ -39,12 +42,25 @@ def connected(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[Sa
         yield tuple(sources)
 
 
-class ReadingsFile:
-    """A sensor's readings in SI units, a row each, by the clock that stamped them."""
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What a file holds: how many samples, and whether a board's clock followed its crystal (None: no board's)."""
 
-    def __init__(self, path: Path, name: str, sensor: RecordedSensor) -> None:
+    seen: SensorSamples
+    follows_crystal: bool | None
+
+
+class ReadingsFile:
+    """A sensor's readings in SI units, a row each, by the clock that stamped them.
+
+    A board's clock that `follows_crystal` counts too few microseconds by NOMINAL_DRIFT: its times are the crystal's.
+    """
+
+    def __init__(self, path: Path, name: str, sensor: RecordedSensor, follows_crystal: bool | None = None) -> None:
         """Raises OSError, and FileExistsError where there is such a file."""
         self.path = path
+        self.follows_crystal = follows_crystal
+        self._microsecond_s = 1e-6 * (1 + NOMINAL_DRIFT) if follows_crystal else 1e-6
         # Temperature has never been a column here.
         self._channels = [each for each in sensor.channels if each.quantity != TEMPERATURE.name]
         columns = [column for each in self._channels for column in each.measures.columns]
@@ -70,7 +86,7 @@ class ReadingsFile:
 
     def add(self, samples: NDArray[Any]) -> None:
         """Samples (n,) in the order they came. Raises OSError."""
-        time_s = samples["board_time_us"] * 1e-6
+        time_s = samples["board_time_us"] * self._microsecond_s
         if self._began_s is None:
             self._began_s = float(time_s[0])
         self.lasts_s = float(time_s[-1]) - self._began_s
@@ -80,7 +96,7 @@ class ReadingsFile:
         self._file.flush()
 
 
-def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, SensorSamples]:
+def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, Recorded]:
     """Record every sensor for so long by its own clock, into `folder`/<sensor>.csv; what each file holds.
 
     Nothing is moved. What was recorded stays when it ends early. Raises Refused as `connected`, and `run_folder`;
@@ -88,9 +104,10 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
     """
     arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
     with connected(config, lambda name, samples: arrived.put((name, samples))) as sources, ExitStack() as stack:
+        by_crystal = [_follows_crystal(source) for source in sources]
         files = {
-            name: stack.enter_context(_new_file(folder, name, sensor))
-            for source in sources
+            name: stack.enter_context(_new_file(folder, name, sensor, follows))
+            for source, follows in zip(sources, by_crystal, strict=True)
             for name, sensor in source.sensors.items()
         }
         for source in sources:
@@ -110,13 +127,21 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
                     f"no sample from {', '.join(silent)} within {FIRST_SAMPLE_S:g} s of the start",
                     "Check the sensor's wiring and its data-ready line, then run `rig check`",
                 )
-        return {file.path: file.seen for file in files.values()}
+        return {file.path: Recorded(file.seen, file.follows_crystal) for file in files.values()}
 
 
-def _new_file(folder: Path, name: str, sensor: RecordedSensor) -> ReadingsFile:
+def _follows_crystal(source: SampleSource) -> bool | None:
+    """Whether the board's clock does, by its own word; None of what has a port of its own."""
+    if not isinstance(source, BoardSource):
+        return None
+    with refusing():
+        return follows_crystal(source.board)
+
+
+def _new_file(folder: Path, name: str, sensor: RecordedSensor, follows_crystal: bool | None) -> ReadingsFile:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return ReadingsFile(folder / f"{name}.csv", name, sensor)
+        return ReadingsFile(folder / f"{name}.csv", name, sensor, follows_crystal)
     except OSError as error:
         raise Refused(
             "run_folder", f"{folder}/{name}.csv cannot be made: {error}", "Choose another with --out"

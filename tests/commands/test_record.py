@@ -111,3 +111,16 @@ def test_who_turns_the_sensors_needs_to_know_the_arm(tmp_path: Path) -> None:
     config = sensors_alone(tmp_path, world={"sensors": {}})
     simulated = rig_here("record", config, "--out", tmp_path / "out", "--duration-s", "1")
     assert simulated.returncode == 2 and "arm: missing" in simulated.stderr, simulated
+
+
+@pytest.mark.parametrize("crystal", [True, False], ids=["crystal", "none"])
+def test_a_boards_times_are_those_of_its_crystal_or_it_says_so(crystal: bool, tmp_path: Path) -> None:
+    board = f"world.board={{crystal: {str(crystal).lower()}, crystal_ppm: 0}}"
+    address = f"board.port=socket://{fresh_host()}:7321"
+    config, told = CONFIGS / "by_hand.yaml", ("--set", board, "--set", address)
+    done = rig_here("record", config, "--out", tmp_path, "--duration-s", "2", *told)
+    assert done.returncode == 0, done
+    assert ("does not follow its crystal" in done.stderr) is not crystal
+    if crystal:
+        time_s = np.loadtxt(tmp_path / "gyro.csv", delimiter=",", skiprows=1)[:, 0]
+        assert np.diff(time_s).mean() == pytest.approx(1 / 238, rel=1e-5)
