@@ -102,7 +102,12 @@ def _swings(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], times_
 
 
 def _ways(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
-    """Every one, from before the arm moves to when it stands, in which nothing is missing."""
+    """Every one, from before the arm moves to when it stands, in which nothing is missing.
+
+    There is none of a shaft whose encoder is known over whole turns alone: a way is a part of one.
+    """
+    if not motion.tells_parts_of_turns:
+        return
     windows = sorted([*(each.window for each in swept(run)), *rested(run)], key=lambda window: window.start_s)
     for before, after in pairwise(windows):
         yield from _moved(before.end_s, after.start_s, stream, motion)

@@ -105,6 +105,11 @@ class ArmMotion:
         """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
         return closely_followed(self.time_s, self._covered, time_s)
 
+    @property
+    def tells_parts_of_turns(self) -> bool:
+        """Whether an angle is where its reading says, so that not only whole turns are known."""
+        return not self._scatters
+
     def moved_rad(self, window: Window) -> float | None:
         """How far the joint that moved most was moved in a window; None where no two states tell."""
         q_rad = self._q_rad(window)

@@ -1,4 +1,7 @@
-"""How the item was found to sit in each stage of a run, in words for screens and certificates. Pure."""
+"""How the item was found to sit in each stage of a run, in words for screens and certificates. Pure.
+
+Turns about one axis of the item for each stage tell nothing of that: then there are no words.
+"""
 
 from collections.abc import Iterator
 from math import degrees, hypot
@@ -7,19 +10,26 @@ from rig.data.result_file import MountEntry, ResultDocument
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.rounding import plus_minus
 
+ROUNDING = 1e-6  # of its uncertainty: a turn that is smaller was not found but is what was assumed
+
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
     """A line for each stage but the first, against which the others are told; none where the item stayed mounted."""
-    yield from map(_line, result.mounts)
+    yield from map(_line, _found(result))
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
     """The line of the stage whose mount was farthest off, and how many there are beside it."""
-    if not result.mounts:
+    found = _found(result)
+    if not found:
         return
-    others = len(result.mounts) - 1
-    farthest = _line(max(result.mounts, key=lambda mount: hypot(*mount.turn_rad)))
+    others = len(found) - 1
+    farthest = _line(max(found, key=lambda mount: hypot(*mount.turn_rad)))
     yield farthest if not others else f"{farthest}; less in {others} other stage{'s' if others > 1 else ''}"
+
+
+def _found(result: ResultDocument) -> list[MountEntry]:
+    return [mount for mount in result.mounts if hypot(*mount.turn_rad) > ROUNDING * hypot(*mount.std_rad)]
 
 
 def _line(mount: MountEntry) -> str:

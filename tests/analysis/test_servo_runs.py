@@ -54,6 +54,7 @@ def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> No
 
 
 @pytest.mark.proof
+@pytest.mark.thorough
 @pytest.mark.timeout(1800)
 def test_error_over_uncertainty_is_about_one_in_many_runs() -> None:
     """Each with an encoder ±1.3° out, 7 % of ripple, 0.25° of play, an adapter a degree off in each mounting."""

@@ -266,7 +266,7 @@ def test_a_turned_tool_frame_is_refused_where_attitudes_are_visited(turned_rad: 
 def test_it_says_by_how_much_the_frame_is_turned() -> None:
     told = replace(REPORT, tcp_offset=(0.0, 0.0, 0.0, 0.0, 0.0, math.radians(45)))
     (problem,) = arm_problems(attitudes((45, -90, 0)), told)
-    assert "turned by 45° against the flange's" in problem.what and "TCP to zero" in problem.remedy
+    assert "turned by 45° relative to the flange's" in problem.what and "TCP to zero" in problem.remedy
 
 
 @pytest.mark.parametrize("wrist_2_deg", [-110.0, -90.0, 90.0])

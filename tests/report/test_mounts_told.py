@@ -10,6 +10,7 @@ from rig.data.result_file import MountEntry, ResultDocument, write_result
 from rig.page.shown import Shown
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.ending import ending
+from rig.report.mounts import farthest_off, mount_lines
 from rig.report.table import print_values
 from rig.station.events import DocumentWritten
 from support.certified import certificate, compared, read, result
@@ -40,6 +41,14 @@ def test_the_terminal_tells_every_stage_and_the_end_of_a_run_the_farthest() -> N
     assert [line.rstrip() for line in console.export_text().splitlines() if "mounted anew" in line] == TOLD
     said = ending(in_stages(), folder=None, everything="all", certificate=None, since=(), width=200)
     assert [line for line in said if "mounted anew" in line] == [f"{TOLD[0]}; less in 1 other stage"]
+
+
+def test_nothing_is_said_where_the_turns_tell_nothing_of_the_mounts() -> None:
+    """One axis of the item for each stage: every angle is found as it was assumed, but for rounding."""
+    unknown = entry(2, (1e-12, -2e-12, 0.0), (1.6, 1.6, 1.6))
+    result = in_stages().model_copy(update={"mounts": (unknown,)})
+    assert [*mount_lines(result), *farthest_off(result)] == []
+    assert "was mounted in" not in read(certificate(result)).text
 
 
 def test_certificates_tell_every_stage() -> None:
