@@ -75,6 +75,7 @@ class HandSession:
     _shift_s: float | None = None  # from the board's clock to the session's, once samples have come
     _move: Move | None = None  # that has ended, before the rest after it is judged
     _rest: Rest | None = None  # that has begun, before it has lasted as long as is wanted
+    _judged_s: float = -np.inf  # when the rest ended that was judged last
     _taken: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)  # the faces that lay up
     _refused: int = 0  # in a row
@@ -88,7 +89,7 @@ class HandSession:
             return
         self._segmenter, self._not_counted, ends_s = segmented(self.earlier, self.name)
         self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
-        self._begins_s = ends_s + BETWEEN_S
+        self._begins_s = self._judged_s = ends_s + BETWEEN_S
         for event in (recorded.event for run in self.earlier for recorded in run.events):
             if isinstance(event, HandMoveTaken):
                 self._taken.append(HandMove(event.kind, event.from_face, event.to_face, event.turns))
@@ -137,6 +138,7 @@ class HandSession:
         move, self._move, self._rest = self._move, None, None
         if move is not None and self._begins_s is not None and move.start_s < self._begins_s:
             move = None  # it was somewhere while nobody listened
+        self._pauses_before(rest)
         session = self._not_counted.without(self._segmenter.handled)
         now = self._progress = progress(session, self.told)
         wrong = now.asked or self._not_closed(now)
@@ -155,6 +157,15 @@ class HandSession:
             self._take(move, now, face)
         self._lay.append(face)
         self._ask(self._next(now, face), wrong)
+
+    def _pauses_before(self, rest: Rest) -> None:
+        """What rested too short to be judged is a pause in the hand, and no rest of the session."""
+        for pause in self._segmenter.handled.rests:
+            if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
+                event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")
+                self._not_counted.take(event, self._shift_s or 0.0)
+                self.note(event)
+        self._judged_s = rest.end_s
 
     def _not_closed(self, now: Progress) -> Fault | None:
         """What is wrong with a turn that was to be whole and ends too far from where it began."""

@@ -13,6 +13,7 @@ deviation; whose that is stands beside it.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -93,7 +94,7 @@ class Factor:
         return np.asarray(np.sqrt(sum(np.square(each) for each in self.causes.values())), dtype=np.float64)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Graph:
     """A session, on which faces, with what was told of it; where the solution is, and what the gyroscope says there."""
 
@@ -109,10 +110,15 @@ class Graph:
         """How many parameters there are."""
         return RESTS + 6 * len(self.session.rests)
 
-    @property
+    @cached_property
+    def noise_rad_s(self) -> float:
+        """The scatter of a reading at rest."""
+        return noise(self.session)
+
+    @cached_property
     def walk_rad_sqrt_s(self) -> float:
         """The angle random walk, of the scatter at rest as white noise."""
-        return noise(self.session) * float(np.sqrt(np.median(np.diff(self.session.time_s))))
+        return self.noise_rad_s * float(np.sqrt(np.median(np.diff(self.session.time_s))))
 
 
 def factors(graph: Graph) -> Iterator[Factor]:
@@ -215,7 +221,7 @@ def _rest(graph: Graph, row: int) -> Factor:
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s / np.sqrt(max(rest.end_s - rest.start_s, 1e-3))),
         "earth": np.full(3, EARTH_STD_RAD_S),
-        "held": np.full(3, _held(rest.noise_rad_s, noise(session), rest.end_s - rest.start_s)),
+        "held": np.full(3, _held(rest.noise_rad_s, graph.noise_rad_s, rest.end_s - rest.start_s)),
     }
     return Factor(REST, row, rest.mean_rad_s - state.biases[row] - state.sensitivity @ up, design, causes)
 

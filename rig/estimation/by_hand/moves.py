@@ -37,30 +37,25 @@ class Moved:
 
 def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up: Array) -> Moved:
     """The moves by F (3, 3), biases (N, 3) at the rests, G (3, 3) and the vertical `up` (N, 3) in the body at each."""
-    time_s, moves = session.time_s, session.moves
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
-    bias = np.column_stack([np.interp(time_s, middles, each) for each in biases.T])
-    felt = np.zeros_like(bias)
-    if sensitivity.any():
-        there = course(time_s, session.rates - bias, matrix, np.zeros(3), time_s)
-        for row, move in enumerate(moves):
-            inside = _inside(time_s, move.start_s, move.end_s)
-            felt[inside] = _vertical(there.attitudes[inside], up[row])
-    corrected = session.rates - bias - felt @ sensitivity.T
-    there = course(time_s, corrected, matrix, np.zeros(3), time_s)
     inverse = np.linalg.inv(matrix)
     rotations, by_theta, by_gravity, swept, durations, paths = [], [], [], [], [], []
-    for row, move in enumerate(moves):
-        inside = _inside(time_s, move.start_s, move.end_s)
-        attitudes, at_s = there.attitudes[inside], time_s[inside]
-        back = attitudes[0].T
+    for row, move in enumerate(session.moves):
+        inside = _inside(session.time_s, move.start_s, move.end_s)
+        at_s = session.time_s[inside]
+        corrected = session.rates[inside] - np.column_stack([np.interp(at_s, middles, each) for each in biases.T])
+        there = course(at_s, corrected, matrix, np.zeros(3), at_s)
+        if sensitivity.any():
+            corrected = corrected - _vertical(there.attitudes, up[row]) @ sensitivity.T
+            there = course(at_s, corrected, matrix, np.zeros(3), at_s)
+        attitudes, back = there.attitudes, there.attitudes[0].T
         rotations.append(back @ attitudes[-1])
-        by_theta.append(back @ (there.sensitivities[inside][-1] - there.sensitivities[inside][0]))
+        by_theta.append(back @ (there.sensitivities[-1] - there.sensitivities[0]))
         along = -(back @ attitudes @ inverse)[..., None] * _vertical(attitudes, up[row])[:, None, None, :]
         by_gravity.append(np.trapezoid(along.reshape(len(at_s), 3, 9), at_s, axis=0))
-        swept.append(np.trapezoid(corrected[inside], at_s, axis=0))
+        swept.append(np.trapezoid(corrected, at_s, axis=0))
         durations.append(float(np.ptp(at_s)))
-        paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s[inside], axis=1), at_s)))
+        paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s, axis=1), at_s)))
     theta = _stacked(by_theta, (3, 12))
     return Moved(
         _stacked(rotations, (3, 3)),
