@@ -92,7 +92,7 @@ def named(fit: Fit, doubt: Doubt) -> Fault:
             "turn_not_closed",
             f"the turn from {move.start_s:.1f} to {move.end_s:.1f} s ended {abs(np.degrees(missed)):.1f}° from where "
             "it began",
-            "Turn against a straight edge, so that it ends where it began; or say that there was none: --no-closure",
+            "Turn against a straight edge, so that it ends where it began (rig solve: or say --no-closure)",
         )
     if doubt.name == "lost_in_move":
         move = moves[doubt.at]
@@ -127,7 +127,7 @@ def _beyond(fit: Fit) -> Fault | None:
         return Fault("not_flat", what, _REMEDY)
     if sizes.closure_rad >= NEARLY * LARGEST.closure_rad:
         what = f"the turns do not end where they began, by {1e3 * sizes.closure_rad:.0f} mrad or more"
-        return Fault("turn_not_closed", what, "Turn against a straight edge; or say that there was none: --no-closure")
+        return Fault("turn_not_closed", what, "Turn against a straight edge (rig solve: or say --no-closure)")
     if sizes.of_angle >= NEARLY * LARGEST.of_angle:
         what = f"the moves contradict each other by {100 * sizes.of_angle:.2f} % of a quarter turn or more"
         return Fault("lost_in_move", what, _REMEDY)
