@@ -441,7 +441,7 @@ class WorldSection(Section):
         """What of this does not go with what turns, a line each."""
         kinds: dict[str, type[TurnerSection]] = {"arm": ArmSection, "servo": ServoSection, "hand": HandSection}
         for name, kind in kinds.items():
-            if name in self.model_fields_set and not isinstance(turner, kind):
+            if getattr(self, name) != type(self).model_fields[name].default and not isinstance(turner, kind):
                 yield f"world.{name}: there is none; another kind of turner turns the sensors"
         if isinstance(turner, ServoSection) and self.time_scale != 1.0:
             yield (

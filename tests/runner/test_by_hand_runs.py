@@ -38,16 +38,16 @@ def held(run: Path) -> None:
 
 
 def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(tmp_path: Path) -> None:
-    path, out = config(tmp_path, world={"seed": 11, "hand": {"mistakes": {"too_fast": 0.2}}}), tmp_path / "run"
+    path, out = config(tmp_path, world={"seed": 11, "hand": {"mistakes": {"short": 0.5}}}), tmp_path / "run"
     done = rig("run", path, "--out", out, "--set", "procedure.flips=8", timeout_s=270)
     assert done.returncode == 0, done.stderr + done.stdout
     assert "again: " in done.stderr
-    assert "not taken: clipping" in done.stderr
+    assert "not taken: turn_not_closed" in done.stderr
     held(out)
     again = rig_here("solve", out, "--json")
     first, second = json.loads((out / "result.json").read_text()), json.loads(again.stdout)
     assert first["sensors"] == second["sensors"]
-    assert "by hand" in (out / "certificate.html").read_text(encoding="utf-8")
+    assert "By hand: the item was turned" in (out / "certificate.html").read_text(encoding="utf-8")
     assert rig_here("show", out).returncode == 0
 
 

@@ -357,7 +357,7 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     handle.control({"do": "unplug_board"})
     missing = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert missing.returncode == 2 and "not ready: 2 to mend" in missing.stdout
-    assert "missing: speed_slider: the speed slider stands at 30 %" in missing.stderr
+    assert "missing: speed_slider: the speed slider is at 30 %" in missing.stderr
     state = handle.state()
     assert not state["program_running"] and not state["moving"] and state["claims"] == []
 

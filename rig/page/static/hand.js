@@ -58,7 +58,11 @@ function sound({ tone, tones }) {
   if (tones === heard) return;
   const first = heard === null;
   heard = tones ?? 0;
-  if (first || !audio || !tone) return;
+  if (!first && tone) play(tone);
+}
+
+function play(tone) {
+  if (!audio) return;
   let at = audio.currentTime;
   for (const [hertz, lasting] of TONES[tone]) {
     const [wave, loud] = [audio.createOscillator(), audio.createGain()];
@@ -78,7 +82,7 @@ $("hand-sound").addEventListener("click", async () => {
   audio = audio ? null : new AudioContext();
   $("hand-sound").setAttribute("aria-pressed", audio ? "true" : "false");
   $("hand-sound").textContent = audio ? "Sound is on" : "Sound is off: tap for tones";
-  if (audio) { heard = -1; sound({ tone: "rest", tones: 0 }); heard = null; }
+  play("rest");
 });
 
 // -- the drawing ------------------------------------------------------------------------------------------------
