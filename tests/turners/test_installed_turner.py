@@ -99,7 +99,7 @@ def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, instal
     assert "table at /dev/ttyUSB7: Toys T1, serial number T-7" in checked["seen"]
     assert [problem["name"] for problem in checked["missing"]] == ["no_port"]
     wrong = ran(installed, "-m", "rig", "plan", config, "--set", "turner.kind=turntabel", status=2)
-    allowed = "did you mean turntable?; allowed: ur, servo, turntable"
+    allowed = "did you mean turntable?; allowed: ur, hand, servo, turntable"
     assert f"turner.kind (--set): 'turntabel' is not allowed, {allowed}" in wrong
     wrong = ran(installed, "-m", "rig", "plan", config, "--set", "procedure.name=six_observation", status=2)
     assert "other_turner" in wrong
