@@ -13,11 +13,12 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, why_closed
+from firmware_host.serial_port import SerialPort, why_closed
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.settings import NAMES, Wanted, same
+from rig.sensors.silence import Silence
 
 ATTEMPTS = 4  # times a command is sent; each waits twice as long as the one before
 SILENCE_S = 2.0  # without a message in a stream, and the link is lost
@@ -44,7 +45,7 @@ class Kvh1775:
         self._sensor, self._port, self._baud = sensor, port, baud
         self._on_messages, self._timeout_s = on_messages, timeout_s
         self._messages = MessageReader()
-        self._bytes_seen = self._messages_seen = self._idle_reads = 0
+        self._bytes_seen = self._messages_seen = 0
         self._tests: list[BuiltInTest] = []
         self._counter: MessageCounter | None = None  # while it streams
         self._format = b""
@@ -52,8 +53,7 @@ class Kvh1775:
         self._heard = bytearray()
         self._news = threading.Condition()
         self._closing = threading.Event()
-        self._clock_s: float | None = None  # what another instrument's clock showed at the last check,
-        self._clock_at_message_s: float | None = None  # … and when the last message came
+        self._silence = Silence()
         try:
             self._serial = SerialPort(port, baud)
         except OSError as error:
@@ -140,7 +140,7 @@ class Kvh1775:
         with self._news:
             self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
             self._format = wanted.message.encode()
-            self._idle_reads = 0
+            self._silence.restart()
 
     @property
     def lost(self) -> int:
@@ -155,8 +155,7 @@ class Kvh1775:
         if self._fault is not None:
             raise self._fault
         with self._news:
-            self._clock_s = self._clock_s if clock_s is None else clock_s
-            silent_s = self._silent_s
+            silent_s = self._silence.seen_by(clock_s)
         if self._counter is not None and silent_s > SILENCE_S + 2e-6 * self._counter.interval_us:
             raise SensorError(
                 "kvh_link_lost",
@@ -167,19 +166,6 @@ class Kvh1775:
     def listen(self, duration_s: float) -> None:
         """Waits so long while it streams. Raises what goes wrong meanwhile."""
         self._wait(lambda: False, duration_s)
-
-    @property
-    def _silent_s(self) -> float:
-        """How long no message has come, in time spent reading: when the reader was held up, nobody was silent.
-
-        Nor was anybody while another instrument's clock stood still, if there is one: it may be a simulated one's.
-        """
-        silent_s = self._idle_reads * READ_TIMEOUT_S
-        if self._clock_s is None:
-            return silent_s
-        if self._clock_at_message_s is None:
-            self._clock_at_message_s = self._clock_s
-        return min(silent_s, self._clock_s - self._clock_at_message_s)
 
     def fail(self, error: SensorError) -> None:
         """Makes `error` what `check` raises, unless there is one already."""
@@ -285,11 +271,11 @@ class Kvh1775:
     def _take(self, data: bytes, host_time_s: float) -> None:
         decoded = self._messages.feed(data)
         with self._news:
-            silent_s = self._silent_s
+            silent_s = self._silence.lasts_s
             if len(decoded.messages):
-                self._idle_reads, self._clock_at_message_s = 0, self._clock_s
+                self._silence.heard()
             else:
-                self._idle_reads += 1
+                self._silence.idle()
             if not data:
                 return
             self._bytes_seen += len(data)

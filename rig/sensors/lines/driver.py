@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, why_closed
+from firmware_host.serial_port import SerialPort, why_closed
 from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection
 from rig.config.sensor_sections import OwnPortSection
 from rig.errors.quoting import quote
@@ -21,6 +21,7 @@ from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.decoding import Decoded, LineReader
 from rig.sensors.lines.stamping import Stamper
+from rig.sensors.silence import Silence
 
 FIRST_LINE_S = 4.0  # in which a device must have begun: an Arduino starts anew when its port is opened
 LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
@@ -91,12 +92,10 @@ class LinesDevice:
         self._stamper: Stamper | None = None  # while it streams
         self._skipped = 0  # lines that were no samples since the last that was
         self._seen: list[Array] = []  # until it is known what comes
-        self._idle_reads = 0
         self._fault: SensorError | None = None
         self._news = threading.Condition()
         self._closing = threading.Event()
-        self._clock_s: float | None = None  # what another instrument's clock showed at the last check,
-        self._clock_at_sample_s: float | None = None  # … and when the last sample came
+        self._silence = Silence()
         try:
             self._serial = SerialPort(line.port, line.baud)
         except OSError as error:
@@ -135,7 +134,8 @@ class LinesDevice:
         """Start to hand everything to `on_values`, from the next line on."""
         with self._news:
             self._stamper = Stamper(self._section, self._rate_hz)
-            self._idle_reads = self._skipped = 0
+            self._skipped = 0
+            self._silence.restart()
 
     @property
     def lost(self) -> int:
@@ -150,8 +150,7 @@ class LinesDevice:
         if self._fault is not None:
             raise self._fault
         with self._news:
-            self._clock_s = self._clock_s if clock_s is None else clock_s
-            silent_s = self._silent_s
+            silent_s = self._silence.seen_by(clock_s)
         if self._stamper is not None and silent_s > LONGEST_GAP_S + 2 / self._rate_hz:
             raise SensorError("lines_link_lost", f"{self.where} has sent no sample for {silent_s:.1f} s", _CABLE)
 
@@ -166,19 +165,6 @@ class LinesDevice:
         self._closing.set()
         self._thread.join()
         self._serial.close()
-
-    @property
-    def _silent_s(self) -> float:
-        """How long no sample has come, in time spent reading: when the reader was held up, nobody was silent.
-
-        Nor was anybody while another instrument's clock stood still, if there is one: it may be a simulated one's.
-        """
-        silent_s = self._idle_reads * READ_TIMEOUT_S
-        if self._clock_s is None:
-            return silent_s
-        if self._clock_at_sample_s is None:
-            self._clock_at_sample_s = self._clock_s
-        return min(silent_s, self._clock_s - self._clock_at_sample_s)
 
     # -- what comes at all -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
@@ -270,9 +256,9 @@ class LinesDevice:
         decoded = self._reader.feed(data)
         with self._news:
             if len(decoded.values):
-                self._idle_reads, self._clock_at_sample_s = 0, self._clock_s
+                self._silence.heard()
             else:
-                self._idle_reads += 1
+                self._silence.idle()
             if not data:
                 return
             self.counts.add(decoded)

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from firmware_host.serial_port import READ_TIMEOUT_S, why_closed
+from firmware_host.serial_port import why_closed
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
 from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
 from rig.sensors.mavlink.port import open_port
+from rig.sensors.silence import Silence
 
 ATTEMPTS = 4  # times something is asked; each waits twice as long as the one before
 SILENCE_S = 2.0  # without a message, and the link is lost
@@ -71,14 +72,13 @@ class Link:
         self.counter = LinkCounter()
         self.autopilot: Autopilot | None = None
         self.armed = False
-        self._bytes_seen = self._others_seen = self._idle_reads = 0
+        self._bytes_seen = self._others_seen = 0
         self._parameters: dict[str, Parameter] = {}
         self._answers: dict[int, int] = {}
         self._version: Any = None
         self._streaming = False
         self._fault: SensorError | None = None
-        self._clock_s: float | None = None
-        self._clock_at_message_s: float | None = None
+        self._silence = Silence()
         self._news, self._sending = threading.Condition(), threading.Lock()
         self._closing = threading.Event()
         try:
@@ -181,7 +181,7 @@ class Link:
     def start(self) -> None:
         """Start to take the stream's silence for a fault."""
         with self._news:
-            self._streaming, self._idle_reads, self._clock_at_message_s = True, 0, None
+            self._streaming, self._silence = True, Silence()
 
     def check(self, clock_s: float | None = None) -> None:
         """Raises what went wrong meanwhile: `mavlink_link_lost`, `autopilot_armed`, what a consumer raised.
@@ -191,8 +191,7 @@ class Link:
         if self._fault is not None:
             raise self._fault
         with self._news:
-            self._clock_s = self._clock_s if clock_s is None else clock_s
-            silent_s = self._silent_s
+            silent_s = self._silence.seen_by(clock_s)
         if self._streaming and silent_s > SILENCE_S:
             raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
 
@@ -220,16 +219,6 @@ class Link:
     @property
     def _address(self) -> tuple[int, int]:
         return self.known.system, self.known.component
-
-    @property
-    def _silent_s(self) -> float:
-        """How long no message has come, in time spent reading, nor longer than by another instrument's clock."""
-        silent_s = self._idle_reads * READ_TIMEOUT_S
-        if self._clock_s is None:
-            return silent_s
-        if self._clock_at_message_s is None:
-            self._clock_at_message_s = self._clock_s
-        return min(silent_s, self._clock_s - self._clock_at_message_s)
 
     def _find(self) -> None:
         if not self._wait(lambda: self.autopilot is not None, self._timeout_s):
@@ -326,9 +315,9 @@ class Link:
                     found.append((message, self.counter.lost == lost))
             # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
             if found if self._streaming else heard:
-                self._idle_reads, self._clock_at_message_s = 0, self._clock_s
+                self._silence.heard()
             else:
-                self._idle_reads += 1
+                self._silence.idle()
             if self.armed and self._streaming:
                 raise self._armed()
             if data:

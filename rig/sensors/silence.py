@@ -1,0 +1,45 @@
+"""How long a sensor with a port of its own has sent nothing, by reads of its port and by another clock."""
+
+from firmware_host.serial_port import READ_TIMEOUT_S
+
+
+class Silence:
+    """The reader says what came; whoever checks the link says what another instrument's clock shows, if there is one.
+
+    It is not locked: both hold the driver's own lock meanwhile.
+    """
+
+    def __init__(self) -> None:
+        self._idle_reads = 0
+        self._clock_s: float | None = None  # what the other clock showed at the last check,
+        self._clock_then_s: float | None = None  # … and when something came last
+
+    def heard(self) -> None:
+        """Something came."""
+        self._idle_reads, self._clock_then_s = 0, self._clock_s
+
+    def idle(self) -> None:
+        """A read brought nothing."""
+        self._idle_reads += 1
+
+    def restart(self) -> None:
+        """Count reads from here on."""
+        self._idle_reads = 0
+
+    def seen_by(self, clock_s: float | None) -> float:
+        """How long it lasts, s, now that the other clock shows `clock_s`."""
+        self._clock_s = self._clock_s if clock_s is None else clock_s
+        return self.lasts_s
+
+    @property
+    def lasts_s(self) -> float:
+        """How long nothing has come, in time spent reading: when the reader was held up, nobody was silent.
+
+        Nor was anybody while another instrument's clock stood still, if there is one: it may be a simulated one's.
+        """
+        silent_s = self._idle_reads * READ_TIMEOUT_S
+        if self._clock_s is None:
+            return silent_s
+        if self._clock_then_s is None:
+            self._clock_then_s = self._clock_s
+        return min(silent_s, self._clock_s - self._clock_then_s)
