@@ -15,6 +15,8 @@ from support.hidden_worlds import STATED, at_address, quiet
 from support.worlds import fresh_host, merge
 
 SEEDS, FEW = range(20), range(1)
+BEYOND = 2.2  # U of the difference: none of 60 values that are normal is farther off
+WITHIN = 0.92  # of the values, at least: U is what holds 95 of a hundred
 FIRST_SEED = 70_000  # beyond those of the families
 AS_DRAWN: dict[str, str] = {}
 QUARTER, TIPPED = {"x": "+y", "y": "-x", "z": "+z"}, {"x": "+x", "y": "+z", "z": "-y"}
@@ -62,8 +64,8 @@ def swept(folder: Path, recording: str) -> int:
 @pytest.mark.proof
 @pytest.mark.timeout(5400)
 def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path, thorough: bool) -> None:
-    """The difference of both is within the U of both."""
-    apart: dict[int, float] = {}
+    """The difference of both is within the U of both, as often as U says."""
+    apart: dict[int, list[float]] = {}
     for seed in SEEDS if thorough else FEW:
         rng, found = np.random.default_rng(FIRST_SEED + seed), []
         mounts = [a_little_off(rng, mount) for mount in (AS_DRAWN, QUARTER, TIPPED)]
@@ -75,9 +77,13 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path, thorough: bool) 
             assert status == 0, (seed, name, said)
             found.append(scale(tmp_path / f"{seed}-{name}"))
         (in_stages, of_stages), (in_one, of_one) = found
-        apart[seed] = float(np.max(np.abs(in_stages - in_one) / np.hypot(of_stages, of_one)))
-        print(f"seed {seed}: scale factors differ by {apart[seed]:.2f} U at most")
-    assert not {seed: each for seed, each in apart.items() if each > 1}
+        apart[seed] = (np.abs(in_stages - in_one) / np.hypot(of_stages, of_one)).tolist()
+        print(f"seed {seed}: scale factors differ by {max(apart[seed]):.2f} U at most")
+    assert not {seed: each for seed, each in apart.items() if max(each) > BEYOND}
+    if thorough:
+        within = float(np.mean([each <= 1 for axes in apart.values() for each in axes]))
+        print(f"{100 * within:.1f} % of {3 * len(apart)} differences are within U")
+        assert within >= WITHIN
 
 
 @pytest.mark.slow
