@@ -18,6 +18,7 @@ SEEDS = range(1, 21)
 ERROR_RAD = 1e-3
 MICRO_G = 9.80665e-6  # m/s²
 # ppm, µg, times. The bias is the reading at 0 g, of a sensor that may bend: there an arm's errors count.
+LEAST, MOST = 0.7, 1.3  # of error over u, 120 values of 20 laboratories: a third too wide or too narrow would be seen
 LIMITS = {"mpu9250": (110.0, 130.0, 2.5), "adis16465": (14.0, 20.0, 15.0), "lsm9ds1": (90.0, 90.0, 2.5)}
 WRISTS = np.array([0, 0, 0, 1, 1, 1])
 
@@ -97,7 +98,7 @@ def test_scale_and_bias_hold_on_an_arm_that_is_off_by_a_milliradian(tmp_path: Pa
         print(f"{name}: scale {scale:.1f} ppm, bias {bias:.1f} µg, {over:.2f} of the stated;")
         print(f"  as_published {times:.1f} times worse in attitudes alone;")
         print(f"  lever arm {lever:.2f} mm off, gyroscope's angles {skew:.4f} °")
-        assert scale <= scale_ppm and bias <= bias_ug and 0.8 <= over <= 1.3 and times >= better
+        assert scale <= scale_ppm and bias <= bias_ug and LEAST <= over <= MOST and times >= better
         assert skew <= 0.01
 
 
