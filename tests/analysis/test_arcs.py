@@ -11,6 +11,7 @@ from support.drawn_recording import KINDS, Drawn, drawn
 from support.synthetic_run import Setup, synthetic_run, truth
 
 STD_DEG = 0.05
+MISSED = 2  # of 20: three differences of cw and ccw are all there is to tell, and all may happen to be small
 
 
 def arcs(arc_deg: float, *, std_deg: float = STD_DEG, **more: object) -> Setup:
@@ -96,8 +97,9 @@ def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 def test_encoders_that_err_as_stated_fail_nothing_and_ten_times_that_is_told(thorough: bool) -> None:
-    """By what the parts of a sweep say of each other."""
-    kind = KINDS["quiet LSM9DS1"]
+    """By what cw says of ccw, and the parts of a sweep of each other."""
+    kind, passed = KINDS["quiet LSM9DS1"], 0
     for seed in range(700, 720 if thorough else 701):
         assert failed(checked(drawn(seed, kind, arcs(180)).run)) == set()
-        assert failed(checked(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
+        passed += not failed(checked(drawn(seed, kind, arcs(180, encoders_err=10.0)).run))
+    assert passed <= (MISSED if thorough else 0)
