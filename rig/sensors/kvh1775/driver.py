@@ -13,8 +13,8 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import SerialPort, why_closed
-from rig.sensors.errors import SensorError
+from firmware_host.serial_port import SerialPort
+from rig.sensors.errors import SensorError, no_port
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.settings import NAMES, Wanted, same
@@ -57,11 +57,7 @@ class Kvh1775:
         try:
             self._serial = SerialPort(port, baud)
         except OSError as error:
-            raise SensorError(
-                "no_port",
-                f"sensors.{sensor}: the port {port} does not open: {why_closed(port, error)}",
-                "Check serial.port and the cable, and that no other program has the port",
-            ) from error
+            raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
         self._reader = threading.Thread(target=self._read, name=f"kvh1775 {port}", daemon=True)
         self._reader.start()
         try:

@@ -13,12 +13,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import SerialPort, why_closed
+from firmware_host.serial_port import SerialPort
 from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection
 from rig.config.sensor_sections import OwnPortSection
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
-from rig.sensors.errors import SensorError
+from rig.sensors.errors import SensorError, no_port
 from rig.sensors.lines.decoding import Decoded, LineReader
 from rig.sensors.lines.stamping import Stamper
 from rig.sensors.silence import Silence
@@ -99,11 +99,7 @@ class LinesDevice:
         try:
             self._serial = SerialPort(line.port, line.baud)
         except OSError as error:
-            raise SensorError(
-                "no_port",
-                f"sensors.{sensor}: the port {line.port} does not open: {why_closed(line.port, error)}",
-                "Check serial.port and the cable, and that no other program has the port",
-            ) from error
+            raise no_port(line.port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
         self._thread = threading.Thread(target=self._read, name=f"lines {line.port}", daemon=True)
         self._thread.start()
         try:

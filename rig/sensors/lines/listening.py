@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 
-from firmware_host.serial_port import SerialPort, why_closed
-from rig.sensors.errors import SensorError
+from firmware_host.serial_port import SerialPort
+from rig.sensors.errors import SensorError, no_port
 from rig.sensors.lines.shape import Line
 
 USUAL = (115200, 921600, 460800, 230400, 57600, 38400, 19200, 9600, 500000, 1000000, 250000, 2000000)
@@ -26,7 +26,7 @@ def listen(
     try:
         serial = SerialPort(port, found)
     except OSError as error:
-        raise _no_port(port, error) from error
+        raise no_port(port, error) from error
     lines: list[Line] = []
     rest, began_s, told = b"", time.monotonic(), False
     try:
@@ -73,7 +73,7 @@ def _heard(port: str, baud: int) -> bytes:
     try:
         serial = SerialPort(port, baud)
     except OSError as error:
-        raise _no_port(port, error) from error
+        raise no_port(port, error) from error
     try:
         serial.read()  # what stands there was read at another speed
         heard, until_s = b"", time.monotonic() + TRIED_S
@@ -84,14 +84,6 @@ def _heard(port: str, baud: int) -> bytes:
         return b""
     finally:
         serial.close()
-
-
-def _no_port(port: str, error: OSError) -> SensorError:
-    return SensorError(
-        "no_port",
-        f"the port {port} does not open: {why_closed(port, error)}",
-        "Check the name and the cable, and that no other program has the port",
-    )
 
 
 def _silent(port: str) -> SensorError:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from firmware_host.serial_port import why_closed
-from rig.sensors.errors import SensorError
+from rig.sensors.errors import SensorError, no_port
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
 from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
@@ -84,11 +83,7 @@ class Link:
         try:
             self._port = open_port(port, baud)
         except OSError as error:
-            raise SensorError(
-                "no_port",
-                f"{self._where} does not open: {why_closed(port, error)}",
-                "Check mavlink.port and the cable, and that no other program has the port",
-            ) from error
+            raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="mavlink.port") from error
         self._reader = threading.Thread(target=self._read, name=f"mavlink {port}", daemon=True)
         self._reader.start()
         try:
