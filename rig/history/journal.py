@@ -122,6 +122,19 @@ def broken(connection: Connection) -> Iterator[Broken]:
         yield Broken(f"{kind} {key}", "changed", "it is there, and the journal does not know it")
 
 
+def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
+    """Whether the row with this primary key, which is there, is not as the journal has it."""
+    lines = schema.journal.c
+    asked = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
+    entered = connection.scalar(asked)
+    what = f"{table.name} {json.dumps(key)}"
+    if entered is None:
+        return Broken(what, "changed", "the journal does not know it")
+    if entered != _sha256(connection, table, key):
+        return Broken(what, "changed", "its rows are not those entered")
+    return None
+
+
 def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) -> str:
     rows = [[name, row] for name, row in _rows(connection, table, key)]
     said = json.dumps(rows, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
