@@ -18,13 +18,13 @@ class Reason:
 
     @property
     def anchor(self) -> tuple[int, str] | None:
-        """As it stands in the text, None where no history was at hand."""
+        """The entry that the text names, None where no history was at hand."""
         found = _ANCHOR.search(self.text)
         return None if found is None else (int(found[1]), found[2])
 
 
 def reason_of(certificate: "Certificate", anchor: tuple[int, str] | None) -> Reason:
-    """Of a certificate: its number, and all that stands across its pages, such as that the laboratory is simulated."""
+    """The reason to sign a certificate: its number, and what stands across its pages, as that the laboratory is simulated."""
     said = [*certificate.marks, f"{certificate.title} {certificate.number}"]
     if anchor is not None:
         said.append(f"Signed after the history's journal entry {anchor[0]}, SHA-256 {anchor[1]}")

@@ -62,7 +62,7 @@ def looked_at(name: str, content: bytes, trust: Sequence[bytes]) -> Looked:
 
 
 def not_signed(name: str) -> Refused:
-    """There is no signature."""
+    """The problem of a file without a signature."""
     return Refused(
         "not_signed",
         f"{name} has no signature",
@@ -71,7 +71,7 @@ def not_signed(name: str) -> Refused:
 
 
 def not_as_signed(name: str, why: str) -> Refused:
-    """It was altered, or never was what is signed."""
+    """The problem of a file that was altered, or never was what is signed."""
     return Refused(
         "not_as_signed", f"{name} is not what was signed: {why}", "Do not rely on it; ask the laboratory for it"
     )
@@ -114,7 +114,7 @@ def untrusted(chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime) 
 
 
 def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """It is whole, and signed by somebody else than was expected."""
+    """The problem of a file that is whole, and signed by somebody else than was expected."""
     return Refused(
         "signer_not_trusted",
         f"{name} is signed by {signer}, who is not trusted: {why}",
