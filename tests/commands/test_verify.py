@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from rig.cli import main
 from rig.data.result_file import write_result
 from rig.history.finished import finished_run
 from rig.history.store import open_history
+from rig.report.signatures.seen import untrusted
 from support.certified import result
 from support.dcc_rules import schema_faults
 from support.kept_rows import forge
@@ -444,6 +446,18 @@ def test_what_cannot_be_signed_is_refused_before_anything_is_written(
     monkeypatch.setitem(__import__("sys").modules, "pyhanko.sign", None)
     assert main(["report", str(lab.folder), "--sign", str(old), *out]) == 2
     assert "missing_extra" in capsys.readouterr().err
+
+
+def test_a_certificate_is_trusted_itself_or_by_its_authority_while_it_is_valid() -> None:
+    authority = holder("Authority")
+    below = holder("Laboratory", authority)
+    own, root, other = (each.chain[0].public_bytes(Encoding.DER) for each in (below, authority, holder("Authority")))
+    now = datetime.now(UTC)
+    for trust in (own, root):
+        assert untrusted([own, root], [other, trust], now) == ""
+        for later in (timedelta(days=31), timedelta(days=-2)):
+            assert "the certificate is valid from" in untrusted([own], [trust], now + later)
+    assert untrusted([own, root], [other], now) and untrusted([root], [root], now) == ""
 
 
 def test_a_time_server_that_gives_none_leaves_out_the_pdf_alone(

@@ -103,6 +103,9 @@ def untrusted(chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime) 
     from pyhanko_certvalidator.errors import PathError, ValidationError
 
     own, *others = map(Certificate.load, chain)
+    begin, end = own.not_valid_before, own.not_valid_after
+    if not begin <= moment <= end:  # one that is trusted itself is not asked this below
+        return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, and not on {moment:%Y-%m-%d}"
     context = ValidationContext(
         trust_roots=list(map(Certificate.load, trust)), other_certs=others, moment=moment, allow_fetching=False
     )
