@@ -24,7 +24,7 @@ class Reason:
 
 
 def reason_of(certificate: "Certificate", anchor: tuple[int, str] | None) -> Reason:
-    """The reason to sign a certificate: its number, and what stands across its pages, as that the laboratory is simulated."""
+    """The reason to sign a certificate: what stands across its pages, as "Simulated laboratory …", and its number."""
     said = [*certificate.marks, f"{certificate.title} {certificate.number}"]
     if anchor is not None:
         said.append(f"Signed after the history's journal entry {anchor[0]}, SHA-256 {anchor[1]}")
