@@ -134,8 +134,8 @@ def test_a_file_that_is_not_what_was_entered_is_named(
         (["DELETE FROM journal WHERE number = 1"], "journal 1 to 1"),
         (["UPDATE journal SET entered_utc = '2020-01-01' WHERE number = 2"], "journal 2: it does not follow"),
         (["UPDATE journal SET chain_sha256 = NULL WHERE number = 3"], "journal 3: it does not follow"),
-        (["UPDATE journal SET chain_sha256 = NULL WHERE number < 3", "UPDATE journal SET sha256 = 'ab' WHERE number = 1"],
-         "journal 3: it does not follow"),
+        (["UPDATE journal SET chain_sha256 = NULL WHERE number < 3",
+          "UPDATE journal SET sha256 = 'ab' WHERE number = 1"], "journal 3: it does not follow"),
     ],
 )  # fmt: skip
 def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], named: str, tmp_path: Path) -> None:
