@@ -29,7 +29,9 @@ needs_test() {
   need libc6-dev found '/usr/include/stdio.h'
   need gcc-arm-none-eabi installed arm-none-eabi-gcc
   need libnewlib-arm-none-eabi found '/usr/*/arm-none-eabi/*/*.specs'
-  need poppler-utils installed pdftotext  # reads the certificate's PDF back
+  need poppler-utils installed pdftotext  # reads the certificate's PDF back, and its signature
+  need xmlsec1 installed xmlsec1  # and another's view of the digital certificate's signature
+  need softhsm2 installed softhsm2-util  # a token for keys to sign with
   need procps installed ps
   need postgresql found '/usr/lib/postgresql/*/bin/initdb'  # a history that rigs share
   need chromium installed chromium  # shows the operator's page

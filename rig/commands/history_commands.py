@@ -155,6 +155,8 @@ def verify(options: Namespace) -> int:
             counts[found.state] += 1
             if found.state != "ok":
                 say(f"{found.state}: {found.what}: {found.why}")
+        end = history.head()
+    say(f"journal: entry {end.number}, chained to all before by SHA-256 {end.sha256}")
     say(", ".join(f"{count} {state}" for state, count in counts.items()))
     return DISAGREE if counts["changed"] or counts["missing"] else 0
 

@@ -88,6 +88,24 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     return f"{where.label} does not know this run; rig history import {folder} enters it{there}"
 
 
+def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | None:
+    """Number and SHA-256 of the last entry in the journal of the history in which `remember_certificate` notes it.
+
+    None where there is no history, or none that answers, or an empty one.
+    """
+    try:
+        from rig.history.finished import configured_in
+        from rig.history.place import own_place
+
+        loaded = configured_in(folder)
+        where = own_place(history)
+        if where is None or (history is None and loaded is not None and loaded.config.history.off):
+            return None
+        return answer_of(lambda: _end(where), ANSWER_S)
+    except Exception:  # whatever it is, the certificate is signed; that it is in no history is said afterwards
+        return None
+
+
 def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
     from rig.history.change_words import beyond_u, change_in_short
@@ -124,6 +142,16 @@ def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bo
         return False
     with open_history(place) as history:
         return history.certify(content_sha256, certificate)
+
+
+def _end(place: "Place") -> tuple[int, str] | None:
+    from rig.history.store import open_history
+
+    if isinstance(place.where, Path) and not place.where.exists():
+        return None
+    with open_history(place) as history:
+        end = history.head()
+    return (end.number, end.sha256) if end.number else None
 
 
 def why(error: Exception) -> str:

@@ -1,7 +1,8 @@
-"""What was entered, a second time: a line for each entry, with the hash of its rows, numbered without gaps.
+"""What was entered, a second time: a line for each entry, with the hash of its rows, numbered without gaps, chained.
 
-So a row that was changed, added or taken away behind the rig's back is seen, and so is a line. Somebody who may write
-every table can write a journal that fits: signatures are not here.
+So a row that was changed, added or taken away behind the rig's back is seen, and so is a line: each has the hash of
+itself and of the chain before it. Somebody who may write every table can write a journal that fits from its beginning,
+or leave out its end. That is seen by whoever knows a `Head` of it: a signed certificate names one.
 """
 
 import hashlib
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from sqlalchemy import Connection, Table, func, insert, select, text
+from sqlalchemy import Connection, Table, insert, select, text
 
 from rig.history import schema
 
@@ -31,6 +32,14 @@ class Broken:
     why: str
 
 
+@dataclass(frozen=True, slots=True)
+class Head:
+    """A line of the journal by its number, and the SHA-256 of the chain that ends there: all lines up to it."""
+
+    number: int
+    sha256: str
+
+
 def alone(connection: Connection) -> None:
     """Keep others from writing until the end of the transaction. An SQLite transaction that writes is alone anyway."""
     if connection.dialect.name == "postgresql":
@@ -39,15 +48,46 @@ def alone(connection: Connection) -> None:
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
     """Note that the row with this primary key was entered, a run with all that belongs to it; `alone`."""
-    number = connection.scalar(select(func.coalesce(func.max(schema.journal.c.number), 0) + 1))
+    before = head(connection)
     line = {
-        "number": number,
+        "number": before.number + 1,
         "kind": table.name,
         "key": json.dumps(key),
         "sha256": _sha256(connection, table, key),
         "entered_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
     }
-    connection.execute(insert(schema.journal).values(line))
+    connection.execute(insert(schema.journal).values({**line, "chain_sha256": _link(before.sha256, line)}))
+
+
+def head(connection: Connection) -> Head:
+    """The end of the journal; number 0 of one that is empty."""
+    newest = select(schema.journal).order_by(schema.journal.c.number.desc()).limit(1)
+    last = connection.execute(newest).one_or_none()
+    if last is None:
+        return Head(0, "")
+    if last.chain_sha256 is not None:
+        return Head(last.number, last.chain_sha256)
+    return Head(last.number, _chained(connection))  # entered before version 6: the next line seals it with all before
+
+
+def holds(connection: Connection, known: Head) -> bool:
+    """Whether the lines up to that one are those of when it was the end; `known` may be of years ago."""
+    return _chained(connection, known.number) == known.sha256
+
+
+def _chained(connection: Connection, number: int | None = None) -> str:
+    """The chain of the lines as they stand, up to this one or to the last."""
+    lines = select(schema.journal).order_by(schema.journal.c.number)
+    before = ""
+    for line in connection.execute(lines if number is None else lines.where(schema.journal.c.number <= number)):
+        before = _link(before, line._mapping)
+    return before
+
+
+def _link(before: str, line: Mapping[Any, Any]) -> str:
+    """SHA-256 of a line and of the chain before it."""
+    said = [before, *(line[name] for name in ("number", "kind", "key", "sha256", "entered_utc"))]
+    return hashlib.sha256(json.dumps(said, separators=(",", ":")).encode()).hexdigest()
 
 
 def note_all(connection: Connection) -> None:
@@ -58,17 +98,21 @@ def note_all(connection: Connection) -> None:
 
 
 def broken(connection: Connection) -> Iterator[Broken]:
-    """What is not as the journal has it, what the journal does not have, and the gaps in it."""
+    """What is not as the journal has it, what the journal does not have, its gaps, and where its chain is broken."""
     there = {
         (name, json.dumps(tuple(key))): (table, tuple(key))
         for name, table in ENTERED.items()
         for key in connection.execute(select(*table.primary_key)).all()
     }
-    before = 0
+    before, chain, chained = 0, "", False
     for line in connection.execute(select(schema.journal).order_by(schema.journal.c.number)).all():
         if line.number > before + 1:
             yield Broken(f"journal {before + 1} to {line.number - 1}", "missing", "what was entered then is not known")
-        before = line.number
+        before, chain = line.number, _link(chain, line._mapping)
+        chained = chained or line.chain_sha256 is not None
+        if chained and line.chain_sha256 != chain:
+            yield Broken(f"journal {line.number}", "changed", "it does not follow from the lines before it")
+            chain = line.chain_sha256 or chain
         what, found = f"{line.kind} {line.key}", there.pop((line.kind, line.key), None)
         if found is None:
             yield Broken(what, "missing", f"entered {line.entered_utc}, and not there any more")
@@ -76,6 +120,19 @@ def broken(connection: Connection) -> Iterator[Broken]:
             yield Broken(what, "changed", f"its rows are not those entered {line.entered_utc}")
     for kind, key in there:
         yield Broken(f"{kind} {key}", "changed", "it is there, and the journal does not know it")
+
+
+def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
+    """Whether the row with this primary key, which is there, is not as the journal has it."""
+    lines = schema.journal.c
+    asked = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
+    entered = connection.scalar(asked)
+    what = f"{table.name} {json.dumps(key)}"
+    if entered is None:
+        return Broken(what, "changed", "the journal does not know it")
+    if entered != _sha256(connection, table, key):
+        return Broken(what, "changed", "its rows are not those entered")
+    return None
 
 
 def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) -> str:

@@ -7,7 +7,7 @@ stays.
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 
-from sqlalchemy import Connection, insert, inspect, select, text, update
+from sqlalchemy import Connection, Table, insert, inspect, select, text, update
 
 from rig.errors import Refused
 from rig.history import journal, schema
@@ -42,11 +42,20 @@ def migrate_4_to_5(connection: Connection) -> None:
     _add_coverage_factor(connection)
 
 
+def migrate_5_to_6(connection: Connection) -> None:
+    """Lines of the journal are chained; those before stay as they are, and the next one seals them."""
+    if "chain_sha256" not in _columns(connection, schema.journal):  # an older history's journal was made as it is today
+        connection.execute(text(f"ALTER TABLE journal ADD COLUMN chain_sha256 VARCHAR({schema.HASH})"))
+
+
 def _add_coverage_factor(connection: Connection) -> None:
     """Add the coverage factor, unless an earlier step has."""
-    columns = {column["name"] for column in inspect(connection).get_columns(schema.parameter.name)}
-    if "coverage_factor" not in columns:
+    if "coverage_factor" not in _columns(connection, schema.parameter):
         connection.execute(text("ALTER TABLE parameter ADD COLUMN coverage_factor FLOAT"))
+
+
+def _columns(connection: Connection, table: Table) -> set[str]:
+    return {column["name"] for column in inspect(connection).get_columns(table.name)}
 
 
 MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {
@@ -54,6 +63,7 @@ MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {
     2: migrate_2_to_3,
     3: migrate_3_to_4,
     4: migrate_4_to_5,
+    5: migrate_5_to_6,
 }
 
 

@@ -18,7 +18,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 5
+VERSION = 6
 HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
@@ -152,5 +152,7 @@ journal = Table(
     Column("key", String(1000), nullable=False),  # what finds the row there, as JSON
     Column("sha256", String(HASH), nullable=False),
     Column("entered_utc", String(TIME), nullable=False),
+    # Since version 6, null of lines before: of this line and, through the one before it, of all before.
+    Column("chain_sha256", String(HASH)),
     UniqueConstraint("kind", "key"),
 )

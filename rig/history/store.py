@@ -225,6 +225,16 @@ class History:
         with self.engine.connect() as connection:
             yield from journal.broken(connection)
 
+    def head(self) -> journal.Head:
+        """The end of the journal, as `journal.head`."""
+        with self.engine.connect() as connection:
+            return journal.head(connection)
+
+    def holds(self, known: journal.Head) -> bool:
+        """Whether the journal still goes on from what was its end once, as `journal.holds`."""
+        with self.engine.connect() as connection:
+            return journal.holds(connection, known)
+
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
         with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():

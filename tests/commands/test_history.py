@@ -77,7 +77,7 @@ def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.Cap
     recording[len(recording) // 2] ^= 1
     (folder / "verify.h5").write_bytes(recording)
     found = told(capsys, "verify", status=1).splitlines()
-    assert found[0].startswith(f"changed: {folder / 'verify.h5'}: ") and len(found) == 2
+    assert found[0].startswith(f"changed: {folder / 'verify.h5'}: ") and len(found) == 3
     (folder / "verify.h5").unlink()
     assert f"missing: {folder / 'verify.h5'}" in told(capsys, "verify", status=1)
     moved = folder.rename(folder.with_name("archive"))

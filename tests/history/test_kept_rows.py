@@ -11,16 +11,17 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
-from rig.history import schema
+from rig.history import journal, schema
 from rig.history.engine import WRITES
 from rig.history.finished import content_sha256, finished_run
 from rig.history.integrity import examined
 from rig.history.issued import Issued
+from rig.history.journal import Head
 from rig.history.store import History, open_history
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import stated_in
-from support.kept_rows import forge
+from support.kept_rows import drop_triggers, forge
 from support.past_runs import finished
 from support.paths import CONFIGS, FIXTURES
 from support.postgres import postgresql
@@ -131,6 +132,10 @@ def test_a_file_that_is_not_what_was_entered_is_named(
         (["DELETE FROM certificate_file", "DELETE FROM certificate"], "certificate [1]: entered"),
         (["DELETE FROM document"], "its rows are not those entered"),
         (["DELETE FROM journal WHERE number = 1"], "journal 1 to 1"),
+        (["UPDATE journal SET entered_utc = '2020-01-01' WHERE number = 2"], "journal 2: it does not follow"),
+        (["UPDATE journal SET chain_sha256 = NULL WHERE number = 3"], "journal 3: it does not follow"),
+        (["UPDATE journal SET chain_sha256 = NULL WHERE number < 3",
+          "UPDATE journal SET sha256 = 'ab' WHERE number = 1"], "journal 3: it does not follow"),
     ],
 )  # fmt: skip
 def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], named: str, tmp_path: Path) -> None:
@@ -141,6 +146,43 @@ def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], name
     forge(file, *statements)
     with open_history(file) as history:
         assert named in "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.wrong)
+
+
+def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_end(place: str) -> None:
+    with open_history(place) as history:
+        assert history.head() == Head(0, "")
+        fill(history)
+        known = history.head()
+        history.enter(finished(7))
+        assert history.holds(known) and history.holds(history.head()) and known.number < history.head().number
+        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+            drop_triggers(connection)
+            connection.execute(text("DELETE FROM voided"))
+            connection.execute(text("DELETE FROM journal"))
+            for table in ("run", "location", "certificate"):
+                journal.note(connection, schema.metadata.tables[table], 1)
+            file = ISSUED.files[0]
+            journal.note(connection, schema.certificate_file, 1, *file)
+            for table in ("run", "location"):
+                journal.note(connection, schema.metadata.tables[table], 2)
+        assert list(history.broken()) == [], "a journal that fits can be made by who may write every table"
+        assert not history.holds(known)
+        assert history.holds(Head(0, ""))
+
+
+def test_lines_of_before_the_chain_are_sealed_by_the_next(tmp_path: Path) -> None:
+    file = str(tmp_path / "history.sqlite")
+    with open_history(file) as history:
+        fill(history)
+        end = history.head()
+    forge(file, "UPDATE journal SET chain_sha256 = NULL")
+    with open_history(file) as history:
+        assert list(history.broken()) == [] and history.head() == end
+        history.enter(finished(7))
+        assert list(history.broken()) == []
+    forge(file, "UPDATE journal SET entered_utc = '2020-01-01' WHERE number = 1")
+    with open_history(file) as history:
+        assert [each.what for each in history.broken()] == [f"journal {end.number + 1}"]
 
 
 def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) -> None:

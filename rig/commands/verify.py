@@ -1,0 +1,166 @@
+"""`rig verify`: who signed a certificate, when, whether it is whole, and whether a history knows it."""
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rig.commands.config_arguments import add_json
+from rig.commands.named_history import named_history
+from rig.errors import Refused
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.report.signatures.seen import Looked, Seen
+
+SIZE_MAX_BYTES = 256_000_000
+SCHEMA = "rig.verification/1"
+WRONG = 1
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig verify`."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="a signed certificate.pdf or certificate.xml; beside it what is attached to it, such as result.json",
+    )
+    parser.add_argument(
+        "--trust",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="CERTIFICATE",
+        help="that of the laboratory's key, or of who issued it, or of a time server: PEM or DER; may be repeated",
+    )
+    parser.add_argument(
+        "--history", metavar="PLACE", help="whether this history knows the files, and still has them so"
+    )
+    add_json(parser)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    file: Path
+    signatures: "tuple[Seen, ...]"
+    history: tuple[str, ...]
+    attached_to: str | None
+    problems: tuple[Refused, ...]
+
+
+def run(options: Namespace) -> int:
+    """Look at each file and say what is found; returns 1 where one is not whole, not trusted, or not known.
+
+    Raises Refused `verify_file`, and as `trusted_in`, `looked_at` and `open_history`.
+    """
+    from rig.report.signatures.seen import looked_at, trusted_in
+
+    trust = trusted_in(options.trust)
+    contents = {file: _content(file) for file in options.files}
+    looks = {file: looked_at(file.name, content, trust) for file, content in contents.items()}
+    named = named_history(options.history)
+    known = {} if named is None else _known(named, contents, looks)
+    found = [_found(file, contents[file], looks, known.get(file)) for file in contents]
+    if options.json:
+        print(json.dumps({"schema": SCHEMA, "files": list(map(_entry, found))}, indent=2))
+    else:
+        for each in found:
+            _tell(each)
+    return WRONG if any(each.problems for each in found) else 0
+
+
+def _content(file: Path) -> bytes:
+    from rig.config.regular_file import UnfitFile, read_regular_file
+
+    try:
+        return read_regular_file(file, SIZE_MAX_BYTES)
+    except (UnfitFile, OSError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise Refused("verify_file", f"{file} cannot be read: {why}", "Give the files of a certificate") from None
+
+
+def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Looked]") -> dict[Path, Any]:
+    """What the history says of each file."""
+    from rig.commands.waiting import answer_of
+    from rig.history.known import known
+    from rig.history.place import place
+    from rig.history.store import open_history
+
+    where = place(named)
+    if isinstance(where.where, Path) and not where.where.exists():  # to look makes none
+        raise Refused("history_unreachable", f"there is no history {where.label}", "Name another with --history")
+
+    def asked() -> dict[Path, Any]:
+        with open_history(where) as history:
+            anchors = {
+                file: next((each.reason.anchor for each in look.signatures if each.reason.anchor), None)
+                for file, look in looks.items()
+            }
+            return {file: known(history, file.name, each, anchors[file]) for file, each in contents.items()}
+
+    return answer_of(asked)
+
+
+def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: Any) -> _Found:
+    """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
+    from rig.report.signatures.seen import not_as_signed
+
+    look, attached_to = looks[file], None
+    problems = list(look.problems)
+    if not look.signatures:
+        holders = {other.name: each.attached[file.name] for other, each in looks.items() if file.name in each.attached}
+        attached_to = next((other for other, held in holders.items() if held == content), None)
+        if attached_to is not None or (known is not None and not known.problems):
+            problems = [each for each in problems if each.name != "not_signed"]
+        elif holders:
+            problems = [not_as_signed(file.name, f"another is attached to {', '.join(holders)}")]
+    said = () if known is None else known.said
+    return _Found(file, look.signatures, said, attached_to, (*problems, *(() if known is None else known.problems)))
+
+
+def _tell(found: _Found) -> None:
+    say(f"{found.file}: {'NOT WHOLE, or not to be relied on' if found.problems else 'whole'}")
+    for each in found.signatures:
+        when = "at a time it does not say" if each.when is None else f"{each.when:%Y-%m-%d %H:%M:%S %Z}"
+        clock = "the signer's own clock" if each.time_server is None else f"the time server {each.time_server}"
+        say(f"  signed by {each.signer}, {when} by {clock}")
+        say(f"  its certificate has SHA-256 {each.certificate_sha256}; {_TRUSTED[each.trusted]}")
+        say(f"  reason: {each.reason.text}")
+    if found.attached_to is not None:
+        say(f"  attached to {found.attached_to}, which is signed")
+    for words in found.history:
+        say(f"  in the history: {words}")
+    for problem in found.problems:
+        say(f"  {problem}")
+
+
+_TRUSTED = {
+    None: "whether that is the laboratory's, compare yourself, or give --trust",
+    True: "trusted by --trust",
+    False: "not trusted",
+}
+
+
+def _entry(found: _Found) -> dict[str, Any]:
+    return {
+        "file": str(found.file),
+        "whole": not found.problems,
+        "signatures": [
+            {
+                "signer": each.signer,
+                "certificate_sha256": each.certificate_sha256,
+                "when": None if each.when is None else each.when.isoformat(),
+                "time_server": each.time_server,
+                "reason": each.reason.text,
+                "trusted": each.trusted,
+            }
+            for each in found.signatures
+        ],
+        "attached_to": found.attached_to,
+        "history": list(found.history),
+        "problems": [{"name": each.name, "what": each.what, "remedy": each.remedy} for each in found.problems],
+    }

@@ -1,0 +1,95 @@
+"""What a history knows of a file: which certificate or result it is, and whether that is still as it was entered."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from sqlalchemy import Connection, Table, select
+
+from rig.errors import Refused
+from rig.history import journal, schema
+from rig.history.finished import content_sha256
+from rig.history.journal import Head
+from rig.history.store import History
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What there is to say of it, in words, and what is wrong, by the names of errors."""
+
+    said: tuple[str, ...]
+    problems: tuple[Refused, ...]
+
+
+def known(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> Known:
+    """A file by its SHA-256, a result.json by what it says; `anchor` is the journal's entry that its signature names.
+
+    It is a problem, `unknown_to_history`, if the history has no such file; `not_as_entered` if its rows have changed
+    since; `journal_rewritten` if the journal is not the one at the time of the signature.
+    """
+    with history.engine.connect() as connection:
+        found = list(_entries(connection, content))
+        if not found:
+            return Known((), (_unknown(name),))
+        problems = [
+            _changed(name, broken)
+            for table, key, _ in found
+            if (broken := journal.unlike(connection, table, *key)) is not None
+        ]
+        if anchor is not None and not journal.holds(connection, Head(*anchor)):
+            problems.append(_rewritten(name, anchor))
+    return Known(tuple(words for _, _, words in found if words), tuple(problems))
+
+
+def _entries(connection: Connection, content: bytes) -> Iterator[tuple[Table, tuple[int | str, ...], str]]:
+    """The rows that a file is entered by: table, key, and what they say."""
+    sha256 = hashlib.sha256(content).hexdigest()
+    files, issued, runs = schema.certificate_file, schema.certificate, schema.run
+    asked = select(files.c.name, issued).select_from(files.join(issued)).where(files.c.sha256 == sha256)
+    of_runs: list[int] = []
+    for row in connection.execute(asked).all():
+        newer = connection.scalars(select(issued.c.number).where(issued.c.replaces == row.number)).all()
+        said = [f"certificate {row.number} of run {row.run_id}, entered {row.entered_utc[:10]}"]
+        said += [f"replaced by {each}" for each in newer] + ([row.marks] if row.marks else [])
+        yield files, (row.id, row.name, sha256), ""
+        yield issued, (row.id,), "; ".join(said)
+        of_runs.append(row.run_id)
+    beside = schema.document.c
+    of_runs += connection.scalars(select(beside.run_id).where(beside.sha256 == sha256))
+    result = _result(content)
+    of_runs += connection.scalars(select(runs.c.id).where(runs.c.content_sha256 == result)) if result else []
+    for number in sorted(set(of_runs)):
+        row = connection.execute(select(runs).where(runs.c.id == number)).one()
+        void = _voided(connection, number)
+        yield runs, (number,), "; ".join([f"run {number} of {row.started_utc[:10]}, verdict {row.verdict}", *void])
+
+
+def _voided(connection: Connection, run_id: int) -> list[str]:
+    rows = select(schema.voided).join(schema.calibration).where(schema.calibration.c.run_id == run_id)
+    return [f"calibration {row.calibration_id} is void: {row.reason}" for row in connection.execute(rows)]
+
+
+def _result(content: bytes) -> str | None:
+    """The hash of a result.json by which it is entered; None of anything else."""
+    try:
+        return content_sha256(content.decode())
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _unknown(name: str) -> Refused:
+    why = f"the history knows no file like {name}, byte for byte"
+    return Refused(
+        "unknown_to_history", why, "Ask the laboratory which certificate it has issued; see `rig history show`"
+    )
+
+
+def _changed(name: str, broken: journal.Broken) -> Refused:
+    why = f"what the history has of {name} is not what was entered: {broken.what}: {broken.why}"
+    return Refused("not_as_entered", why, "Look with `rig history verify`, and bring the history back from a back-up")
+
+
+def _rewritten(name: str, anchor: tuple[int, str]) -> Refused:
+    why = f"{name} was signed after entry {anchor[0]} of a journal, which the history's journal does not have so"
+    remedy = "Look with `rig history verify`, and compare the history with its back-ups"
+    return Refused("journal_rewritten", why, remedy)

@@ -1,0 +1,1 @@
+"""Signatures on certificates: made by the laboratory's key, and looked at by anybody."""
