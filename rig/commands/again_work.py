@@ -1,5 +1,6 @@
 """What a worker does, on this computer or another, when everything is solved again: one recording, and its answer."""
 
+import platform
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,7 +49,8 @@ def _folder(task: Task) -> Path | Unsolved:
             return Path(path)
         damaged = damaged or next((each for each in found if each is not None and each.state == "damaged"), None)
     places = ", ".join(f"{path} ({computer})" for computer, path in task.places)
-    return damaged or Unsolved("missing", f"its recordings are not in {places or 'any place the history knows'}")
+    where = f"{places or 'any place the history knows'}, as {platform.node()} sees it"
+    return damaged or Unsolved("missing", f"its recordings are not in {where}")
 
 
 def _held(file: Path, entered: Recording) -> Unsolved | None:

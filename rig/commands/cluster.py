@@ -26,6 +26,7 @@ def client_of(address: str) -> Iterator["Client"]:
         raise Refused(
             "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
         ) from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # whoever asks is told by name, without a traceback
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what becomes of a cluster is told by name, in one line
     with client:
         yield client

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from multiprocessing import get_context
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Protocol
@@ -119,13 +119,11 @@ class Cluster:
 
     def threads(self) -> dict[str, int]:
         """How many threads each worker has, by its address. Raises Fault `cluster_lost`."""
-        if self._client.status != "running":
-            raise _lost("the scheduler does not answer any more")
-        try:
-            found: dict[str, int] = self._client.nthreads()  # type: ignore[no-untyped-call]
-        except (OSError, TimeoutError, RuntimeError) as error:
-            raise _lost(f"the scheduler does not answer any more ({error or type(error).__name__})") from error
-        return found
+        if self._client.status == "running":
+            with suppress(OSError, RuntimeError):
+                found: dict[str, int] = self._client.nthreads()  # type: ignore[no-untyped-call]
+                return found
+        raise _lost("the scheduler does not answer any more")
 
     def room(self) -> int:
         """Some for each thread, less what is in hand. Raises Fault `cluster_lost` when all have been gone for long."""

@@ -2,6 +2,9 @@
 
 import argparse
 import csv
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +17,7 @@ from rig.data.result_file import ResultDocument
 from rig.history.again import Answer, Given
 from rig.history.store import History, open_history
 from rig.report.kinds.registry import followed
-from support.clusters import local_cluster
+from support.clusters import killable_cluster, local_cluster
 from support.commands import rig_here
 from support.kept_recordings import certified, keep
 from support.past_runs import finished
@@ -49,6 +52,7 @@ def shifted(document: ResultDocument) -> ResultDocument:
     return document.model_copy(update={"sensors": {"gyro": gyro.model_copy(update={"scale": scale})}})
 
 
+@pytest.mark.slow
 def test_seven_verdicts_change_by_another_limit_and_no_file_does(history: History, tmp_path: Path) -> None:
     for i in range(7):
         run = keep(history, tmp_path / "runs" / f"wide {i}")
@@ -94,6 +98,7 @@ def test_moved_missing_and_damaged_are_named_counted_and_gone_on_with(history: H
     assert "2 of 4 are solved" in done.stderr and "4 results: 4 solved" in done.stdout and done.returncode == 0
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_give_the_same_numbers_as_one_by_one(history: History, tmp_path: Path) -> None:
     for i in range(3):
         keep(history, tmp_path / f"run {i}")
@@ -104,6 +109,27 @@ def test_workers_of_a_cluster_give_the_same_numbers_as_one_by_one(history: Histo
     assert rows(Path("there")) == rows(Path("here"))
     noted = [sorted((Path(each) / "again.jsonl").read_text().splitlines()) for each in ("there", "here")]
     assert noted[0] == noted[1] and len(noted[0]) == 4
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_killed_is_named_and_a_second_call_goes_on(history: History, tmp_path: Path) -> None:
+    for i in range(5):
+        keep(history, tmp_path / f"run {i}")
+    journal = Path("again/again.jsonl")
+    with killable_cluster(tmp_path) as (scheduler, address):
+        command = [sys.executable, "-m", "rig", "history", "again", "--dask", address]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as again:
+            while not journal.exists() or journal.read_text(encoding="utf-8").count("\n") < 2:
+                assert again.poll() is None
+                time.sleep(0.02)
+            scheduler.kill()
+            said, errors = again.communicate()
+    assert again.returncode == 3 and "cluster_lost" in errors and "Traceback" not in errors
+    assert "5 results: " in said and "not reached" in said
+    solved = journal.read_text(encoding="utf-8").count("\n") - 1
+    assert 1 <= solved < 5
+    done = rig_here("history", "again")
+    assert f"{solved} of 5 are solved" in done.stderr and "5 results: 5 solved" in done.stdout and done.returncode == 0
 
 
 def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history: History, tmp_path: Path) -> None:

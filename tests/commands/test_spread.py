@@ -1,17 +1,10 @@
 """Who solves where: a worker that dies costs what it had in hand and no other; a cluster that goes away is named."""
 
-import json
 import os
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from rig.commands.again_work import Task
 from rig.commands.cluster import client_of
 from rig.commands.spread import Cluster, Processes, one_by_one, spread
 from rig.data.run_folder import RESULT
@@ -22,18 +15,6 @@ from support.clusters import local_cluster
 
 NAMES = (*(f"before {i}" for i in range(3)), DEADLY, *(f"after {i}" for i in range(4)))
 TASKS = [task(name) for name in NAMES]
-
-
-@contextmanager
-def started(module: str, *arguments: str) -> Iterator["subprocess.Popen[bytes]"]:
-    """One of the programs of distributed, killed in the end."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
-    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,25 +51,6 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
     assert all(isinstance(each, Given) and each.verdict == key for key, each in answers.items())
     workers = {each.failed for each in answers.values() if isinstance(each, Given)}
     assert str(os.getpid()) not in {number for number, _ in workers} and {threads for _, threads in workers} == {"1"}
-
-
-def test_a_scheduler_that_is_killed_is_named_and_what_was_solved_is_kept(tmp_path: Path) -> None:
-    tasks = [task("first"), *(task(f"{WAITING} {i}", tmp_path) for i in range(3))]
-    answers: list[Task] = []
-    file = tmp_path / "scheduler.json"
-    at = ("--scheduler-file", str(file), "--no-dashboard")
-    with started("dask_scheduler", *at, "--port", "0") as scheduler:
-        while not file.exists():
-            assert scheduler.poll() is None
-            time.sleep(0.02)
-        with started("dask_worker", *at, "--nthreads", "1", "--no-nanny"):
-            address = json.loads(file.read_text(encoding="utf-8"))["address"]
-            with client_of(address) as client, pytest.raises(Fault, match="cluster_lost"):
-                for each, _ in spread(tasks, waiting, Cluster(client)):
-                    answers.append(each)
-                    scheduler.kill()
-                    scheduler.wait()
-    assert [each.key for each in answers] == ["first"]
 
 
 def test_a_cluster_without_workers_is_waited_for_and_then_named(monkeypatch: pytest.MonkeyPatch) -> None:
