@@ -74,12 +74,12 @@ class Move:
 
     @property
     def shift(self) -> float:
-        """By how much the value moved, in multiples of the U that was stated; without end where it is gone."""
+        """The step of the value in multiples of the U that was stated; without end where it is gone."""
         return math.inf if self.now is None else _of(abs(self.now.value - self.before.value), self.before.expanded)
 
     @property
     def growth(self) -> float:
-        """By how much U grew, in multiples of what was stated: then too small a one was; below 0 it became smaller."""
+        """The growth of U in multiples of what was stated, which then was too small; below 0 it became smaller."""
         return math.inf if self.now is None else _of(self.now.expanded - self.before.expanded, self.before.expanded)
 
     @property
@@ -98,7 +98,7 @@ class Compared:
 
     @cached_property
     def moves(self) -> Mapping[int, tuple[Move, ...]]:
-        """Of each calibration, by its number, every parameter, the one that moved most first; empty if unsolved."""
+        """Every parameter of each calibration, by its number, the one that moved most first; empty if unsolved."""
         if not isinstance(self.answer, Given):
             return {}
         now = {(each.sensor, each.quantity): each.parameters for each in self.answer.calibrations}

@@ -24,7 +24,7 @@ SIZE_MAX_BYTES = 1 << 32  # a recording has some thousand
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """By which program, settings and estimator (None: each procedure's own) everything is solved."""
+    """The program, settings and estimator (None: each procedure's own) by which everything is solved."""
 
     rig_version: str
     overrides: tuple[str, ...]
