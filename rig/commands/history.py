@@ -5,12 +5,13 @@ from collections.abc import Callable, Sequence
 from datetime import date
 from pathlib import Path
 
-from rig.commands.config_arguments import add_json
+from rig.commands.config_arguments import add_json, add_set
 from rig.commands.named_history import add_history
 from rig.commands.waiting import answer_of
 
 LIST = "list"
-_COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", "compare", "void")
+AGAIN = "again"
+_COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", AGAIN, "compare", "void")
 
 
 def with_usual_command(arguments: Sequence[str]) -> list[str]:
@@ -53,6 +54,10 @@ def add(history: argparse.ArgumentParser) -> None:
         "--solve", action="store_true", help="enter what the recordings give, whatever a result.json says"
     )
     added("verify", "whether rows, results and files are what was entered; exit status 1 when they are not")
+    again = added(AGAIN, "solve every recording by today's method and say what changes; nothing is overwritten")
+    again.add_argument("--serial", dest="serial_number", metavar="SERIAL", help="only of one sensor")
+    _add_selection(again)
+    _add_again(again)
     compare = added("compare", "two calibrations of one sensor, with E_n")
     compare.add_argument("first", type=int, metavar="A")
     compare.add_argument("second", type=int, metavar="B")
@@ -60,6 +65,31 @@ def add(history: argparse.ArgumentParser) -> None:
     void = added("void", "say that a calibration does not count, and why; nothing is taken away")
     void.add_argument("number", type=int, metavar="NUMBER")
     void.add_argument("--reason", required=True, metavar="TEXT")
+
+
+def _add_again(again: argparse.ArgumentParser) -> None:
+    """How everything is solved, on how many processes or machines, and where the report goes."""
+    add_set(again, "judge by another threshold or limit than was recorded, as in `rig solve`", metavar="NAME=VALUE")
+    again.add_argument("--estimator", metavar="NAME", help="another than each procedure's own, as in `rig solve`")
+    again.add_argument(
+        "--of-u",
+        type=float,
+        default=0.1,
+        metavar="PART",
+        help="a result counts as moved beyond this part of the U that was stated (default: 0.1)",
+    )
+    again.add_argument(
+        "--out",
+        type=Path,
+        default=Path("again"),
+        metavar="DIR",
+        help="report and journal; the same command with the same folder goes on (default: again)",
+    )
+    spread = again.add_mutually_exclusive_group()
+    spread.add_argument("--jobs", type=int, default=1, metavar="N", help="processes of this computer (default: 1)")
+    spread.add_argument(
+        "--dask", metavar="ADDRESS", help="the workers of this Dask scheduler, as tcp://10.0.0.2:8786 (extra `dask`)"
+    )
 
 
 def _add_selection(parser: argparse.ArgumentParser, *, rig: bool = True) -> None:
@@ -78,6 +108,10 @@ def _day(text: str) -> date:
 
 def run(options: argparse.Namespace) -> int:
     """Carry out the command of `rig history` that is meant; Ctrl-C is heard at once, whatever its database does."""
+    if options.of_history == AGAIN:
+        from rig.commands.history_again import again
+
+        return again(options)
     from rig.commands import history_commands as history
 
     commands: dict[str, Callable[[argparse.Namespace], int]] = {

@@ -98,21 +98,11 @@ def _about(entry: "Entry", jobs: int = 1) -> str:
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Everything joblib does inside goes to the Dask scheduler at `address`."""
-    from rig.errors.extras import missing_extra
-
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise missing_extra(error, "dask") from error
     from joblib import parallel_config
 
-    try:
-        client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise Refused(
-            "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
-        ) from error
-    with client, parallel_config(backend="dask", client=client):
+    from rig.commands.cluster import client_of
+
+    with client_of(address) as client, parallel_config(backend="dask", client=client):
         yield
 
 

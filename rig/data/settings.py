@@ -466,30 +466,34 @@ def _uncertainty(config: "RigConfig") -> Uncertainty:
     return Uncertainty(**{**said, **of_sensors})
 
 
-def _overridden(settings: RunSettings, item: str) -> RunSettings:
-    """The settings with one `section.key=value` laid over them."""
-    path, _, value = item.partition("=")
-    section, _, key = path.strip().partition(".")
-    if path.strip() not in _settable():
+def known_setting(item: str) -> str:
+    """The path of what `section.key=value` sets. Raises Refused `unknown_setting` where no recording has that."""
+    path = item.partition("=")[0].strip()
+    if path not in _settable():
         raise Refused(
             "unknown_setting",
-            f"a recording has no setting {quote(path.strip())} that could be changed",
+            f"a recording has no setting {quote(path)} that could be changed",
             f"Set one of {', '.join(_settable())}",
         )
+    return path
+
+
+def _overridden(settings: RunSettings, item: str) -> RunSettings:
+    """The settings with one `section.key=value` laid over them."""
+    path, value = known_setting(item), item.partition("=")[2]
+    section, _, key = path.partition(".")
     if settings.elsewhere is not None and key:
         raise Refused(
             "unknown_setting", "readings from files are not judged by thresholds or limits", f"Leave out {section}"
         )
     document = settings.document()
     if key and document[section] is None:  # in recordings of before
-        raise Refused("unknown_setting", f"this recording states no {section}", f"Leave out {path.strip()}")
+        raise Refused("unknown_setting", f"this recording states no {section}", f"Leave out {path}")
     (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")
     except ValueError as error:
-        raise Refused(
-            "wrong_setting", str(error), f"Give a number, as in {path.strip()}={'0.001' if key else 1}"
-        ) from None
+        raise Refused("wrong_setting", str(error), f"Give a number, as in {path}={'0.001' if key else 1}") from None
 
 
 def setting(key: str) -> str:

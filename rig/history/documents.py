@@ -70,7 +70,7 @@ def history_csv(pasts: Sequence[Past]) -> str:
         entry = calibration_entry(past)
         shared = {name: entry[name] for name in COLUMNS if name in entry}
         for name, values in entry["parameters"].items():
-            writer.writerow({column: _cell(value) for column, value in {**shared, "parameter": name, **values}.items()})
+            writer.writerow({column: cell(value) for column, value in {**shared, "parameter": name, **values}.items()})
     return out.getvalue()
 
 
@@ -184,7 +184,8 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
     }
 
 
-def _cell(value: object) -> object:
+def cell(value: object) -> object:
+    """A value as a spreadsheet may read it: of one line, and no formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

@@ -167,10 +167,13 @@ class History:
                 certificates.enter(connection, run_id, certificate, now_utc())
             return run_id is not None
 
-    def calibrations(self, selection: Selection = Selection()) -> list[Past]:
-        """Calibrations in the order of time, voided ones too. One that a later one of its run replaced is left out."""
-        question = select(*_COLUMNS).select_from(_ROWS).where(~_replaced()).order_by(*_IN_TIME)
-        return self._pasts(_chosen(question, selection))
+    def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
+        """Calibrations in the order of time, voided ones too.
+
+        One that a later one of its run replaced is left out, unless it is asked for.
+        """
+        question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
+        return self._pasts(chosen(question if replaced_too else question.where(~replaced()), selection))
 
     def calibration(self, number: int) -> Past:
         """One by its number, replaced or not. Raises Refused `not_in_history`."""
@@ -300,14 +303,15 @@ def _kept(connection: Connection, number: int) -> Kept:
     )
 
 
-def _replaced() -> Any:
-    """Whether there is a later result of the same measurement."""
+def replaced() -> Any:
+    """Whether there is a later result of the same measurement, of a row of the runs."""
     later = schema.run.alias("later")
     newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
 
 
-def _chosen(question: Select[Any], selection: Selection) -> Select[Any]:
+def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
+    """A question for runs, or for their calibrations, narrowed to those that were chosen."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)
     if selection.part is not None:

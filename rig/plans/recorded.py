@@ -1,6 +1,6 @@
 """A run as it was recorded, and judged again by the procedure that judged it when it ended."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,8 +43,10 @@ class RecordedRun:
         return replace(self, raw=raw, corrected=corrected)
 
 
-def open_run(path: Path, script: Path | None = None) -> RecordedRun:
+def open_run(path: Path, script: Path | None = None, *, only: Container[str] | None = None) -> RecordedRun:
     """The recordings in a run folder, or a run file; `script` is executed, if it is named.
+
+    Of a folder `only` those of these names, where some are given: what was recorded there later is left out.
 
     Raises Refused `no_run`, and as `read_run` and `load_script`.
     """
@@ -54,8 +56,11 @@ def open_run(path: Path, script: Path | None = None) -> RecordedRun:
         corrected = _is_corrected(run)
         return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True, script=named)
     # Corrected readings are compared as one whole movement: what was interrupted before it does not count.
-    files = recordings(path, "raw"), recordings(path, "calibrated")[-1:]
-    raw, repeated = (tuple(map(read_run, each)) for each in files)
+    raw_files, repeated_files = (
+        [file for file in recordings(path, readings) if only is None or file.name in only]
+        for readings in ("raw", "calibrated")
+    )
+    raw, repeated = (tuple(map(read_run, files)) for files in (raw_files, repeated_files[-1:]))
     if not raw and not repeated:
         raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
     return RecordedRun(path, raw, repeated, script=named)

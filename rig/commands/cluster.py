@@ -1,0 +1,32 @@
+"""The cluster of a Dask scheduler that somebody names."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+@contextmanager
+def client_of(address: str) -> Iterator["Client"]:
+    """A client of the scheduler at `address`. Raises Refused `missing_extra`, `no_cluster`."""
+    from rig.errors.extras import missing_extra
+
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise missing_extra(error, "dask") from error
+    try:
+        client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise Refused(
+            "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
+        ) from error
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what becomes of a cluster is told by name, in one line
+    with client:
+        yield client

@@ -1,0 +1,72 @@
+"""A command loads what it needs: a history, a plan and a report do not wait for libraries of recordings and arms."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rig.history.store import open_history
+from support.past_runs import finished
+from support.paths import DEMO, FIXTURES
+
+# What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
+SLOW = ("h5py", "scipy", "rtde_control", "rtde_receive", "rtde_io", "matplotlib", "uvicorn", "distributed", "joblib")
+COMMAND = f"""
+import json, sys
+
+def loaded():
+    return sorted(name for name in {SLOW} if name in sys.modules)
+
+class Told:
+    encoding, first = "utf-8", None
+    def write(self, text):
+        if self.first is None and text.strip():
+            self.first = loaded()
+    def flush(self): ...
+    def isatty(self): return False
+
+told, there = Told(), sys.stdout
+sys.stdout = told
+from rig.cli import main
+status = main(sys.argv[1:])
+print(json.dumps([status, told.first, loaded()]), file=there)
+"""
+
+
+def loaded(*arguments: str | Path) -> tuple[list[str], list[str]]:
+    """Which of the slow libraries there are at the first line that a command prints, and when it has ended."""
+    command = [sys.executable, "-c", COMMAND, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, env=dict(os.environ), check=False)
+    assert done.returncode == 0, done.stderr
+    status, first, last = json.loads(done.stdout)
+    assert status == 0 and first is not None, done.stderr
+    return first, last
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A history of two sensors, the one that is meant."""
+    monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "history.sqlite"))
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        for day in range(3):
+            history.enter(finished(day, serial_number=f"G-{day % 2}"))
+    return tmp_path
+
+
+@pytest.mark.parametrize("words", [(), ("list", "--csv"), ("G-0",), ("show", "1"), ("compare", "1", "3")])
+def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], place: Path) -> None:
+    assert loaded("history", *words) == ([], [])
+
+
+def test_a_report_is_written_without_them(place: Path) -> None:
+    run = shutil.copytree(FIXTURES / "calibration", place / "run")
+    assert loaded("report", run) == ([], [])
+
+
+def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None:
+    first, last = loaded("plan", DEMO)
+    assert first == [] and set(last) <= {"scipy"}  # for how small a disturbance its checks can notice

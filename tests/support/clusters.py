@@ -1,0 +1,47 @@
+"""Dask clusters of this computer."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+
+@contextmanager
+def local_cluster(**of: Any) -> Iterator[Any]:
+    from distributed import LocalCluster
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # distributed's own, about the loop it closes
+        with LocalCluster(threads_per_worker=1, dashboard_address=None, **of) as cluster:  # type: ignore[no-untyped-call]
+            yield cluster
+
+
+@contextmanager
+def killable_cluster(folder: Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
+    """A scheduler with one worker, each a process of its own: the scheduler's, and its address."""
+    file = folder / "scheduler.json"
+    at = ("--scheduler-file", str(file), "--no-dashboard")
+    with started("dask_scheduler", *at, "--port", "0") as scheduler:
+        while not file.exists():
+            assert scheduler.poll() is None
+            time.sleep(0.02)
+        with started("dask_worker", *at, "--nthreads", "1", "--no-nanny"):
+            yield scheduler, json.loads(file.read_text(encoding="utf-8"))["address"]
+
+
+@contextmanager
+def started(module: str, *arguments: str) -> Iterator["subprocess.Popen[bytes]"]:
+    """One of the programs of distributed, killed in the end."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *arguments]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
