@@ -1,4 +1,4 @@
-"""Which way of using the rig fits a sensor that somebody has: four questions, four answers."""
+"""Which way of using the rig fits a sensor that somebody has: six questions, six answers."""
 
 from svg import Drawing
 
@@ -9,6 +9,12 @@ WAYS = (  # question, answer if yes in two lines, the page
         "and do you have the arm?",
         "wire it to our board",
         "how-to/first-calibration.md",
+    ),
+    (
+        "Is it in an autopilot, or does it print lines,",
+        "and do you have the arm?",
+        "MAVLink, or lines",
+        "how-to/autopilot.md, how-to/lines.md",
     ),
     ("Is it a KVH 1775,", "and do you have the arm?", "its own serial port", "kvh1775.md"),
     (
@@ -23,12 +29,13 @@ WAYS = (  # question, answer if yes in two lines, the page
         "readings + sweeps as CSV",
         "how-to/data-recorded-elsewhere.md",
     ),
+    ("Is it a gyroscope that you can lay on a table,", "side after side?", "by hand", "how-to/by-hand.md"),
 )
 
 
 def choice() -> Drawing:
     """The questions one below the other; yes goes right, no goes down."""
-    drawing = Drawing(900, 560, "I have my own IMU: which way?")
+    drawing = Drawing(900, 770, "I have my own IMU: which way?")
     drawing.words((450, 30), "I have my own IMU: which way?", size=18, anchor="middle", bold=True)
     for number, (first, second, answer, page) in enumerate(WAYS):
         y = 60.0 + 105 * number
@@ -42,7 +49,7 @@ def choice() -> Drawing:
         drawing.words((700, y + 48), page, "#555555", 13, "middle")
         drawing.arrow((240, y + 66), (240, y + 105), "#222222")
         drawing.words((252, y + 90), "no", bold=True)
-    drawing.box(40, 480, 400, 56, "#fbeee0", colour="#c25e00")
-    drawing.words((240, 504), "a new driver: new-sensor.md (on the board)", anchor="middle")
-    drawing.words((240, 524), "or other-hardware.md (a port of its own)", anchor="middle")
+    drawing.box(40, 690, 400, 56, "#fbeee0", colour="#c25e00")
+    drawing.words((240, 714), "a new driver: new-sensor.md (on the board)", anchor="middle")
+    drawing.words((240, 734), "or other-hardware.md (a port of its own)", anchor="middle")
     return drawing
