@@ -62,11 +62,12 @@ def swept(folder: Path, recording: str) -> int:
 
 @pytest.mark.slow
 @pytest.mark.proof
+@pytest.mark.thorough
 @pytest.mark.timeout(5400)
-def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path, thorough: bool) -> None:
-    """The difference of both is within the U of both, as often as U says."""
+def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
+    """The difference of both is within the U of both, as often as U says. One run of three stages is in test_stages.py."""
     apart: dict[int, list[float]] = {}
-    for seed in SEEDS if thorough else FEW:
+    for seed in SEEDS:
         rng, found = np.random.default_rng(FIRST_SEED + seed), []
         mounts = [a_little_off(rng, mount) for mount in (AS_DRAWN, QUARTER, TIPPED)]
         for name, document in (
@@ -80,10 +81,9 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path, thorough: bool) 
         apart[seed] = (np.abs(in_stages - in_one) / np.hypot(of_stages, of_one)).tolist()
         print(f"seed {seed}: scale factors differ by {max(apart[seed]):.2f} U at most")
     assert not {seed: each for seed, each in apart.items() if max(each) > BEYOND}
-    if thorough:
-        within = float(np.mean([each <= 1 for axes in apart.values() for each in axes]))
-        print(f"{100 * within:.1f} % of {3 * len(apart)} differences are within U")
-        assert within >= WITHIN
+    within = float(np.mean([each <= 1 for axes in apart.values() for each in axes]))
+    print(f"{100 * within:.1f} % of {3 * len(apart)} differences are within U")
+    assert within >= WITHIN
 
 
 @pytest.mark.slow
