@@ -62,7 +62,8 @@ def _wrong(signature: Any, status: Any, content: bytes, *, last: bool) -> Iterat
         yield "something was changed after a signature"
     start, length, end, _ = map(int, signature.byte_range)
     held = content[start + length : end]
-    if held[:1] != b"<" or held[-1:] != b">" or bytes.fromhex(held[1:-1].decode("ascii")) != signature.pkcs7_content:
+    written = signature.pkcs7_content.hex()
+    if held not in (f"<{written}>".encode(), f"<{written.upper()}>".encode()):
         yield "beside its signature there is something else"
     elif signature.pkcs7_content[parser.peek(signature.pkcs7_content) :].strip(b"\0"):
         yield "behind its signature there is something else"
