@@ -138,8 +138,11 @@ def _shares(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
     """The largest contributors of each sensor: shares of the variance of its worst scale factor and its worst bias."""
     found = {}
     for name, budget in budgets.items():
-        worst = int(np.argmax(budget.std[:3])), 3 + int(np.argmax(budget.std[3:]))
-        shares = [(each.name, *(_share(each.std[p], budget.std[p]) for p in worst)) for each in budget.contributors]
+        scale, bias = int(np.argmax(budget.std[:3])), 3 + int(np.argmax(budget.std[3:]))
+        shares = [
+            (each.name, _share(each.std[scale], budget.std[scale]), _share(each.std[bias], budget.std[bias]))
+            for each in budget.contributors
+        ]
         largest = sorted(shares, key=lambda each: -max(each[1:]))[:TOLD]
         found[name] = [each for each in largest if max(each[1:]) >= WORTH_TELLING]
     return found

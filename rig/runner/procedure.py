@@ -284,8 +284,12 @@ class Rig:
         if self.early is None:
             return False
         if self.early.due():
+            turner = self.devices.turner
+            host_s, turner_s = time.monotonic(), turner.latest.time_s
             with self.early.looking() as looked:
-                self._wait(looked.done, LOOK_S, self._check)
+                # By both clocks, as for the first samples.
+                while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < LOOK_S:
+                    turner.rest(SETTLING_LOOK_S, self._check)
                 said = self.early.found(looked)
             if said is not None:
                 self.recording.station.event(said)

@@ -20,22 +20,25 @@ from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand import Told, solve_by_hand
 from rig.observation.handled import handled
-from rig.plans.by_hand import ROUND
+from rig.plans.by_hand import Wanted as Asked
+from rig.plans.by_hand import listed
 from rig.plans.registry import installed, sections
 from rig.plans.shortest import ARCS_DEG, shortest_run, tried
 from rig.turners import registry as turners
 from rig.world.hand.habits import Action, Flip, Turn
+from support.drawn_servo import KNOWN as OF_DRAWN
 from support.drawn_servo import drawn_servo
 from support.drawn_servo import loaded as servo_loaded
 from support.handled_body import Part, handle
 from support.paths import CONFIGS
 from support.synthetic_run import CONFIG, Setup, synthetic_run
 
-PARTS = ("lsm9ds1", "adis16465", "icm42688p")
+SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
+PARTS = tuple(SET_TO)
 RATIO = 0.9, 1.15  # of reached to predicted
 SAMPLED_HZ = 238.0
 # A part that has been calibrated before: its axes are known to be square, and it hardly feels gravity.
-KNOWN = "uncertainty.non_orthogonality_deg=0.05", "uncertainty.g_sensitivity_deg_s_g=0.01"
+KNOWN = "uncertainty.non_orthogonality_deg=0.05", "uncertainty.g_sensitivity_deg_s_g=0.001"
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,10 @@ def run(part: str, turner: str, **keys: float) -> Run:
     return Run(part, turner, tuple(keys.items()))
 
 
-ARM = ({}, {"speed_deg_s": 80, "rest_s": 6}, {"repeats": 3, "rest_s": 1}, {"axes": 6, "rest_s": 2})
-SERVO = ({"rest_s": 2}, {"repeats": 3, "speed_deg_s": 75}, {"beyond_deg": 180, "speed_deg_s": 45})
-HAND = ({"flips": 12, "turns": 0}, {"flips": 12, "turns": 3}, {"flips": 24, "turns": 0})
+Keys = tuple[dict[str, float], ...]
+ARM: Keys = ({}, {"speed_deg_s": 80, "rest_s": 6}, {"repeats": 3, "rest_s": 1}, {"axes": 6, "rest_s": 2})
+SERVO: Keys = ({"rest_s": 2}, {"repeats": 3, "speed_deg_s": 75}, {"beyond_deg": 180, "speed_deg_s": 45})
+HAND: Keys = ({"flips": 12, "turns": 0}, {"flips": 12, "turns": 3}, {"flips": 24, "turns": 0})
 RUNS = [
     run(part, turner, **keys)
     for turner, plans in (("arm", ARM), ("servo", SERVO), ("hand", HAND))
@@ -70,19 +74,25 @@ def config_of(of: Run) -> RigConfig:
         return parse(text, overrides=said).config
     if of.turner == "servo":
         return servo_loaded((*of_servo(of),)).config
-    overrides = [f"sensors.gyro.part={of.part}", "sensors.gyro.range_deg_s=500", *said]
+    overrides = [*as_set(of.part), *said]
     overrides += ["uncertainty.crystal_ppm=50", "procedure.rest_s=1.0"]
     return load(CONFIGS / "by_hand.yaml", overrides, sections(installed()), turners.sections()).config
 
 
 def of_servo(of: Run) -> tuple[str, ...]:
     said = tuple(f"procedure.{key}={value}" for key, value in of.keys)
-    return (f"sensors.gyro.part={of.part}", "sensors.gyro.range_deg_s=125", *KNOWN, *said)
+    return (*(f"uncertainty.{each}" for each in OF_DRAWN), *as_set(of.part), *KNOWN, *said)
+
+
+def as_set(part: str) -> tuple[str, ...]:
+    rate_hz, range_deg_s = SET_TO[part]
+    keys = {"part": part, "rate_hz": rate_hz, "range_deg_s": range_deg_s}
+    return tuple(f"sensors.gyro.{key}={value}" for key, value in keys.items())
 
 
 def noise_of(of: Run) -> float:
     """RMS of one sample, as the data sheet's random walk makes it."""
-    return angle_walk_rad_sqrt_s(config_of(of).sensors["gyro"]) * SAMPLED_HZ**0.5
+    return float(angle_walk_rad_sqrt_s(config_of(of).sensors["gyro"]) * np.sqrt(SAMPLED_HZ))
 
 
 def reached(of: Run, seed: int) -> Reached:
@@ -116,11 +126,8 @@ def reached(of: Run, seed: int) -> Reached:
 
 def reached_by_hand(of: Run, seed: int) -> Reached:
     keys = dict(of.keys)
-    faces = [ROUND[(1 + place) % len(ROUND)] for place in range(int(keys["flips"]))]
-    actions: list[Action] = [Flip(face) for face in faces]
-    actions += [Turn(1)] * int(keys["turns"] > 0)
-    for _ in range(int(keys["turns"]) - 1):
-        actions += [Flip("+x" if faces[-1][1] != "x" else "+y"), Turn(1)]
+    asked = listed(Asked(int(keys["flips"]), int(keys["turns"])))
+    actions: list[Action] = [Turn(each.turns) if each.turns else Flip(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
     session = handled(told.time_s, told.rates, told.acceleration)
