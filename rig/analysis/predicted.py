@@ -41,6 +41,10 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
 ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
+# What a gear's ripple leaves in the mean over a turn, as a share of the rate: as simulated servos have it, and it differs
+# from turn to turn by half. No real one was measured.
+RIPPLE_LEFT = 3e-5
+ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
@@ -199,7 +203,8 @@ def _scatter(config: RigConfig, sweep: Sweep, made: Made) -> float:
     ramp_rad = sweep.speed_rad_s**2 / (2 * sweep.acceleration_rad_s2) + GUARD_RAD
     whole_rad = abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
     places = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
-    return float(made.reading_std_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD)
+    scatter_rad = np.hypot(made.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
+    return float(np.hypot(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD, RIPPLE_LEFT))
 
 
 @lru_cache(maxsize=512)

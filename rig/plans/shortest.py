@@ -123,7 +123,7 @@ def _duration_s(config: RigConfig) -> float:
 
 
 def _once(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Of each family the one that turns farthest, and repeats and rests least: without noise, more adds little."""
+    """The one of each family that turns farthest and repeats and rests least: without noise, more adds little."""
     found = dict[tuple[object, ...], Candidate]()
     for each in sorted(candidates, key=lambda each: (each.sizes[0], [-size for size in each.sizes[1:]])):
         found[each.family] = each
@@ -167,7 +167,7 @@ class _Swept:
         return found
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The same with rests that are a little shorter, down to the next of the coarse ones."""
+        """The candidates whose rests are a little shorter, down to the next of the coarse ones."""
         *sizes, rest_s = best.sizes
         below = max((each for each in RESTS_S if each < rest_s), default=rest_s)
         found = []
@@ -250,7 +250,7 @@ class _ByHand:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The same with a flip or two less, down to the next of the coarse numbers."""
+        """The candidates with a few flips less, down to the next of the coarse numbers."""
         flips, turns, rest_s = best.sizes
         below = max((each for each in FLIPS if each < flips), default=int(flips))
         return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
