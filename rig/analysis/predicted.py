@@ -41,8 +41,8 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
 ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
-# What a gear's ripple leaves in the mean over a turn, as a share of the rate: as simulated servos have it, and it differs
-# from turn to turn by half. No real one was measured.
+# What a gear's ripple leaves in the mean over a turn, as a share of the rate: as simulated servos have it, where it
+# differs from turn to turn by half. No real one was measured.
 RIPPLE_LEFT = 3e-5
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
