@@ -1,6 +1,7 @@
 """From recordings and their surroundings to what the vector model and its budget are made of."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
 
@@ -26,25 +27,51 @@ SAME_AXIS = 1 - 1e-6  # of the scalar product: the joints beside it stand where 
 WAVE_SHARE = 0.3  # of the error of a joint's zero, what its encoder errs once or twice a turn; assumed
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What one recording adds of a sensor: its turns and rests, and when its clock began by that of the first.
+
+    Its `settings` say the stage, and `mount` (3, 3) takes the flange's frame into the item's.
+    """
+
+    turns: Sequence[Observation]
+    rests: Sequence[Average]
+    since_s: float
+    settings: RunSettings
+    mount: Array | None
+
+
 def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
     """Put together what the arm knows of each average of a sensor, in all recordings of a run.
 
     Speeds by a controller's clock that runs too fast are too small by that.
     """
-    site, run = surroundings.site, recordings[0].run
+    run = recordings[0].run
     parts = [
-        (each.sensors[sensor], since_s) for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        Part(
+            each.sensors[sensor].revolutions, each.sensors[sensor].rests, since_s, each.run.settings, each.motion.mount
+        )
+        for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
     ]
-    turns = [(turn, since_s) for part, since_s in parts for turn in part.revolutions]
-    rests = [(rest, since_s) for part, since_s in parts for rest in part.rests]
+    seen = put_together(parts, surroundings)
+    if not run.settings.knows_sensor:
+        return seen
+    averages = [average for part in parts for average in (turn.average for turn in part.turns)]
+    averages += [rest for part in parts for rest in part.rests]
+    return replace(seen, sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages))
+
+
+def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
+    """What all parts of a run tell, the turns before the rests, without what is known of the sensor."""
+    site, settings = surroundings.site, parts[0].settings
+    turns = [(turn, part.since_s) for part in parts for turn in part.turns]
+    rests = [(rest, part.since_s) for part in parts for rest in part.rests]
     placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    arms_m = np.concatenate(
-        [arms_of(each.sensors[sensor].revolutions, run.settings, each.motion.mount) for each in recordings]
-    )
-    mounted = [each.run.settings.stage for each in recordings for _ in each.sensors[sensor].revolutions]
+    arms_m = np.concatenate([arms_of(each.turns, settings, each.mount) for each in parts])
+    mounted = [each.settings.stage for each in parts for _ in each.turns]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -58,14 +85,13 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
         return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty)
-        if run.settings.knows_returns
+        if settings.knows_returns
         else None,
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
-        sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
     )
 
 

@@ -5,6 +5,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
+from rig.commands.wanted import add_wanted, print_shortest_run
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -21,10 +22,16 @@ def add(parser: ArgumentParser) -> None:
     form.add_argument(
         "--table", action="store_true", help="the sweeps as CSV, a profile for each axis: time, angle, rate"
     )
+    add_wanted(parser)
 
 
 def run(options: Namespace) -> int:
-    """Print the plan as `planned` has it; returns 0."""
+    """Print the plan as `planned` has it, or the shortest one for what is wanted.
+
+    Returns 0, or 1 where no plan has that. Raises Refused as `planned` and `print_shortest_run`.
+    """
+    if options.wanted or options.at_most is not None or options.write is not None:
+        return print_shortest_run(options)
     from rig.config.hand_sections import ByHandSection
     from rig.report.plan_profile import profile_csv
     from rig.report.plan_table import print_plan

@@ -173,6 +173,17 @@ class SixObservationSection(SixSweepsSection):
         max_length=12,
         description="mountings of the item, gone through one after the other",
     )
+    wanted_scale_u: float | None = Field(
+        default=None,
+        gt=0,
+        lt=0.1,
+        description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
+        "home; without it and `wanted_bias_u_rad_s`, it ends when all repeats are made",
+        json_schema_extra=RATIO,
+    )
+    wanted_bias_u_rad_s: float | None = Field(
+        default=None, gt=0, lt=1, description="the same of the biases; where both are given, both must be reached"
+    )
 
     @property
     def then_verify(self) -> bool:
@@ -190,6 +201,11 @@ class SixObservationSection(SixSweepsSection):
         A magnetometer would be recorded, and only at the end of the run nobody could calibrate it.
         """
         yield from SixSweepsSection.problems(self, config)
+        if self.stages and (self.wanted_scale_u or self.wanted_bias_u_rad_s):
+            yield (
+                "procedure.wanted_scale_u and wanted_bias_u_rad_s end a run after a repeat, and procedure.stages has "
+                "its repeats in each mounting: leave out one or the other"
+            )
         if self.stages and self.verify:
             yield (
                 "procedure.verify repeats one movement with one mounting, and stages have several: leave out "

@@ -1,4 +1,4 @@
-"""How good a set of sweep directions is: G-optimality, SIX section II-B.
+"""How good a set of sweep directions is: G-optimality, SIX section II-B, and c-optimality of what is wanted.
 
 The variance of what the fitted model predicts at a point x, N f(x)ᵀ (XᵀX)⁻¹ f(x) in units of one observation's
 variance, is never below p, the number of parameters, at its worst point: the mean over the design's own points is
@@ -55,6 +55,20 @@ def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared")
 def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
     """p / worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
     return PARAMETER_COUNT[model] / maximum_prediction_variance(directions, model)
+
+
+def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale") -> float:
+    """How good sweeps are for the scale factors, or for the biases: 1 where none of as many is better, 0 if singular.
+
+    c-optimality (Elfving): the variance of a combination cᵀβ of the vector model's parameters, N cᵀ(XᵀX)⁻¹c, here of
+    the axis that it is worst of. The squares of a direction's parts add up to 1, so that the least of the worst slope
+    is 3; that of an offset is 1.
+    """
+    features = _features(directions, "vector")
+    if np.linalg.matrix_rank(features) < PARAMETER_COUNT["vector"]:
+        return 0.0
+    variances = len(features) * np.diag(np.linalg.inv(features.T @ features))
+    return float(3 / variances[:3].max() if what == "scale" else 1 / variances[3])
 
 
 def named_designs() -> dict[str, Array]:

@@ -148,20 +148,21 @@ def centripetal_m_s2(turns_rad_s: Array, way_m: Array) -> Array:
     return inwards
 
 
-def explain(seen: Seen, nominal_mounting: Array) -> Explained:
+def explain(seen: Seen, nominal_mounting: Array, process: BiasProcess | None = None) -> Explained:
     """Scale, bias and mounting, with gravity's share where the attitudes tell it.
 
-    Raises Fault as the vector model does.
+    How the bias wanders is found from the means, but for a `process` that is known. Raises Fault as the vector model
+    does.
     """
     try:
-        found = _explain(seen, nominal_mounting, seen.pull_m_s2)
+        found = _explain(seen, nominal_mounting, seen.pull_m_s2, process)
         # By the attitudes alone: circles that are a fiftieth of gravity would tell it, worse than it is known anyway.
         check_told(seen.rates_rad_s, seen.gravity_m_s2)
         return found
     except Fault as fault:
         if fault.name not in UNTOLD:
             raise
-    return _explain(seen, nominal_mounting, None)
+    return _explain(seen, nominal_mounting, None, process)
 
 
 def solver(
@@ -192,7 +193,7 @@ def solver(
     return solve
 
 
-def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) -> Explained:
+def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None) -> Explained:
     several = len(seen.speeds_rad_s) > 1
     arm_errors = seen.arm_errors_rad_s
 
@@ -208,7 +209,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
     steady, errors = solve(None)
     known, own = of_arm_and_speeds(steady.matrix), seen.own_patterns(steady.matrix)
     of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
-    bias = expected_bias_process(
+    bias = process or expected_bias_process(
         design_matrix(seen.rates_rad_s, gravity_m_s2),
         seen.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(known)], known),
         seen.variances_rad2_s2 + of_the_speeds,

@@ -3,13 +3,16 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 from firmware_host.client import Calibration
+from rig.analysis.shortest import Wanted
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
+from rig.config.procedure_sections import SixObservationSection
 from rig.data.provenance import Provenance, calls_itself_simulated, provenance_of
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner
@@ -24,6 +27,7 @@ from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
 from rig.runner.by_hand import HandSession
+from rig.runner.ending_early import EndingEarly
 from rig.runner.host_correction import HostCorrected, correcting
 from rig.runner.mounted import Memory, mounted
 from rig.runner.onboard import BoardCalibration
@@ -90,9 +94,10 @@ class Connector:
             simulated = self.loaded.simulated or calls_itself_simulated(report.software)
             on_board = None if board is None else board.board.identity.unique_id
             carried = mounted(described, on_board, self.memory, simulated=simulated)
+            plan = self.phase.plan(report.state.q_rad, self._left_out(whole_plan))
             yield Rig(
                 devices=Devices(turner, report, kind, self.loaded.config.turner, sources, acquisition, carried),
-                plan=self.phase.plan(report.state.q_rad, self._left_out(whole_plan)),
+                plan=plan,
                 whole_plan=whole_plan,
                 recording=recording,
                 along=None if board is None else self._calibrating_along(board, acquisition, recording, recorded),
@@ -101,7 +106,19 @@ class Connector:
                 stage=self.settings.stage,
                 last=not any(each.indices - self.resumed.done for each in whole_plan.stages[self.settings.stage + 1 :]),
                 up=self.loaded.config.site.up,
+                early=self._ending_early(plan, len(whole_plan.sweeps)),
             )
+
+    def _ending_early(self, plan: Plan, sweeps: int) -> EndingEarly | None:
+        """What ends the run before its last repeat; None where nothing is wanted, or readings are compared."""
+        section = self.loaded.config.procedure
+        if not isinstance(section, SixObservationSection) or self.phase.procedure.reads_corrected:
+            return None
+        if section.wanted_scale_u is None and section.wanted_bias_u_rad_s is None:
+            return None
+        wanted = Wanted(section.wanted_scale_u or inf, section.wanted_bias_u_rad_s or inf)
+        estimator = self.phase.procedure.estimator
+        return EndingEarly(wanted, plan, sweeps, section.repeats, self.path, self.resumed.earlier, estimator)
 
     def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> BoardSource:
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected

@@ -36,6 +36,7 @@ from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
 from rig.runner.by_hand import HandSession
+from rig.runner.ending_early import EndingEarly
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.mounting import (
     REST_S,
@@ -62,6 +63,7 @@ from rig.turners.kind import AnyTurner
 from rig.turners.turner import Turner
 
 FIRST_SAMPLE_TIMEOUT_S = 2.0
+LOOK_S = 60.0  # to solve what is recorded so far
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
 AT_REST_TIMEOUT_S = 10.0  # for the readings that tell how they scatter before anything has moved
 TRIAL_REST_S = 0.3  # of readings after a trial of the mounting, by which it has ended for the sensors too
@@ -119,7 +121,8 @@ class Rig:
 
     `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
     one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
-    `hand` where an operator's turns the item, and `up` is that direction in the frame of the arm's base.
+    `hand` where an operator's turns the item, and `up` is that direction in the frame of the arm's base. Where there is
+    an `early` end, the steps between it and the last way home are passed over.
     """
 
     devices: Devices
@@ -132,6 +135,7 @@ class Rig:
     stage: int = 0
     last: bool = True
     up: Vector3 = (0.0, 0.0, 1.0)
+    early: EndingEarly | None = None
     _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # of each gyroscope, before anything moved
     _motions: Iterator[Motion] | None = None  # the plan's, those to come; None before pre-flight
     _number: int = 0  # of the step that goes on, or the last one
@@ -236,6 +240,8 @@ class Rig:
     def move(self, transfer: Transfer) -> None:
         """Bring the arm to where the next sweep starts, or home. Raises `unplanned_motion`."""
         self._refuse_unplanned(transfer)
+        if self._passed_over(transfer):
+            return
         if transfer.tries:
             self.devices.acquisition.keep()
         with self._step(transfer):
@@ -251,12 +257,16 @@ class Rig:
         Raises `unplanned_motion`.
         """
         self._refuse_unplanned(sweep)
+        if self._passed_over(sweep):
+            return
         if self.along is not None:
             self.along.keep(sweep)
         with self._step(sweep, then=lambda: self._observe(sweep)):
             self.recording.note(SweepStarted(sweep))
             self.devices.turner.move(sweep, lambda: self._watch(sweep))
             self.recording.note(SweepFinished(sweep))
+        if self.early is not None:
+            self.early.swept(sweep)
 
     def _refuse_unplanned(self, motion: Motion) -> None:
         """Pre-flight has judged the plan's motions, one from the end of the other: nobody has looked at other ways."""
@@ -269,12 +279,30 @@ class Rig:
             planned = "no motion is left" if due is None else f"{due.name} comes next"
             raise Fault("unplanned_motion", f"{what}, but in the plan that passed pre-flight {planned}", remedy)
 
+    def _passed_over(self, motion: Motion) -> bool:
+        """Whether a motion is not made, because what is wanted is reached; looks whether it is, after a repeat."""
+        if self.early is None:
+            return False
+        if self.early.due():
+            turner = self.devices.turner
+            host_s, turner_s = time.monotonic(), turner.latest.time_s
+            with self.early.looking() as looked:
+                # By both clocks, as for the first samples.
+                while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < LOOK_S:
+                    turner.rest(SETTLING_LOOK_S, self._check)
+                said = self.early.found(looked)
+            if said is not None:
+                self.recording.station.event(said)
+        return self.early.passes_over(motion)
+
     def _observe(self, sweep: Sweep) -> None:
         if self.along is not None:
             self.along.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
+        if self.early is not None and self.early.ended:
+            return
         with self._step(rest):
             self.recording.note(RestStarted())
             self.devices.turner.rest(rest.duration_s, lambda: self._watch(rest))

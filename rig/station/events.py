@@ -230,6 +230,18 @@ class PhaseSkipped:
 
 
 @dataclass(frozen=True, slots=True)
+class WantedReached:
+    """The expanded uncertainties so far are what was wanted: `repeats_left` are not made, the arm goes home.
+
+    `scale_u` and `bias_u_rad_s` are those of the axis and the sensor that is known worst.
+    """
+
+    scale_u: float
+    bias_u_rad_s: float
+    repeats_left: int
+
+
+@dataclass(frozen=True, slots=True)
 class DocumentWritten:
     """A document of the outcome lies at `path`."""
 
@@ -366,6 +378,7 @@ RunEvent = (
     | AttitudeRead
     | CalibrationStored
     | PhaseSkipped
+    | WantedReached
     | DocumentWritten
     | Plotted
     | NotPlotted

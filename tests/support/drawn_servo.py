@@ -82,11 +82,13 @@ def drawn_servo(
     *,
     mounting_deg: float = 1.0,
     adapter_deg: float = 1.0,
+    noise_rad_s: float = 0.035,
     truth: ServoTruth | None = None,
 ) -> Drawn:
     """A run of configs/servo.yaml with these `overrides`.
 
-    The sensor sits `mounting_deg` off its mounting, the item off each stage's by `adapter_deg`, ways drawn anew.
+    One reading has that noise. The sensor sits `mounting_deg` off its mounting, the item off each stage's by
+    `adapter_deg`, ways drawn anew.
     """
     rng = np.random.default_rng([seed, 43])
     configuration = loaded((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
@@ -113,14 +115,16 @@ def drawn_servo(
         own = plan_servo_six_observation(config.turner, config.procedure, None, done)
         states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
         mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
-        samples = _sampled(far.servo, sits @ mount, (scale, bias - felt @ sits @ mount[:, 2]), (end_s, drift), rng)
+        samples = _sampled(
+            far.servo, sits @ mount, (scale, bias - felt @ sits @ mount[:, 2]), (end_s, drift, noise_rad_s), rng
+        )
         runs.append(
             RunData(
                 configuration.rig_text,
                 replace(settings, stage=stage),
                 replace(PROVENANCE, turner_kind="servo", board_follows_crystal=False),
                 RecordedTurner.of("servo", SERVO.meant(config.turner), JOINTS, SERVO.fields),
-                {"gyro": SENSOR},
+                {"gyro": replace(SENSOR, part=config.sensors["gyro"].part)},
                 {"gyro": samples},
                 states,
                 events,
@@ -192,13 +196,13 @@ def _driven(
 
 
 def _sampled(
-    servo: Servo, rows: Array, model: tuple[Array, Array], until: tuple[float, float], rng: np.random.Generator
+    servo: Servo, rows: Array, model: tuple[Array, Array], until: tuple[float, float, float], rng: np.random.Generator
 ) -> np.ndarray:
     """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
-    (scale, bias), (end_s, drift) = model, until
+    (scale, bias), (end_s, drift, noise_rad_s) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / SENSOR.rate_hz)
     rates = np.array([servo.rate_at(each) for each in time_s.tolist()])
-    read = np.outer(rates, rows[:, 2]) / scale - bias + 0.035 * rng.normal(size=(len(time_s), 3))
+    read = np.outer(rates, rows[:, 2]) / scale - bias + noise_rad_s * rng.normal(size=(len(time_s), 3))
     samples = np.zeros(len(time_s), SAMPLE_DTYPE)
     samples["sequence"] = np.arange(len(time_s))
     samples["board_time_us"] = np.round((time_s + 777.0) * (1 - drift) * 1e6)

@@ -32,7 +32,7 @@ from rig.world.ur10e.links import links
 CONFIG = """
 arm: {{host: 192.0.2.1, payload_kg: 0.35}}
 board: {{port: /dev/ttyACM0}}
-sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
+sensors: {{gyro: {{part: {part}, serial_number: LSM9DS1-001}}}}
 procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}{procedure}}}
 limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}{uncertainty}
 """
@@ -85,6 +85,7 @@ class Setup:
     told: DenavitHartenberg | None = None  # how its controller says it is made
     g_sensitivity_rad_s_per_g: tuple[tuple[float, ...], ...] = ()  # of the sensor's axes to what they feel
     offset_m: tuple[float, ...] = (0.0, 0.0, 0.0)  # from the flange's centre
+    part: str = "lsm9ds1"  # as it is called; what it does is said above
 
 
 def truth(setup: Setup) -> Array:
@@ -100,6 +101,7 @@ class Motion:
             speed_deg_s=setup.speed_deg_s,
             rest_s=setup.rest_s,
             repeats=setup.repeats,
+            part=setup.part,
             procedure="".join(f", {key}: {value}" for key, value in setup.procedure),
             uncertainty=""
             if setup.angle_std_deg is None
@@ -225,7 +227,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
         motion.settings,
         provenance,
         turner_of_provenance(provenance),
-        {"gyro": SENSOR},
+        {"gyro": replace(SENSOR, part=setup.part)},
         {"gyro": samples},
         arm,
         motion.events(),

@@ -1,0 +1,239 @@
+"""The uncertainty that a plan will reach, before it is run: what a recording of it would tell, and its budget. Pure.
+
+A plan says when each joint is where, the configuration says what is known of turner, site and sensor, the data sheet
+says how the sensor scatters. That is all the budget of a run is made of, but for two things: how the bias wandered
+beside its flicker, and how far it warmed, which readings alone tell.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from rig.analysis.clock import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
+from rig.analysis.planned_motion import STANDING_S, Timed, timed
+from rig.analysis.surroundings import Surroundings
+from rig.analysis.vector_inputs import Part, known_sensor, put_together, unknown_of
+from rig.config.models import RigConfig
+from rig.config.sensor_catalogue import PARTS
+from rig.config.sensor_sections import SensorSection, mounting_matrix
+from rig.config.servo_section import ServoSection
+from rig.config.stage_section import rotation_by
+from rig.data.settings import RunSettings, Uncertainty, settings_of
+from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
+from rig.estimation.bias_process import BiasProcess
+from rig.estimation.budget import Budget, budget
+from rig.estimation.six_observation_budget import six_observation_budget
+from rig.estimation.vector_fit import Seen, explain
+from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
+from rig.motion.state import Joints, Made
+from rig.motion.steps import TURN_RAD, Plan, Rest, Sweep, closes
+from rig.observation.arm_motion import ATTITUDES
+from rig.observation.average import Average
+from rig.observation.even_turn import GUARD_RAD
+from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, nearest_axis
+
+ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
+STEP_K = 1 / 16  # of a thermometer, assumed
+REMOUNTING_S = 60.0  # between two stages, assumed
+# How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
+# mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
+SITS_OFF_DEG = 5.0
+ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
+# What a gear's ripple leaves in the mean over a turn, as a share of the rate: as simulated servos have it, where it
+# differs from turn to turn by half. No real one was measured.
+RIPPLE_LEFT = 3e-5
+ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
+STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
+
+
+def angle_walk_rad_sqrt_s(sensor: SensorSection) -> float:
+    """What noise alone makes of an angle in a second, by the data sheet: rad/√s, a standard deviation."""
+    return float(np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60)
+
+
+def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = False) -> dict[str, Budget]:
+    """The budget that a run of the plan will have, for each sensor to calibrate.
+
+    It is that of the solution which the turner's runs are judged by: of the speeds alone where single readings of its
+    angle scatter. Of an `endless` run, which is repeated without end, nothing is left that comes anew each time.
+    Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
+    """
+    settings = settings_of(config, plan)
+    site, known = settings.site, settings.uncertainty
+    assert site is not None and known is not None, "as new settings have them"
+    found = {}
+    for name, sensor in config.to_calibrate.items():
+        surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
+        seen = put_together([_part(config, each, sensor, made) for each in _stages(plan, settings)], surroundings)
+        whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
+        kept = tuple(each for each in whole.contributors if not (endless and each.name in ANEW))
+        found[name] = replace(whole, contributors=kept)
+    return found
+
+
+def _budget(
+    seen: Seen, name: str, sensor: SensorSection, surroundings: Surroundings, *, by_speeds_alone: bool
+) -> Budget:
+    known, mounting = surroundings.uncertainty, mounting_matrix(sensor.mounting)
+    of = name, sensor.part, float(np.radians(sensor.range_deg_s))
+    stays = known_sensor(known, of, np.full(len(seen.windows_s), ROOM_C), STEP_K)
+    off_deg = SITS_OFF_DEG if seen.mount_turns_rad is None else known.mount_deg
+    seen = replace(seen, means_rad_s=_read(seen, _sitting_off(off_deg) @ mounting), sensor=stays)
+    explained = explain(seen, mounting, BiasProcess(0.0, 0.0, 0, stays.instability_rad_s))
+    unknown = unknown_of(surroundings, name, sensor.part, None)
+    if not by_speeds_alone:
+        return budget(explained, unknown)
+    accumulated = Accumulator.empty()
+    for mean, variance, turn, std in zip(
+        seen.means_rad_s, seen.variances_rad2_s2, seen.turns_rad_s, seen.speed_std_rad_s, strict=True
+    ):
+        if turn.any():
+            accumulated = accumulated.add(mean, variance, float(np.linalg.norm(turn)), float(std))
+    axes_rad = float(np.radians(known.of("non_orthogonality_deg", name, sensor.part)))
+    return six_observation_budget(explained, accumulated.solve("newton"), unknown, axes_rad)
+
+
+def _sitting_off(angle_deg: float) -> Array:
+    """(3, 3) a rotation by that angle about an axis that is as far from x as from y and z."""
+    return rotation_by(np.radians(angle_deg) / np.sqrt(3) * np.array([1.0, -1.0, 1.0]))
+
+
+def _read(seen: Seen, matrix: Array) -> Array:
+    """(N, 3) what a sensor of that F (3, 3) reads, with the same noise each time: no two readings are quite alike."""
+    noise = np.random.default_rng(len(seen.windows_s)).standard_normal((len(seen.windows_s), 3))
+    read: Array = seen.rates_rad_s @ matrix.T + np.sqrt(seen.variances_rad2_s2) * noise
+    return read
+
+
+def _clock(known: Uncertainty, *, on_board: bool) -> ClockCheck:
+    """The controller's clock as a run will hold it against this computer's and the board's crystal."""
+    stated = {BY_COMPUTER: known.computer_clock_ppm, **({BY_CRYSTAL: known.crystal_ppm} if on_board else {})}
+    compared = tuple(ClockComparison(by, 0.0, ppm * PPM, 0.0) for by, ppm in stated.items())
+    half_width = known.controller_clock_ppm * PPM
+    weights = 3 / half_width**2 + sum(1 / each.std**2 for each in compared)
+    return ClockCheck(0.0, float(weights**-0.5), compared, half_width)
+
+
+def _jitter_s(made: Made) -> float:
+    return 0.0 if made.reading_std_rad else STATE_JITTER_S  # what scatters tells no jitter beside
+
+
+def _stages(plan: Plan, settings: RunSettings) -> list[tuple[Plan, RunSettings, float]]:
+    """The plan cut into its stages, each with its settings and when it begins; one of a plan without."""
+    if not plan.stages:
+        return [(plan, settings, 0.0)]
+    begins = [stage.begins for stage in plan.stages]
+    found, since_s = [], 0.0
+    for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(plan.steps)], strict=True)):
+        own = replace(plan, steps=plan.steps[first:last], stages=())
+        found.append((own, replace(settings, stage=number), since_s))
+        since_s += own.duration_s + 2 * STANDING_S + REMOUNTING_S
+    return found
+
+
+def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made) -> Part:
+    """What a recording of a stage would tell."""
+    plan, settings, since_s = stage
+    mount = np.array(settings.mount)
+    turns, rests, here = list[Observation](), list[Average](), plan.start_q_rad
+    for each in timed(plan):
+        if isinstance(each.step, Sweep):
+            turned = Timed(each.step, each.start_s, each.end_s)
+            turns.append(_turn(turned, sensor, made, mount, _scatter(config, each.step, made)))
+        elif isinstance(each.step, Rest):
+            window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
+            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_REST_SAMPLES:
+                rests.append(_average(window_s, sensor, mount @ _attitude(made.kinematics, here)))
+            continue
+        here = getattr(each.step, "target_q_rad", here)
+    return Part(turns, rests, since_s, settings, mount)
+
+
+def _average(window_s: tuple[float, float], sensor: SensorSection, attitude: Array) -> Average:
+    lasting_s = window_s[1] - window_s[0]
+    samples = max(round(lasting_s * sensor.rate_hz), 2)
+    return Average(
+        mean_rad_s=np.zeros(3),
+        variance_rad2_s2=np.full(3, angle_walk_rad_sqrt_s(sensor) ** 2 / lasting_s),
+        noise_rad_s=np.full(3, angle_walk_rad_sqrt_s(sensor) * sensor.rate_hz**0.5),
+        samples=samples,
+        start_s=window_s[0],
+        end_s=window_s[1],
+        temperature_c=ROOM_C,
+        attitude=attitude,
+        freedom=float(samples - 1),
+    )
+
+
+def _turn(at: Timed[Sweep], sensor: SensorSection, made: Made, mount: Array, speed_std: float) -> Observation:
+    sweep = at.step
+    growing = 1.0 if sweep.direction == "ccw" else -1.0
+    began, attitude = _through(made.kinematics, sweep.start_q_rad, sweep.joint, sweep.revolution_rad)
+    if sweep.direction == "cw":
+        began = (*began[: sweep.joint], sweep.revolution_rad[1], *began[sweep.joint + 1 :])
+    axis = growing * mount @ _axes(made.kinematics, began)[:, sweep.joint]
+    nearest, sign = nearest_axis(mounting_matrix(sensor.mounting) @ axis)
+    return Observation(
+        sweep=sweep.index,
+        joint_name=sweep.joint_name,
+        direction=sweep.direction,
+        axis=nearest,
+        sign=sign,
+        axis_flange=axis,
+        speed_rad_s=sweep.speed_rad_s,
+        speed_std_rad_s=speed_std * sweep.speed_rad_s,
+        lost=0,
+        average=_average(at.window_s, sensor, mount @ attitude),
+        axis_errors=growing * _axis_errors(made.kinematics, began, sweep.joint) @ mount.T,
+        arm_m=mount @ _arm(made.kinematics, began, sweep.joint),
+        angle_rad=sweep.angle_rad,
+        arc_rad=None if closes(sweep.angle_rad) else sweep.revolution_rad,
+    )
+
+
+def _scatter(config: RigConfig, sweep: Sweep, made: Made) -> float:
+    """Standard deviation of the mean speed, as a share of it, of a shaft whose single readings scatter.
+
+    The places that come again a turn later are so many pairs of readings; see `rig.observation.turn_speed`.
+    """
+    if not made.reading_std_rad or not isinstance(config.turner, ServoSection):
+        return 0.0
+    ramp_rad = sweep.speed_rad_s**2 / (2 * sweep.acceleration_rad_s2) + GUARD_RAD
+    whole_rad = abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
+    places = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
+    scatter_rad = np.hypot(made.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
+    return float(np.hypot(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD, RIPPLE_LEFT))
+
+
+@lru_cache(maxsize=512)
+def _through(
+    arm: DenavitHartenberg, start_q_rad: Joints, joint: int, ends_rad: tuple[float, float]
+) -> tuple[Joints, Array]:
+    """Joint angles at the lower end of a sweep's turn, and the mean attitude (3, 3) over it."""
+    low, high = ends_rad
+    q_rad = np.tile(start_q_rad, (ATTITUDES, 1))
+    q_rad[:, joint] = np.linspace(low, high, ATTITUDES, endpoint=False) + (high - low) / (2 * ATTITUDES)
+    mean: Array = flange_attitude(q_rad, arm).mean(axis=0)
+    return (*start_q_rad[:joint], low, *start_q_rad[joint + 1 :]), mean
+
+
+@lru_cache(maxsize=512)
+def _attitude(arm: DenavitHartenberg, q_rad: Joints) -> Array:
+    return flange_attitude(np.array(q_rad), arm)
+
+
+@lru_cache(maxsize=512)
+def _axes(arm: DenavitHartenberg, q_rad: Joints) -> Array:
+    return flange_axes(q_rad, arm)
+
+
+@lru_cache(maxsize=512)
+def _axis_errors(arm: DenavitHartenberg, q_rad: Joints, joint: int) -> Array:
+    return axis_errors(q_rad, joint, arm)
+
+
+@lru_cache(maxsize=512)
+def _arm(arm: DenavitHartenberg, q_rad: Joints, joint: int) -> Array:
+    return flange_arm(np.array(q_rad), joint, arm)

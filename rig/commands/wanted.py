@@ -1,0 +1,98 @@
+"""`rig plan CONFIG --wanted …`: the shortest run for an uncertainty, and the configuration of it."""
+
+import json
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from rig.analysis.shortest import Planned, Wanted
+
+SCALE, BIAS = "scale", "bias"
+EXAMPLE = "Give for example --wanted scale=5e-4 --wanted bias=1e-4"
+
+
+def add_wanted(parser: ArgumentParser) -> None:
+    """`--wanted`, any number of times, with what belongs to it."""
+    parser.add_argument(
+        "--wanted",
+        action="append",
+        default=[],
+        metavar="scale=U",
+        help="the shortest run that is predicted to reach this expanded uncertainty (k = 2): scale=U, bias=U in rad/s",
+    )
+    parser.add_argument("--at-most", type=float, metavar="S", help="… in so many seconds")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the configuration of that run, a new file")
+
+
+def print_shortest_run(options: Namespace) -> int:
+    """Print the shortest run for what is wanted, and write its configuration; returns 1 where there is none.
+
+    Raises Refused `bad_option`, `configuration_not_written`, `not_foretold`, and as `configured`.
+    """
+    from rig.commands.configured import configured
+    from rig.plans.shortest import shortest_run
+    from rig.report.shortest_words import print_shortest
+
+    wanted = wanted_of(options.wanted, options.at_most)
+    if options.table or options.script is not None:
+        raise Refused("bad_option", "--wanted goes with no --table and no --script", "Write the configuration first")
+    if options.write is not None and options.write.exists():
+        raise _not_written(options.write, "it is there already")
+    config = configured(options.config, options.overrides).loaded.config
+    found = shortest_run(config, wanted)
+    print_shortest(found, config.procedure, as_json=options.json)
+    if found.best is None:
+        return 1
+    if options.write is not None:
+        _write(options, found.best)
+    return 0
+
+
+def wanted_of(said: Sequence[str], at_most_s: float | None) -> "Wanted":
+    """What the words `scale=U` and `bias=U` say. Raises Refused `bad_option`."""
+    from rig.analysis.shortest import Wanted
+
+    sizes: dict[str, float] = {}
+    for each in said:
+        name, _, value = each.partition("=")
+        try:
+            sizes[name] = float(value)
+        except ValueError:
+            raise Refused("bad_option", f"--wanted {each} is no size", EXAMPLE) from None
+        if name not in (SCALE, BIAS) or not 0 < sizes[name] < inf:
+            raise Refused("bad_option", f"--wanted {each} is no uncertainty of scale or bias", EXAMPLE)
+    if not sizes:
+        raise Refused("bad_option", "--at-most and --write are for a run with --wanted", EXAMPLE)
+    if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):
+        raise Refused("bad_option", f"--at-most is {at_most_s:g}", "Give a time above 0, in seconds")
+    return Wanted(sizes.get(SCALE, inf), sizes.get(BIAS, inf), inf if at_most_s is None else at_most_s)
+
+
+def _write(options: Namespace, best: "Planned") -> None:
+    """The configuration of a run, as `rig run` takes it: what the file says, with the procedure that was found."""
+    from rig.commands.configured import configured
+    from rig.config.written_file import write_new
+    from rig.report.shortest_words import changed_keys
+
+    section = configured(options.config, options.overrides).loaded.config.procedure
+    changed = changed_keys(section, best.candidate.procedure)
+    overrides = [f"procedure.{key}={json.dumps(value)}" for key, value in changed.items()]
+    loaded = configured(options.config, [*options.overrides, *overrides]).loaded
+    reached = best.reached
+    said = (
+        f"# Made by rig plan --wanted. Predicted: {best.candidate.duration_s:.1f} s, U = {reached.scale:.3g} of the "
+        f"scale factors, {reached.bias_rad_s:.3g} rad/s of the biases.\n"
+    )
+    try:
+        write_new(options.write, said + loaded.text)
+    except OSError as error:
+        raise _not_written(options.write, str(error.strerror or error)) from error
+
+
+def _not_written(path: Path, why: str) -> Refused:
+    return Refused("configuration_not_written", f"{path} cannot be written: {why}", "Name a new file with --write")

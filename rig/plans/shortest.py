@@ -1,0 +1,287 @@
+"""The shortest run of a configuration: which procedures are tried, and the shortest of them. Pure.
+
+What the file asks for beside the uncertainty stays: order, directions, stages, several speeds, six axes.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import inf
+from typing import Protocol
+
+import numpy as np
+
+from rig.analysis.predicted import predicted
+from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
+from rig.analysis.shortest import Budgets, Candidate, Planned, Reached, Searched, Shortest, Wanted, shortest
+from rig.config.hand_sections import ByHandSection
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.procedure_sections import LONGEST_SWEEP_S, SPEED_TO_RANGE, SixObservationSection
+from rig.config.servo_procedure import ServoSixObservationSection
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.solution import REAL_HANDS
+from rig.motion.state import Made
+from rig.motion.steps import Plan
+from rig.plans.by_hand import Wanted as Asked
+from rig.plans.by_hand import listed
+from rig.plans.servo_sweeps import plan_servo_six_observation
+from rig.plans.six_sweeps import plan_six_observation
+from rig.turners.registry import kind_of
+
+SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
+REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
+MOST = 100  # sweeps of one plan
+RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)
+ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them
+TURNS_DEG = (360.0, 720.0, 1080.0)
+BEYOND_DEG = (45.0, 90.0, 180.0)  # of a servo's turn
+FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
+REST_STEP_S = 0.1  # of the last, fine search
+
+
+class Tried(Protocol):
+    """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run."""
+
+    def candidates(self) -> Sequence[Candidate]: ...
+    def finer(self, best: Candidate) -> Sequence[Candidate]: ...
+    def predict(self, candidate: Candidate) -> Budgets | None: ...
+    def endless(self, candidate: Candidate) -> Budgets | None: ...
+    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None: ...
+    def directions(self, procedure: ProcedureSection) -> Array | None: ...
+
+
+def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
+    """The shortest run of this configuration that is predicted to reach what is wanted.
+
+    Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted.
+    """
+    what = tried(config)
+    candidates = what.candidates()
+    floors = {each.family: floor for each in _once(candidates) if (floor := what.endless(each)) is not None}
+    least = min(floors, key=lambda family: wanted.share(Reached.by(floors[family])))
+    endless = floors[least]
+    able = {family for family, floor in floors.items() if wanted.met_by(Reached.by(floor))}
+    found = shortest([each for each in candidates if each.family in able], what.predict, wanted)
+    if not able:
+        found = shortest(_longest(candidates, least, wanted.at_most_s), what.predict, wanted)
+    fine = shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
+    best = what.final(fine.best or found.best, wanted)
+    shown = best or found.nearest
+    before = Candidate(config.procedure, (), (), 0.0)
+    own = what.predict(before)
+    return Shortest(
+        wanted,
+        None if own is None else Planned(replace(before, duration_s=_duration_s(config)), own),
+        best,
+        found.nearest,
+        Reached.by(endless),
+        endless,
+        found.tried + fine.tried,
+        len(candidates),
+        None if shown is None else what.directions(shown.candidate.procedure),
+    )
+
+
+def tried(config: RigConfig) -> Tried:
+    """What may be tried of a configuration. Raises Refused `not_foretold`."""
+    procedure = config.procedure
+    if not config.to_calibrate:
+        raise _not_foretold("nothing is to be calibrated")
+    if isinstance(procedure, ByHandSection):
+        return _ByHand(config, procedure)
+    made = kind_of(config.turner).meant(config.turner)
+    if isinstance(procedure, ServoSixObservationSection):
+        return _Swept(config, made, _of_servo)
+    if type(procedure) is SixObservationSection and not procedure.finds_earth_rate:
+        return _Swept(config, made, _of_arm)
+    raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
+
+
+def _not_foretold(what: str) -> Refused:
+    return Refused(
+        "not_foretold",
+        what,
+        "Use six_observation with the Earth's rate known or left out, servo_six_observation, or by_hand",
+    )
+
+
+def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
+    """The motions of a procedure; none by hand."""
+    if isinstance(procedure, ServoSixObservationSection):
+        return plan_servo_six_observation(config.turner, procedure)  # type: ignore[arg-type]
+    if isinstance(procedure, SixObservationSection):
+        return plan_six_observation(config.arm, procedure)
+    return Plan((), (), ())
+
+
+def _duration_s(config: RigConfig) -> float:
+    procedure = config.procedure
+    if isinstance(procedure, ByHandSection):
+        return duration_s(list(listed(Asked(procedure.flips, procedure.turns))), procedure.rest_s)
+    return plan_of(config, procedure).duration_s
+
+
+def _once(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The one of each family that turns farthest and repeats and rests least: without noise, more adds little."""
+    found = dict[tuple[object, ...], Candidate]()
+    for each in sorted(candidates, key=lambda each: (each.sizes[0], [-size for size in each.sizes[1:]])):
+        found[each.family] = each
+    return list(found.values())
+
+
+def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
+    """The longest of a family, alone."""
+    own = [each for each in candidates if each.family == family and each.duration_s <= at_most_s]
+    return sorted(own, key=lambda each: each.duration_s)[-1:]
+
+
+Motions = Callable[[RigConfig], Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Swept:
+    """Sweeps of a turner with joints; `motions` are what may be told of them but repeats and rests.
+
+    Of each its family, how far it turns, and the keys of the procedure.
+    """
+
+    config: RigConfig
+    made: Made
+    motions: Motions
+
+    def candidates(self) -> Sequence[Candidate]:
+        found = []
+        for family, turned, keys in self.motions(self.config):
+            once, twice = (self._procedure(**keys, repeats=repeats, rest_s=RESTS_S[0]) for repeats in (1, 2))
+            plan = plan_of(self.config, once)
+            if kind_of(self.config.turner).problems([plan], self.config.turner, None):
+                continue
+            again_s = plan_of(self.config, twice).duration_s - plan.duration_s
+            rests = sum(1 for step in plan.steps if step.name.startswith("rest"))
+            some = [each for each in REPEATS if each * len(plan.sweeps) <= MOST or each == 1]
+            for repeats, rest_s in product(some, RESTS_S):
+                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * rests * (rest_s - RESTS_S[0])
+                procedure = self._procedure(**keys, repeats=repeats, rest_s=rest_s)
+                found.append(Candidate(procedure, family, (turned, repeats, rest_s), lasting_s))
+        return found
+
+    def finer(self, best: Candidate) -> Sequence[Candidate]:
+        """The candidates whose rests are a little shorter, down to the next of the coarse ones."""
+        *sizes, rest_s = best.sizes
+        below = max((each for each in RESTS_S if each < rest_s), default=rest_s)
+        found = []
+        for shorter_s in np.arange(below + REST_STEP_S, rest_s - REST_STEP_S / 2, REST_STEP_S).round(3).tolist():
+            procedure = best.procedure.model_copy(update={"rest_s": shorter_s})
+            lasting_s = plan_of(self.config, procedure).duration_s
+            found.append(Candidate(procedure, best.family, (*sizes, shorter_s), lasting_s))
+        return found
+
+    def predict(self, candidate: Candidate) -> Budgets | None:
+        return self._predicted(candidate, endless=False)
+
+    def endless(self, candidate: Candidate) -> Budgets | None:
+        return self._predicted(candidate, endless=True)
+
+    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
+        """The run that also ends after an earlier repeat, when U is reached."""
+        procedure = None if best is None else best.candidate.procedure
+        if best is None or not isinstance(procedure, SixObservationSection) or procedure.repeats == 1:
+            return best
+        if procedure.stages:
+            return best
+        sizes = ("wanted_scale_u", wanted.scale), ("wanted_bias_u_rad_s", wanted.bias_rad_s)
+        ending = procedure.model_copy(update={key: size for key, size in sizes if size < inf})
+        return replace(best, candidate=replace(best.candidate, procedure=ending))
+
+    def directions(self, procedure: ProcedureSection) -> Array | None:
+        plan = plan_of(self.config, procedure)
+        turned = [np.array(sweep.axis_flange) for sweep in plan.sweeps]
+        for stage in plan.stages:
+            for each in (each for each in plan.sweeps if each.index in stage.indices):
+                turned[each.index] = np.array(stage.mount) @ np.array(each.axis_flange)
+        return np.array(turned)
+
+    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
+        config = self.config.model_copy(update={"procedure": candidate.procedure})
+        try:
+            return predicted(config, plan_of(config, candidate.procedure), self.made, endless=endless)
+        except Fault:  # so few sweeps and rests tell nothing
+            return None
+
+    def _procedure(self, **keys: object) -> ProcedureSection:
+        return self.config.procedure.model_copy(update=keys)
+
+
+def _of_arm(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
+    procedure = config.procedure
+    assert isinstance(procedure, SixObservationSection)
+    axes = (3, 6) if procedure.axes == 3 and not procedure.stages else (procedure.axes,)
+    speeds: list[tuple[float, Mapping[str, object]]] = [
+        (speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in _speeds_deg_s(config)
+    ]
+    if procedure.speeds_deg_s is not None:
+        speeds = [(min(procedure.speeds), {})]
+    turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
+    for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
+        if arc_deg / slowest <= LONGEST_SWEEP_S:
+            closed = arc_deg % 360 == 0
+            yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
+
+
+def _of_servo(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
+    for speed_deg_s, beyond_deg in product(_speeds_deg_s(config), BEYOND_DEG):
+        yield (speed_deg_s,), beyond_deg, {"speed_deg_s": speed_deg_s, "beyond_deg": beyond_deg}
+
+
+def _speeds_deg_s(config: RigConfig) -> list[float]:
+    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / SPEED_TO_RANGE
+    return [speed for speed in SPEEDS_DEG_S if speed <= fastest]
+
+
+@dataclass(frozen=True, slots=True)
+class _ByHand:
+    """A session by hand of so many flips and turns."""
+
+    config: RigConfig
+    section: ByHandSection
+
+    def candidates(self) -> Sequence[Candidate]:
+        return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
+
+    def finer(self, best: Candidate) -> Sequence[Candidate]:
+        """The candidates with a few flips less, down to the next of the coarse numbers."""
+        flips, turns, rest_s = best.sizes
+        below = max((each for each in FLIPS if each < flips), default=int(flips))
+        return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
+
+    def predict(self, candidate: Candidate) -> Budgets | None:
+        return self._predicted(candidate, endless=False)
+
+    def endless(self, candidate: Candidate) -> Budgets | None:
+        return self._predicted(candidate, endless=True)
+
+    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
+        """The session that also ends before its list, when U is reached: beside what no session shows of hands."""
+        own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
+        if best is None or not 0 < own < inf:
+            return best
+        procedure = best.candidate.procedure.model_copy(update={"wanted_scale_u": round(own**0.5, 7)})
+        return replace(best, candidate=replace(best.candidate, procedure=procedure))
+
+    def directions(self, procedure: ProcedureSection) -> Array | None:
+        return None
+
+    def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
+        procedure = self.section.model_copy(update={"flips": flips, "turns": turns, "rest_s": rest_s})
+        lasting_s = duration_s(list(listed(Asked(flips, turns))), rest_s)
+        return Candidate(procedure, (), (flips, turns, rest_s), lasting_s)
+
+    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
+        section = candidate.procedure
+        assert isinstance(section, ByHandSection)
+        try:
+            moves = list(listed(Asked(section.flips, section.turns)))
+            return predicted_by_hand(self.config, moves, section.rest_s, endless=endless)
+        except Fault:
+            return None

@@ -1,0 +1,194 @@
+"""The shortest run in words: how long it is, what it reaches, what limits it, and what no run reaches."""
+
+import json
+from collections.abc import Iterator
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from rig.analysis.shortest import Budgets, Planned, Reached, Shortest
+from rig.config.models import ProcedureSection
+from rig.estimation.optimality import c_efficiency, g_efficiency, named_designs
+from rig.station.plain_text import plain
+
+if TYPE_CHECKING:
+    from rig.estimation.arrays import Array
+
+TOLD = 3  # of what limits it, as many lines
+WORTH_TELLING = 0.05  # of the variance
+ASSUMED = (
+    "Predicted for parts as in their data sheets, at one temperature, with a bias that flickers and does nothing else, "
+    "off the nominal mounting by 5° (in stages by uncertainty.mount_deg). A sensor that sits straighter does better, "
+    "one that warms up does worse."
+)
+
+
+def changed_keys(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
+    """The keys of the procedure that differ, with what they are now."""
+    was, now = before.model_dump(mode="json"), after.model_dump(mode="json")
+    return {key: value for key, value in now.items() if was.get(key) != value}
+
+
+def print_shortest(found: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
+    """What was found, on stdout: tables for people, JSON in SI units for machines."""
+    if as_json:
+        print(json.dumps(shortest_document(found, section), indent=2, allow_nan=False))
+        return
+    console = Console(highlight=False)
+    console.print(plain(_verdict(found)))
+    shown = found.best or found.nearest
+    if shown is not None:
+        console.print(_plans(found, shown, section))
+        console.print(_limits("What limits it, as shares of the variance:", shown.budgets))
+    console.print(plain(_floor(found)))
+    if found.directions is not None:
+        console.print(_optimality(found.directions))
+    console.print(plain(f"{found.tried} of {found.among} plans were looked at. {ASSUMED}"))
+
+
+def shortest_document(found: Shortest, section: ProcedureSection) -> dict[str, Any]:
+    """What was found, for machines; null where there is no such plan or no such wish."""
+    shown = found.best or found.nearest
+    return {
+        "schema": "rig.shortest/1",
+        "wanted": {
+            "scale": _finite(found.wanted.scale),
+            "bias_rad_s": _finite(found.wanted.bias_rad_s),
+            "at_most_s": _finite(found.wanted.at_most_s),
+        },
+        "reached": found.best is not None,
+        "cannot_be_had": found.cannot_be_had,
+        "plan": None if shown is None else _plan_entry(shown, section),
+        "before": None if found.before is None else _plan_entry(found.before, section),
+        "at_any_length": {"scale": found.at_any_length.scale, "bias_rad_s": found.at_any_length.bias_rad_s},
+        "optimality": None if found.directions is None else _efficiencies(found.directions),
+        "tried": found.tried,
+        "among": found.among,
+    }
+
+
+def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
+    return {
+        "duration_s": planned.candidate.duration_s,
+        "scale": planned.reached.scale,
+        "bias_rad_s": planned.reached.bias_rad_s,
+        "changed": changed_keys(section, planned.candidate.procedure),
+        "limits": {
+            name: [{"contributor": line, "scale_share": scale, "bias_share": bias} for line, scale, bias in lines]
+            for name, lines in _shares(planned.budgets).items()
+        },
+    }
+
+
+def _verdict(found: Shortest) -> str:
+    wish = _wish(found)
+    within = "" if found.wanted.at_most_s == inf else f" within {found.wanted.at_most_s:g} s"
+    if found.best is not None:
+        return f"The shortest run for {wish} takes {found.best.candidate.duration_s:.1f} s."
+    if found.cannot_be_had:
+        return f"No run of this kind reaches {wish}, however long it is."
+    return f"No plan that was looked at reaches {wish}{within}; this one comes nearest."
+
+
+def _wish(found: Shortest) -> str:
+    parts = []
+    if found.wanted.scale < inf:
+        parts.append(f"U ≤ {found.wanted.scale:.3g} of the scale factors")
+    if found.wanted.bias_rad_s < inf:
+        parts.append(f"U ≤ {found.wanted.bias_rad_s:.3g} rad/s of the biases")
+    return " and ".join(parts)
+
+
+def _plans(found: Shortest, shown: Planned, section: ProcedureSection) -> Table:
+    """The plan beside the file's own."""
+    table = Table(box=SIMPLE)
+    for heading in ("", "as in the file", "shortest" if found.best else "nearest"):
+        table.add_column(heading, justify="right" if heading else "left")
+    before = found.before
+    was = section.model_dump(mode="json")
+    for key, value in changed_keys(section, shown.candidate.procedure).items():
+        table.add_row(f"procedure.{key}", plain(_shown(was.get(key))), plain(_shown(value)))
+    for name, place in (("U of the scale factors", "scale"), ("U of the biases, rad/s", "bias_rad_s")):
+        own = "–" if before is None else f"{getattr(before.reached, place):.3g}"
+        table.add_row(name, own, f"{getattr(shown.reached, place):.3g}")
+    own = "–" if before is None else f"{before.candidate.duration_s:.1f}"
+    table.add_row("duration, s", own, f"{shown.candidate.duration_s:.1f}")
+    return table
+
+
+def _shown(value: object) -> str:
+    return "–" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _limits(title: str, budgets: Budgets) -> Table:
+    table = Table(title=title, title_justify="left", box=SIMPLE)
+    for heading in ("sensor", "contributor", "of the scale factors", "of the biases"):
+        table.add_column(heading, justify="right" if heading.startswith("of") else "left")
+    for name, lines in _shares(budgets).items():
+        for contributor, scale, bias in lines:
+            table.add_row(plain(name), contributor, f"{100 * scale:.0f} %", f"{100 * bias:.0f} %")
+    return table
+
+
+def _shares(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
+    """The largest contributors of each sensor: shares of the variance of its worst scale factor and its worst bias."""
+    found = {}
+    for name, budget in budgets.items():
+        scale, bias = int(np.argmax(budget.std[:3])), 3 + int(np.argmax(budget.std[3:]))
+        shares = [
+            (each.name, _share(each.std[scale], budget.std[scale]), _share(each.std[bias], budget.std[bias]))
+            for each in budget.contributors
+        ]
+        largest = sorted(shares, key=lambda each: -max(each[1:]))[:TOLD]
+        found[name] = [each for each in largest if max(each[1:]) >= WORTH_TELLING]
+    return found
+
+
+def _share(part: float, whole: float) -> float:
+    return float((part / whole) ** 2) if whole > 0 else 0.0
+
+
+def _floor(found: Shortest) -> str:
+    """What no run of this kind gets below, and why."""
+    least: Reached = found.at_any_length
+    parts = []
+    for size, unit, what, place in (
+        (least.scale, "", "the scale factors", 1),
+        (least.bias_rad_s, " rad/s", "the biases", 2),
+    ):
+        largest = [max(lines, key=lambda line: line[place])[0] for lines in _shares(found.endless).values() if lines]
+        parts.append(f"U = {size:.2g}{unit} of {what}" + (f" ({', '.join(sorted(set(largest)))})" if size > 0 else ""))
+    return f"However long it is, no run of this kind gets below {' and '.join(parts)}."
+
+
+def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
+    """The design's efficiencies beside those of the six directions of SIX."""
+    return {name: dict(_of_design(each)) for name, each in (("plan", directions), ("six", named_designs()["six"]))}
+
+
+def _of_design(directions: "Array") -> Iterator[tuple[str, float]]:
+    yield "g", g_efficiency(directions, "vector")
+    yield "g_squared", g_efficiency(directions, "squared")
+    yield "c_scale", c_efficiency(directions, "scale")
+    yield "c_bias", c_efficiency(directions, "bias")
+
+
+def _optimality(directions: "Array") -> Table:
+    table = Table(title="How good the directions of the sweeps are (1: none are better):", box=SIMPLE)
+    table.title_justify = "left"
+    names = {"g": "G", "g_squared": "G, speeds alone", "c_scale": "c, scale", "c_bias": "c, bias"}
+    table.add_column("")
+    for each in names.values():
+        table.add_column(each, justify="right")
+    words = {"plan": "this plan", "six": "the paper's six"}
+    for name, values in _efficiencies(directions).items():
+        table.add_row(words[name], *(f"{values[key]:.2f}" for key in names))
+    return table
+
+
+def _finite(value: float) -> float | None:
+    return value if value < inf else None

@@ -1,0 +1,286 @@
+"""The shortest run for a wanted uncertainty: what is predicted is reached, and nothing shorter is left over."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.analysis.calibration import observe_recordings, solve_observed
+from rig.analysis.predicted import angle_walk_rad_sqrt_s
+from rig.analysis.shortest import Candidate, Reached, Wanted, shortest
+from rig.analysis.surroundings import surroundings_of
+from rig.cli import main
+from rig.config.load import load, parse
+from rig.config.models import RigConfig
+from rig.errors import Refused
+from rig.estimation.budget import Budget, Contributor
+from rig.estimation.by_hand import Told, solve_by_hand
+from rig.observation.handled import handled
+from rig.plans.by_hand import Wanted as Asked
+from rig.plans.by_hand import listed
+from rig.plans.registry import installed, sections
+from rig.plans.shortest import ARCS_DEG, shortest_run, tried
+from rig.turners import registry as turners
+from rig.world.hand.habits import Action, Flip, Turn
+from support.drawn_servo import KNOWN as OF_DRAWN
+from support.drawn_servo import drawn_servo
+from support.drawn_servo import loaded as servo_loaded
+from support.handled_body import Part, handle
+from support.paths import CONFIGS
+from support.synthetic_run import CONFIG, Setup, synthetic_run
+
+SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
+PARTS = tuple(SET_TO)
+RATIO = 0.9, 1.15  # of reached to predicted
+OF_SERVO = 0.85, 1.35  # what a gear's ripple leaves differs from turn to turn
+SAMPLED_HZ = 238.0
+# A part that has been calibrated before: its axes are known to be square, and it hardly feels gravity.
+KNOWN = "uncertainty.non_orthogonality_deg=0.02", "uncertainty.g_sensitivity_deg_s_g=0.001"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A planned run of a part: its turner, and what the procedure says."""
+
+    part: str
+    turner: str
+    keys: tuple[tuple[str, float], ...]
+
+
+def run(part: str, turner: str, **keys: float) -> Run:
+    return Run(part, turner, tuple(keys.items()))
+
+
+Keys = tuple[dict[str, float], ...]
+ARM: Keys = ({}, {"speed_deg_s": 80, "rest_s": 6}, {"repeats": 3, "rest_s": 1}, {"axes": 6, "rest_s": 2})
+SERVO: Keys = ({"rest_s": 2}, {"repeats": 3, "speed_deg_s": 75}, {"beyond_deg": 180, "speed_deg_s": 45})
+HAND: Keys = ({"flips": 12, "turns": 0}, {"flips": 12, "turns": 3}, {"flips": 24, "turns": 0})
+RUNS = [
+    run(part, turner, **keys)
+    for turner, plans in (("arm", ARM), ("servo", SERVO), ("hand", HAND))
+    for keys in plans
+    for part in PARTS
+]
+FEW = [RUNS[0], RUNS[-1]]
+
+
+def config_of(of: Run) -> RigConfig:
+    said = [f"procedure.{key}={value}" for key, value in of.keys]
+    if of.turner == "arm":
+        text = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=1, part=of.part, procedure="", uncertainty="")
+        return parse(text, overrides=said).config
+    if of.turner == "servo":
+        return servo_loaded((*of_servo(of),)).config
+    overrides = [*as_set(of.part), *said]
+    overrides += ["uncertainty.crystal_ppm=50", "procedure.rest_s=1.0"]
+    return load(CONFIGS / "by_hand.yaml", overrides, sections(installed()), turners.sections()).config
+
+
+def of_servo(of: Run) -> tuple[str, ...]:
+    said = tuple(f"procedure.{key}={value}" for key, value in of.keys)
+    return (*(f"uncertainty.{each}" for each in OF_DRAWN), *as_set(of.part), *KNOWN, *said)
+
+
+def as_set(part: str) -> tuple[str, ...]:
+    rate_hz, range_deg_s = SET_TO[part]
+    keys = {"part": part, "rate_hz": rate_hz, "range_deg_s": range_deg_s}
+    return tuple(f"sensors.gyro.{key}={value}" for key, value in keys.items())
+
+
+def noise_of(of: Run) -> float:
+    """RMS of one sample, as the data sheet's random walk makes it."""
+    return float(angle_walk_rad_sqrt_s(config_of(of).sensors["gyro"]) * np.sqrt(SAMPLED_HZ))
+
+
+def reached(of: Run, seed: int) -> Reached:
+    """U as the budget of a whole recording of that run states it."""
+    rng = np.random.default_rng([seed, 31])
+    if of.turner == "hand":
+        return reached_by_hand(of, seed)
+    if of.turner == "arm":
+        keys = dict(of.keys)
+        setup = Setup(
+            seed=seed,
+            part=of.part,
+            noise_rad_s=noise_of(of),
+            scale=tuple(rng.uniform(0.97, 1.03, 3).tolist()),
+            mounting_error_rad=off(rng, 5.0),
+            speed_deg_s=keys.pop("speed_deg_s", 60.0),
+            rest_s=keys.pop("rest_s", 3.0),
+            repeats=int(keys.pop("repeats", 1)),
+            procedure=tuple((key, str(value)) for key, value in keys.items()),
+        )
+        recorded = synthetic_run(setup)
+        runs, sensors, estimator = [recorded], recorded.sensors, "vector"
+    else:
+        drawn = drawn_servo(seed, of_servo(of), mounting_deg=1.4, adapter_deg=1.4, noise_rad_s=noise_of(of))
+        runs, sensors, estimator = drawn.runs, drawn.runs[0].sensors, "newton"
+    seen = observe_recordings(runs)
+    found = solve_observed(sensors, seen, estimator, surroundings_of(seen))["gyro"]
+    assert found.uncertainty is not None
+    return Reached.by({"gyro": found.uncertainty})
+
+
+def reached_by_hand(of: Run, seed: int) -> Reached:
+    keys = dict(of.keys)
+    asked = listed(Asked(int(keys["flips"]), int(keys["turns"])))
+    actions: list[Action] = [Turn(each.turns) if each.turns else Flip(each.face) for each in asked]
+    part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
+    told = handle(actions, seed, part, rest_s=1.5)
+    session = handled(told.time_s, told.rates, told.acceleration)
+    return Reached.by({"gyro": solve_by_hand(session, Told(50.0)).budget})
+
+
+def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:
+    way = rng.choice([-1.0, 1.0], 3) * rng.uniform(0.8, 1.2, 3)
+    found: tuple[float, ...] = tuple((np.radians(angle_deg) * way / np.linalg.norm(way)).tolist())
+    return found
+
+
+def predicted_of(of: Run) -> Reached:
+    config = config_of(of)
+    budgets = tried(config).predict(Candidate(config.procedure, (), (), 0.0))
+    assert budgets is not None
+    return Reached.by(budgets)
+
+
+@pytest.mark.proof
+@pytest.mark.timeout(3000)
+def test_what_is_predicted_is_reached(thorough: bool) -> None:
+    ratios = {}
+    for seed, each in enumerate(RUNS if thorough else FEW):
+        foretold, found = predicted_of(each), reached(each, seed)
+        ratios[each] = found.scale / foretold.scale, found.bias_rad_s / foretold.bias_rad_s
+        print(f"{each.turner} {each.part} {dict(each.keys)}: {ratios[each][0]:.3f} {ratios[each][1]:.3f}")
+    wrong = {each: found for each, found in ratios.items() if not _within(each, *found)}
+    assert not wrong
+
+
+def _within(of: Run, *ratios: float) -> bool:
+    low, high = OF_SERVO if of.turner == "servo" else RATIO
+    return all(low <= each <= high for each in ratios)
+
+
+def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
+    each = RUNS[0]
+    noisy = synthetic_run(Setup(noise_rad_s=10 * noise_of(each)))
+    seen = observe_recordings([noisy])
+    found = solve_observed(noisy.sensors, seen, "vector", surroundings_of(seen))["gyro"]
+    assert found.uncertainty is not None
+    assert Reached.by({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
+
+
+@cache
+def demo() -> RigConfig:
+    return load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
+
+
+@pytest.mark.proof
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("wanted", [Wanted(1.3e-4, 6e-5), Wanted(1.15e-4, 3e-5), Wanted(bias_rad_s=2.5e-5)])
+def test_no_plan_of_the_grid_is_shorter(thorough: bool, wanted: Wanted) -> None:
+    what = tried(demo())
+    grid = [each for each in what.candidates() if thorough or coarse(each)]
+    assert len(grid) >= 30
+    found = shortest(grid, what.predict, wanted)
+    does = [
+        each.duration_s
+        for each in grid
+        if (budgets := what.predict(each)) is not None and wanted.met_by(Reached.by(budgets))
+    ]
+    assert found.best is not None and found.best.candidate.duration_s <= 1.05 * min(does)
+    assert found.tried < len(grid) / 2
+
+
+def coarse(each: Candidate) -> bool:
+    _, repeats, rest_s = each.sizes
+    return each.family[0] == 3 and each.family[1] in (60.0, 120.0) and repeats in (1, 2, 3, 4) and rest_s <= 10
+
+
+def test_more_than_the_rest_is_chosen() -> None:
+    """By the scale factors the speed is found, by the biases repeats or rests."""
+    config = demo()
+    quick = shortest_run(config, Wanted(scale=1.3e-4))
+    assert quick.best is not None and quick.before is not None
+    assert quick.best.candidate.procedure.speed_deg_s > 60  # type: ignore[attr-defined]
+    assert quick.best.candidate.duration_s < quick.before.candidate.duration_s < 90
+    assert quick.best.reached.scale <= 1.3e-4
+
+
+def test_what_no_run_reaches_is_told_from_what_takes_too_long() -> None:
+    never = shortest_run(demo(), Wanted(scale=1e-6))
+    assert never.best is None and never.cannot_be_had and never.nearest is not None
+    late = shortest_run(demo(), Wanted(bias_rad_s=3e-5, at_most_s=60))
+    assert late.best is None and not late.cannot_be_had
+    assert late.nearest is not None and late.nearest.candidate.duration_s <= 60
+
+
+def test_the_search_takes_the_least_of_a_grid_it_has_not_seen_whole() -> None:
+    rng, section = np.random.default_rng(1), demo().procedure
+    for _ in range(50):
+        slopes, cost = rng.uniform(0.2, 3, 3), rng.uniform(1, 9, 3)
+        grid = [
+            Candidate(section, (), (a, b, c), float(cost @ (a, b, c)))
+            for a in range(1, 7)
+            for b in range(1, 7)
+            for c in range(1, 7)
+        ]
+
+        def tells(each: Candidate, slopes: np.ndarray = slopes) -> float:
+            return float(np.exp(-slopes @ np.log(each.sizes)))
+
+        does = [each.duration_s for each in grid if tells(each) <= 0.02]
+        found = shortest(grid, budgets_of(tells), Wanted(scale=0.02))
+        assert (found.best.candidate.duration_s if found.best else None) == min(does, default=None)
+        assert found.tried < len(grid) / 3
+
+
+Tells = Callable[[Candidate], float]
+
+
+def budgets_of(tells: Tells) -> Callable[[Candidate], dict[str, Budget]]:
+    def predict(each: Candidate) -> dict[str, Budget]:
+        covariance = np.diag([(tells(each) / 2) ** 2] * 6)
+        return {"gyro": Budget((Contributor("all", "B", "normal", None, "", "", np.inf, covariance),))}
+
+    return predict
+
+
+def test_arcs_are_tried_where_the_encoders_are_known() -> None:
+    known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())
+    arcs = {each.sizes[0] for each in tried(known.config).candidates()}
+    assert arcs >= set(ARCS_DEG)
+    assert not {each.sizes[0] for each in tried(demo()).candidates()} & set(ARCS_DEG)
+
+
+def test_a_procedure_that_is_not_predicted_is_refused() -> None:
+    config = load(CONFIGS / "imu.yaml", (), sections(installed()), turners.sections()).config
+    with pytest.raises(Refused, match="not predicted"):
+        shortest_run(config, Wanted(scale=1e-3))
+
+
+def test_the_command_writes_a_configuration_that_plans_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    written = tmp_path / "short.yaml"
+    words = ["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=1.3e-4", "--at-most", "90"]
+    assert main([*words, "--write", str(written), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["reached"] and said["plan"]["scale"] <= 1.3e-4 and said["plan"]["duration_s"] <= 90
+    assert main(["plan", str(written), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["duration_s"] == pytest.approx(said["plan"]["duration_s"])
+    assert main([*words, "--write", str(written)]) == 2
+    assert "configuration_not_written" in capsys.readouterr().err
+
+
+def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    written = tmp_path / "hand.yaml"
+    words = ["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=1.2e-3", "--write", str(written)]
+    assert main(words) == 0
+    section = load(written, (), sections(installed()), turners.sections()).config.procedure
+    assert section.wanted_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # type: ignore[attr-defined]
+    assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=9e-4"]) == 1
+    assert "recordings of real hands" in " ".join(capsys.readouterr().out.split())
+    assert main(["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=often"]) == 2
