@@ -65,7 +65,7 @@ def swept(folder: Path, recording: str) -> int:
 @pytest.mark.thorough
 @pytest.mark.timeout(5400)
 def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
-    """The difference of both is within the U of both, as often as U says. One run of three stages is in test_stages.py."""
+    """The difference of both is within the U of both, as often as U says. One run is in test_stages.py."""
     apart: dict[int, list[float]] = {}
     for seed in SEEDS:
         rng, found = np.random.default_rng(FIRST_SEED + seed), []
