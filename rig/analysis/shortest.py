@@ -89,23 +89,25 @@ class Shortest:
     """The shortest run for what is wanted.
 
     `before` is the file's own procedure, None where it tells nothing; `nearest` what comes nearest where none does, and
-    `at_any_length` the least U that an endless run has. `directions` (N, 3) are those of the sweeps, None by hand.
+    `endless` the budgets of the endless runs that know the scale best, and the bias. `cannot_be_had`: no run of this
+    kind has what is wanted, however long. `directions` (N, 3) are those of the sweeps, None by hand.
     """
 
     wanted: Wanted
     before: Planned | None
     best: Planned | None
     nearest: Planned | None
-    at_any_length: Reached
-    endless: Budgets
+    endless: tuple[Budgets, Budgets]
+    cannot_be_had: bool
     tried: int
     among: int
     directions: Array | None
 
     @property
-    def cannot_be_had(self) -> bool:
-        """Whether no run of this kind has it, however long."""
-        return not self.wanted.met_by(self.at_any_length)
+    def at_any_length(self) -> Reached:
+        """The least U of scale and the least U of bias that endless runs have, which may be different runs."""
+        of_scale, of_bias = (Reached.by(each) for each in self.endless)
+        return Reached(of_scale.scale, of_bias.bias_rad_s)
 
 
 def shortest(

@@ -60,7 +60,6 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     candidates = what.candidates()
     floors = {each.family: floor for each in _once(candidates) if (floor := what.endless(each)) is not None}
     least = min(floors, key=lambda family: wanted.share(Reached.by(floors[family])))
-    endless = floors[least]
     able = {family for family, floor in floors.items() if wanted.met_by(Reached.by(floor))}
     found = shortest([each for each in candidates if each.family in able], what.predict, wanted)
     if not able:
@@ -75,8 +74,11 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
         None if own is None else Planned(replace(before, duration_s=_duration_s(config)), own),
         best,
         found.nearest,
-        Reached.by(endless),
-        endless,
+        (
+            min(floors.values(), key=lambda each: Reached.by(each).scale),
+            min(floors.values(), key=lambda each: Reached.by(each).bias_rad_s),
+        ),
+        not able,
         found.tried + fine.tried,
         len(candidates),
         None if shown is None else what.directions(shown.candidate.procedure),

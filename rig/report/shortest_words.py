@@ -160,8 +160,10 @@ def _floor(found: Shortest) -> str:
         (least.scale, "", "the scale factors", 1),
         (least.bias_rad_s, " rad/s", "the biases", 2),
     ):
-        largest = [max(lines, key=lambda line: line[place])[0] for lines in _shares(found.endless).values() if lines]
-        parts.append(f"U = {size:.2g}{unit} of {what}" + (f" ({', '.join(sorted(set(largest)))})" if size > 0 else ""))
+        lines = [each for each in _shares(found.endless[place - 1]).values() if each]
+        largest = sorted({max(each, key=lambda line: line[place])[0] for each in lines})
+        if size > 0:
+            parts.append(f"U = {size:.2g}{unit} of {what} ({', '.join(largest)})")
     return f"However long it is, no run of this kind gets below {' and '.join(parts)}."
 
 
