@@ -51,7 +51,8 @@ class OfSensor:
     """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
 
     `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
-    rest; `polynomials` are there where it was calibrated over temperature; `of_kinds` is what solvers of installed kinds of sensors found.
+    rest; `of_kinds` is what solvers of installed kinds of sensors found; `polynomials` are there of a calibration over
+    temperature.
     """
 
     item: Item
@@ -72,7 +73,11 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     """
     if read.tells == "turns":
         return _by_hand(read, estimator)
-    found = _by_sweeps(read, estimator, settings.reference_c) if read.tells == "sweeps" else _by_attitudes(read, settings, estimator)
+    found = (
+        _by_sweeps(read, estimator, settings.reference_c)
+        if read.tells == "sweeps"
+        else _by_attitudes(read, settings, estimator)
+    )
     if found.gyroscope is None and not found.at_rest and not found.of_kinds:
         raise _nothing_solved(found.unsolved)
     return found

@@ -155,7 +155,9 @@ def _accelerations(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
     parts = [each.sensors[name] for each in recordings]
-    placed = [(dwell, since) for part, since in zip(parts, since_first_s(recordings), strict=True) for dwell in part.dwells]
+    placed = [
+        (dwell, since) for part, since in zip(parts, since_first_s(recordings), strict=True) for dwell in part.dwells
+    ]
     dwells = [dwell for dwell, _ in placed]
     attitudes = np.array([dwell.attitude for dwell in dwells])
     felt = -(attitudes @ surroundings.site.down_m_s2)

@@ -5,10 +5,10 @@ offset of its own for each place of the plan; only what changes from repeat to r
 
     m = offset(place) + (1/(1 + q(T)) − 1) F x + c(T) + hysteresis + lag · dT/dt · ∂m/∂T + noise and a wandering bias
 
-q and c are polynomials in T − reference without a constant. Their orders, one of all axes' q and one of all axes' c, are
-those of the least AICc (Hurvich and Tsai, Biometrika 76 (1989) 297); what the other orders say, each with its Akaike
-weight (Burnham and Anderson, Model Selection, 2002, 4.3), is a line of the uncertainty. Warming and cooling are told
-apart by a loop that is closed at both ends of the range. A thermometer's lag is found together with the rest.
+q and c are polynomials in T − reference without a constant. Their orders, one of all axes' q and one of all axes' c,
+are those of the least AICc (Hurvich and Tsai, Biometrika 76 (1989) 297); what the other orders say, each with its
+Akaike weight (Burnham and Anderson, Model Selection, 2002, 4.3), is a line of the uncertainty. Warming and cooling are
+told apart by a loop that is closed at both ends of the range. A thermometer's lag is found together with the rest.
 """
 
 from collections.abc import Iterator
@@ -81,8 +81,8 @@ class OverTemperature:
     """k(T) and c(T) = Σ coefficient (T − reference)ⁿ, n from 0: `scale` and `bias` (4, 3), SI units per Kⁿ.
 
     c is what a reading adds. `orders` are those of k and of c; `range_c` is where both hold, and nowhere else.
-    `lag_s` and `lag_std_s` are the thermometer's, `hysteresis` (6,) how far a warming sensor is from the mean of warming
-    and cooling in the middle of the range, and its standard deviation; None where it did not go both ways.
+    `lag_s` and `lag_std_s` are the thermometer's, `hysteresis` (6,) how far a warming sensor is from the mean of both
+    ways in the middle of the range, and its standard deviation; None where it did not go both ways.
     `centre` (2, 3, 3) are the mean powers (orders 1 to 3, by axis) at which k and c are uncorrelated with their mean.
     """
 
@@ -142,7 +142,7 @@ def powers_at(difference_k: float) -> Array:
 
 
 def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> OverTemperature:
-    """The polynomials, k at the reference as far as plain least squares tell it: `settled` takes in what is known better.
+    """The polynomials, with k at the reference by plain least squares: `settled` takes in what is known better.
 
     `gradient_k` is by how much thermometer and sensor may differ in use otherwise than here (half a width).
     Raises Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`, `not_finite`.
@@ -164,7 +164,9 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
     centre = fits.centre(chosen)
     weights = {orders: float(np.exp((chosen.aicc - each.aicc) / 2)) for orders, each in tried.items()}
     total = sum(weights.values())
-    apart = [(weights[o] / total, _from_centre(each, centre) - _from_centre(chosen, centre)) for o, each in tried.items()]
+    apart = [
+        (weights[o] / total, _from_centre(each, centre) - _from_centre(chosen, centre)) for o, each in tried.items()
+    ]
     known, loop = chosen.known_lag, chosen.loop
     scale = np.concatenate([np.ones((1, 3)), chosen.relative]) * fits.scale
     bias = np.concatenate([_constant(chosen.bias, centre[1])[None], chosen.bias])
@@ -230,7 +232,7 @@ def heating(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """Changes in T − reference: of k as a share (3 orders, 3), of c (3, 3); covariances (18, 18), with and without lag."""
+    """Changes in T − reference: of k as a share (3 orders, 3), of c; covariances (18, 18), with and without lag."""
 
     relative: Array
     bias: Array
@@ -295,7 +297,9 @@ class _Fits:
         found = np.zeros(3 * each + 1)  # by axis, then the lag
         for _ in range(STEPS):
             rows, rests = zip(*(self._rows(axis, orders, found) for axis in range(3)), strict=True)
-            design = np.vstack([np.pad(row[:, :-1], ((0, 0), (axis * each, (2 - axis) * each))) for axis, row in enumerate(rows)])
+            design = np.vstack(
+                [np.pad(row[:, :-1], ((0, 0), (axis * each, (2 - axis) * each))) for axis, row in enumerate(rows)]
+            )
             design = np.column_stack([design, np.concatenate([row[:, -1] for row in rows])])
             prior = np.zeros((1, len(found)))
             prior[0, -1] = 1 / LAG_STD_S
@@ -393,7 +397,7 @@ def _from_centre(fit: _Fit, centre: Array) -> Array:
 
 
 def _of_loop(size: Array, std: Array) -> Array:
-    """(24, 24) of values that may lie anywhere between warming and cooling: as far as the loop is more than its noise."""
+    """(24, 24) of values that may lie anywhere in the loop, as far as that is more than its noise."""
     found = np.zeros(COEFFICIENTS)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     found[:3], found[COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3] = half[:3], half[3:]
@@ -427,7 +431,7 @@ def _repeated_often(seen: Repeated) -> Repeated:
     if turned < 3:
         raise Fault(
             "too_few_observations",
-            f"sweeps or attitudes that tell three axes were repeated less than {FEWEST} times while the temperature moved",
+            f"what tells three axes was repeated less than {FEWEST} times while the temperature moved",
             "Repeat the same sweeps, rests and attitudes at several temperatures",
         )
     again = np.searchsorted(often, seen.places[kept])
@@ -440,6 +444,7 @@ def _repeated_often(seen: Repeated) -> Repeated:
 
 def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> Array:
     """(N,) numbers of places: what was felt (N, 3), and what else stood there (N, q), as good as equal in each."""
+
     def scaled(columns: Array) -> Iterator[Array]:
         size = float(np.abs(columns).max(initial=0.0))
         yield columns / size if size > 0 else columns

@@ -2,8 +2,9 @@
 
 `time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (what an
 accelerometer feels: at rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` may
-stand there too, as `rig export` writes it: calibrations over temperature depend on it, nothing else does. Columns may stand in any order; the first row holds
-their names. One recording serves every command: each uses the quantities it knows what to do with.
+stand there too, as `rig export` writes it: a calibration over temperature needs it, nothing else does. Columns may
+stand in any order; the first row holds their names. One recording serves every command: each uses the quantities it
+knows what to do with.
 """
 
 from collections.abc import Mapping, Sequence

@@ -45,7 +45,10 @@ class Files:
 def recorded_in_files(
     files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False, reference_c: float | None = None
 ) -> RunData:
-    """The recording, of a calibration over temperature where there is a reference. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`."""
+    """The recording; with a reference that of a calibration over temperature.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
+    """
     told = files.columns
     needed = () if files.tells == "attitudes" else [RATE]
     samples = read_samples(files.readings, needed, _mapped(told.samples, told.samples_skip_lines))
@@ -55,7 +58,7 @@ def recorded_in_files(
         for i, name in enumerate(quantity.columns)
     }
     if reference_c is not None and samples.temperature_c is not None:
-        columns |= {name: samples.temperature_c for name in TEMPERATURE.columns}
+        columns |= dict.fromkeys(TEMPERATURE.columns, samples.temperature_c)
     began = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     read_elsewhere = ReadElsewhere(files.item, columns, files.tells, _motion(files))
     return RunData(

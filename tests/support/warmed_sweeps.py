@@ -1,11 +1,17 @@
 """Sweeps and rests of a drawn gyroscope that warms and cools, as files and as observations."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from rig.analysis.elsewhere import budget_of, solve_swept
+from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference
 from rig.estimation.arrays import Array
-from rig.estimation.over_temperature import Repeated
+from rig.estimation.over_temperature import Line, OverTemperature, Repeated, settled
+from rig.observation.average import Average
+from rig.observation.csv_import import ExternalData
+from rig.observation.observe import Observation, nearest_axis
 
 REFERENCE_C = 25.0
 FROM_C, TO_C = 20.0, 60.0
@@ -53,9 +59,8 @@ def drawn(
     """A gyroscope with slopes and curvatures at the size of a data sheet's."""
     first = rng.uniform(1.1, 1.2, 3)
     scale = np.array([first, first * rng.uniform(-1, 1, 3) * DATA_SHEET_SCALE_K, first * rng.uniform(-1, 1, 3) * 3e-6])
-    bias = np.array([
-        rng.normal(0, 0.01, 3), rng.uniform(-1, 1, 3) * DATA_SHEET_BIAS_K, rng.uniform(-1, 1, 3) * DATA_SHEET_BIAS_K / 80
-    ])  # fmt: skip
+    ways = rng.uniform(-1, 1, (2, 3))
+    bias = np.array([rng.normal(0, 0.01, 3), ways[0] * DATA_SHEET_BIAS_K, ways[1] * DATA_SHEET_BIAS_K / 80])
     return Drawn(
         scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
         gradient_k * rng.uniform(-1, 1), rng.normal(0, 3e-4, PLACES.shape), noise, walk,
@@ -92,7 +97,9 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
     powers = np.vander(warm, 3, increasing=True)
     within = (of.temperature_c - FROM_C) / (TO_C - FROM_C)
     loop = np.outer(np.sign(of.warming_k_s) * 4 * within * (1 - within), sensor.hysteresis)
-    wandered = np.cumsum(rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0)
+    wandered = np.cumsum(
+        rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
+    )
     white = rng.normal(0, 1, of.felt.shape) * sensor.noise
     return (
         of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
@@ -103,3 +110,58 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
 def repeated(means: Array, of: Session, noise: float) -> Repeated:
     """What the estimator takes."""
     return Repeated(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
+
+
+def write_files(
+    sensor: Drawn, of: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
+) -> tuple[Path, Path]:
+    """Samples with a column of temperature, and the sweeps, as `rig solve --sweeps` takes them."""
+    means, rows = readings(sensor, of, rng), []
+    for mean, (start_s, end_s), warm in zip(means, of.windows_s, of.temperature_c, strict=True):
+        times = np.arange(start_s + 0.5 / rate_hz, end_s, 1 / rate_hz)
+        noise = rng.normal(0, sensor.noise * np.sqrt(len(times)), (len(times), 3))
+        rows.append(np.column_stack([times, mean + noise - noise.mean(axis=0), np.full(len(times), warm)]))
+    samples, sweeps = folder / "samples.csv", folder / "sweeps.csv"
+    header = "time_s,x_rad_s,y_rad_s,z_rad_s,temperature_c"
+    np.savetxt(samples, np.vstack(rows), fmt="%.10g", delimiter=",", header=header, comments="")
+    speeds = np.linalg.norm(of.felt, axis=1)
+    axes = np.where(speeds[:, None] > 0, of.felt / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
+    header = "start_s,end_s,axis_x,axis_y,axis_z,speed_rad_s"
+    table = np.column_stack([of.windows_s, axes, speeds])
+    np.savetxt(sweeps, table, fmt="%.12g", delimiter=",", header=header, comments="")
+    return samples, sweeps
+
+
+def external(means: Array, of: Session, noise: float) -> ExternalData:
+    """The same as `averaged` makes of files."""
+    averages = [
+        Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, freedom=np.full(3, 99.0))
+        for mean, (start_s, end_s), warm in zip(means, of.windows_s.tolist(), of.temperature_c.tolist(), strict=True)
+    ]
+    sweeps = [
+        Observation(
+            row, None, None, *nearest_axis(felt), felt / np.linalg.norm(felt), float(np.linalg.norm(felt)), 0.0, 0, each
+        )
+        for row, (felt, each) in enumerate(zip(of.felt, averages, strict=True), start=1)
+        if felt.any()
+    ]
+    rests = [each for felt, each in zip(of.felt, averages, strict=True) if not felt.any()]
+    return ExternalData(tuple(sweeps), tuple(rests))
+
+
+def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
+    """Polynomials with all of the uncertainty that sweeps of files have."""
+    moved, found = files_to_reference(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
+    solution = solve_swept(moved, "vector")
+    lines = tuple(
+        Line(
+            each.name,
+            each.kind,
+            each.distribution,
+            each.source,
+            each.freedom,
+            OTHER_SIGN @ each.covariance @ OTHER_SIGN,
+        )
+        for each in budget_of(solution, moved).contributors
+    )
+    return settled(found, np.r_[solution.scale, -solution.bias_rad_s], lines)

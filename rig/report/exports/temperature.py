@@ -31,7 +31,8 @@ def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c:
         change = _change(drift, name, "acceleration", each.temperature_c, temperature_c)
         moved = _vector(np.array(each.bias_m_s2) + change)
         accelerometers[name] = each.model_copy(update={"bias_m_s2": moved, "temperature_c": temperature_c})
-    return result.model_copy(update={"sensors": sensors, "accelerometers": accelerometers})
+    moved = {"sensors": sensors, "accelerometers": accelerometers, "over_temperature": {}}  # about another temperature
+    return result.model_copy(update=moved)
 
 
 def _change(

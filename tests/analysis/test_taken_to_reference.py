@@ -1,0 +1,73 @@
+"""A recording of an arm whose sensor warms and cools: solved at the reference temperature, and over it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.analyses import calibrated
+from rig.analysis.outcome import Outcome
+from rig.data.quantity import RATE
+from rig.data.run_file import RunData
+from rig.data.settings import settings_from_json
+from rig.report.document import document_of
+from support.synthetic_run import BIAS_RAD_S, SENSITIVITY, Motion, Setup, readings, run_data, sample_times, true_rate
+
+REFERENCE_C = 25.0
+SETUP = Setup(repeats=6, noise_rad_s=0.002, mounting_error_rad=(0.0, 0.0, 0.0))
+SLOPE, SHARE = np.array([4e-4, -3e-4, 1e-4]), np.array([2e-4, -1e-4, 3e-4])  # rad/s/K, of a reading; 1/K of k
+
+
+@pytest.fixture(scope="module")
+def warmed() -> RunData:
+    """From 20 to 50 °C and back, by a thermometer in steps of 1/16 °C."""
+    rng = np.random.default_rng(11)
+    motion = Motion(SETUP, rng)
+    board_s, time_s = sample_times(SETUP, motion)
+    done = (time_s - time_s[0]) / np.ptp(time_s)
+    warm = 20 + 30 * (1 - np.abs(1 - 2 * done)) - REFERENCE_C
+    plain = SENSITIVITY * readings(SETUP, true_rate(motion, time_s), rng) + BIAS_RAD_S
+    moved = plain / (1 + np.outer(warm, SHARE)) - BIAS_RAD_S + np.outer(warm, SLOPE)
+    run = run_data(SETUP, motion, board_s, np.round(moved / SENSITIVITY))
+    run.samples["gyro"]["temperature_counts"] = np.round(16 * warm)
+    return replace(run, settings=replace(run.settings, reference_c=REFERENCE_C))
+
+
+@pytest.fixture(scope="module")
+def outcome(warmed: RunData) -> Outcome:
+    return calibrated([warmed])
+
+
+def test_the_calibration_is_that_of_the_reference_temperature(outcome: Outcome) -> None:
+    result, budget = outcome.results["gyro"], outcome.results["gyro"].uncertainty
+    assert budget is not None
+    off = np.r_[result.scale - SETUP.scale, result.bias_rad_s - SETUP.bias_rad_s]
+
+    assert result.temperature_c == REFERENCE_C
+    assert (np.abs(off) < 1.5 * budget.expanded).all()
+    assert [check.name for check in outcome.checks if not check.passed] == []
+
+
+def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
+    found = outcome.polynomials["gyro"][RATE]
+    stds = np.sqrt(np.diag(found.covariance))
+
+    assert (np.abs(found.bias[1] - SLOPE) < 4 * stds[15:18]).all()
+    assert (np.abs(found.scale[1] - SHARE * SETUP.scale) < 4 * stds[3:6]).all()
+    assert found.hysteresis is not None and found.orders == (1, 1)
+    assert np.allclose(
+        found.at(REFERENCE_C).values, np.r_[outcome.results["gyro"].scale, -outcome.results["gyro"].bias_rad_s]
+    )
+
+
+def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
+    budget = outcome.results["gyro"].uncertainty
+    assert budget is not None
+    entry = document_of(outcome).over_temperature["gyro"]["rate"]
+
+    assert np.allclose(outcome.polynomials["gyro"][RATE].at(REFERENCE_C).std, budget.std, rtol=1e-6)
+    assert {line.name for line in entry.contributors} > {"noise", "controller clock", "thermometer beside the sensor"}
+
+
+def test_the_settings_keep_the_reference(warmed: RunData) -> None:
+    assert settings_from_json(warmed.settings.to_json()).reference_c == REFERENCE_C
