@@ -21,7 +21,6 @@ from rig.estimation.over_temperature import (
     Line,
     OverTemperature,
     Repeated,
-    at_reference,
     over_temperature,
     places_of,
     powers_at,
@@ -66,11 +65,11 @@ def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings,
         if not recordings[0].run.sensors[name].measures(TEMPERATURE):
             raise NOT_RECORDED
         found[name] = {}
-        if settings.planned_sweeps:
-            moved, found[name][RATE] = _rates(moved, name, surroundings, reference_c)
         if settings.planned_dwells and recordings[0].run.sensors[name].measures(ACCELERATION):
             moved, found[name][ACCELERATION] = _accelerations(moved, name, surroundings, reference_c)
-    return AtReference(tuple(moved), found)
+        if settings.planned_sweeps:  # last, for the sweeps' temperatures are the reference's afterwards
+            moved, found[name][RATE] = _rates(moved, name, surroundings, reference_c)
+    return AtReference(tuple(replace(each, polynomials=found) for each in moved), found)
 
 
 def files_to_reference(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:
@@ -89,7 +88,7 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
         raise NOT_RECORDED
     seen = replace(seen, places=places_of(seen.felt, np.zeros((len(averages), 0))))
     found = over_temperature(seen, reference_c, ASSUMED_GRADIENT_K)
-    means = at_reference(found, seen.means, seen.felt, seen.temperature_c)
+    means = found.at_reference(seen.means, seen.temperature_c)
     moved = [_average(each, mean, reference_c) for each, mean in zip(averages, means, strict=True)]
     sweeps = tuple(replace(each, average=average) for each, average in zip(data.sweeps, moved, strict=False))
     return ExternalData(sweeps, tuple(moved[len(sweeps) :])), found
@@ -143,7 +142,7 @@ def _rates(
         instability=0.0 if known.sensor is None else known.sensor.instability_rad_s,
     )
     found = over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
-    moved = iter(at_reference(found, seen.means, seen.felt, temperature_c))
+    moved = iter(found.at_reference(seen.means, temperature_c))
     turns = [[_turn(turn, next(moved), reference_c) for turn in part.revolutions] for part in parts]
     rests = [[_average(rest, next(moved), reference_c) for rest in part.rests] for part in parts]
     return _replaced(recordings, name, [
@@ -171,10 +170,11 @@ def _accelerations(
         temperature_c=temperature_c,
     )
     found = over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
-    moved = iter(at_reference(found, seen.means, felt, temperature_c))
+    moved = iter(found.at_reference(seen.means, temperature_c))
     stood = [tuple(_dwell(dwell, next(moved), reference_c) for dwell in part.dwells) for part in parts]
+    turns = [tuple(_waved(turn, turn.average.temperature_c, found) for turn in part.revolutions) for part in parts]
     return _replaced(recordings, name, [
-        replace(part, dwells=of) for part, of in zip(parts, stood, strict=True)
+        replace(part, dwells=at, revolutions=of) for part, at, of in zip(parts, stood, turns, strict=True)
     ]), found  # fmt: skip
 
 
@@ -191,6 +191,17 @@ def _average(average: Average, mean_rad_s: Array, reference_c: float) -> Average
 
 def _turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> Observation:
     return replace(turn, average=_average(turn.average, mean_rad_s, reference_c))
+
+
+def _waved(turn: Observation, warmed_c: float, found: OverTemperature) -> Observation:
+    """A turn with the mean and the wave of what its accelerometer read, at the reference temperature."""
+    if turn.acceleration is None:
+        return turn
+    wave = turn.acceleration.harmonic
+    warm = np.array([warmed_c])
+    mean, share = found.at_reference(wave.harmonic_m_s2[:1], warm), found.changes(warm)[0]
+    harmonic = np.vstack([mean, share * wave.harmonic_m_s2[1:]])
+    return replace(turn, acceleration=replace(turn.acceleration, harmonic=replace(wave, harmonic_m_s2=harmonic)))
 
 
 def _dwell(dwell: DwellReading, mean: Array, reference_c: float) -> DwellReading:

@@ -83,6 +83,7 @@ class OverTemperature:
     c is what a reading adds. `orders` are those of k and of c; `range_c` is where both hold, and nowhere else.
     `lag_s` and `lag_std_s` are the thermometer's, `hysteresis` (6,) how far a warming sensor is from the mean of both
     ways in the middle of the range, and its standard deviation; None where it did not go both ways.
+    `zero` (3,) is what the axes read at the reference where nothing is felt.
     `centre` (2, 3, 3) are the mean powers (orders 1 to 3, by axis) at which k and c are uncorrelated with their mean.
     """
 
@@ -93,6 +94,7 @@ class OverTemperature:
     bias: Array
     lines: tuple[Line, ...]
     centre: Array
+    zero: Array
     lag_s: float
     lag_std_s: float
     hysteresis: tuple[Array, Array] | None
@@ -118,6 +120,12 @@ class OverTemperature:
         std = np.sqrt(variances.sum(axis=0).clip(min=0.0))
         freedom = effective_freedom(variances, np.array([[line.freedom] for line in self.lines]))
         return Held(rows @ self.coefficients, std, coverage_factors(freedom) * std)
+
+    def at_reference(self, readings: Array, temperature_c: Array) -> Array:
+        """Readings (N, 3) taken from their temperatures (N,) to the reference."""
+        relative, added = self.changes(temperature_c)
+        moved: Array = relative * (readings - added - self.zero) + self.zero
+        return moved
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
         """(N, 3) k over k at the reference, and (N, 3) what c is more than there."""
@@ -158,6 +166,7 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
     check_inside(range_c, reference_c)
     seen = _repeated_often(seen)
     fits = _Fits(seen, reference_c, range_c)
+    fits.refer(seen, fits.solve((fits.highest, fits.highest)))
     tried = {orders: fits.solve(orders) for orders in product(range(fits.highest + 1), repeat=2)}
     best = min(tried, key=lambda orders: tried[orders].aicc)
     chosen = tried[best]
@@ -181,7 +190,7 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
         lines.append(Line(HYSTERESIS, "A", "rectangular", "half of what warming and cooling differ by", np.inf,
                           fits.in_units(_of_loop(*loop))))  # fmt: skip
     found = OverTemperature(
-        reference_c, range_c, best, scale, bias, tuple(lines), centre, chosen.lag_s, chosen.lag_std_s,
+        reference_c, range_c, best, scale, bias, tuple(lines), centre, fits.zero, chosen.lag_s, chosen.lag_std_s,
         None if loop is None else (loop[0] * fits.in_scale, loop[1] * fits.in_scale), fits.process, fits.repeats,
     )  # fmt: skip
     return replace(found, lines=(*lines, _gradient(found, gradient_k)))
@@ -204,14 +213,6 @@ def settled(found: OverTemperature, values: Array, lines: tuple[Line, ...]) -> O
         return replace(line, covariance=covariance)
 
     return replace(found, scale=scale, bias=bias, lines=(*kept, *map(whole, lines)))
-
-
-def at_reference(found: OverTemperature, means: Array, felt: Array, temperature_c: Array) -> Array:
-    """Readings (N, 3) of what was felt (N, 3), taken from their temperatures (N,) to the reference."""
-    relative, added = found.changes(temperature_c)
-    matrix = _plain_matrix(means, felt)
-    moved: Array = means - added + (1 - 1 / relative) * (felt @ matrix.T)
-    return moved
 
 
 def heating(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
@@ -259,17 +260,27 @@ class _Fits:
         within = (seen.temperature_c - range_c[0]) / (range_c[1] - range_c[0])
         self.both_ways = min(np.mean(way > 0), np.mean(way < 0)) >= EACH_WAY
         self.loop = (way * 4 * within * (1 - within))[:, None]
-        matrix = _plain_matrix(seen.means, seen.felt)
-        self.scale: Array = 1 / np.linalg.norm(matrix, axis=1)
-        self.felt: Array = seen.felt @ matrix.T  # of each axis, as it reads
-        self.in_scale = np.concatenate([self.scale, np.ones(3)])
-        self.left = seen.means - self.felt
+        self._take(seen, seen.means)
         self.process = self._process(seen, places)
         weights = 1 / np.median(seen.variances, axis=1)
         self.weights = np.array([self.felt.T**2 * weights, np.tile(weights, (3, 1))])  # (2, 3, N)
         wander = self.process.covariance(seen.windows_s)
         self.whitening = [self._without(places, np.diag(seen.variances[:, axis]) + wander) for axis in range(3)]
         self.count = 3 * (len(seen.means) - places.shape[1])
+
+    def refer(self, seen: Repeated, fit: "_Fit") -> None:
+        """Let what is felt be as the sensor reads it at the reference, not in the mean of all temperatures."""
+        powers = self.powers[:, 1:] * self.span ** np.arange(1.0, HIGHEST + 1)
+        self._take(seen, seen.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.felt)
+
+    def _take(self, seen: Repeated, means: Array) -> None:
+        design = np.column_stack([seen.felt, np.ones(len(means))])
+        solved, *_ = np.linalg.lstsq(design, means)
+        self.scale: Array = 1 / np.linalg.norm(solved[:3], axis=0)
+        self.zero: Array = solved[3]
+        self.felt: Array = seen.felt @ solved[:3]  # of each axis, as it reads
+        self.in_scale = np.concatenate([self.scale, np.ones(3)])
+        self.left = seen.means - self.felt
 
     @staticmethod
     def _without(places: Array, covariance: Array) -> Array:
@@ -361,12 +372,12 @@ class _Fits:
         return found
 
     def spread(self, covariance: Array, centre: Array) -> Array:
-        """(24, 24) of the coefficients, from (18, 18) of the changes."""
+        """Covariance (24, 24) of the coefficients, from that (18, 18) of the changes."""
         take = np.vstack([_part(centre, 0), _part(centre, 1)])
         return self.in_units(take @ covariance @ take.T)
 
     def in_units(self, covariance: Array) -> Array:
-        """The same with k in its own size, not as a share."""
+        """Covariance (24, 24) with k in its own size, not as a share."""
         size = np.concatenate([np.tile(self.scale, HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
         found: Array = np.outer(size, size) * covariance
         return found
@@ -397,7 +408,7 @@ def _from_centre(fit: _Fit, centre: Array) -> Array:
 
 
 def _of_loop(size: Array, std: Array) -> Array:
-    """(24, 24) of values that may lie anywhere in the loop, as far as that is more than its noise."""
+    """Covariance (24, 24) of values that may lie anywhere in the loop, as far as that is more than its noise."""
     found = np.zeros(COEFFICIENTS)
     half = np.maximum(size**2 - std**2, 0.0) / 3
     found[:3], found[COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3] = half[:3], half[3:]
@@ -412,14 +423,6 @@ def _gradient(found: OverTemperature, half_width_k: float) -> Line:
     pattern = half_width_k / np.sqrt(3) * moved.ravel()
     source = f"± {half_width_k:g} K otherwise than here"
     return Line(GRADIENT, "B", "rectangular", source, np.inf, np.outer(pattern, pattern))
-
-
-def _plain_matrix(means: Array, felt: Array) -> Array:
-    """(3, 3) F of m = F x + c by least squares, good to a few per cent, as only changes of it are looked at."""
-    design = np.column_stack([felt, np.ones(len(felt))])
-    solved, *_ = np.linalg.lstsq(design, means)
-    matrix: Array = solved[:3].T
-    return matrix
 
 
 def _repeated_often(seen: Repeated) -> Repeated:

@@ -120,6 +120,7 @@ def _subtracting(
 
 
 def c_rows(matrix: Iterable[Iterable[float]]) -> str:
+    """The rows of a matrix as C has them."""
     return "{" + ", ".join(_array(row) for row in matrix) + "}"
 
 

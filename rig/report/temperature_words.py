@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from rig.data.quantity import Quantity
-from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry
+from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureLineEntry
+from rig.estimation.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
 from rig.report.rounding import plus_minus
 
 EACH = 4  # of the table's rows are shown
@@ -12,6 +13,11 @@ EACH = 4  # of the table's rows are shown
 def shown_rows(found: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
     """Both ends of the range, its middle, and what is half-way between."""
     return found.table[::EACH]
+
+
+def own_contributors(found: OverTemperatureEntry) -> Sequence[TemperatureLineEntry]:
+    """What is uncertain about the polynomials alone, not about the calibration at the reference."""
+    return [line for line in found.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 
 
 def about_lines(found: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
