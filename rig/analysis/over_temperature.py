@@ -76,17 +76,17 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
     """Sweeps and rests of files at the reference temperature. Raises Fault as `taken_to_reference` does."""
     averages = [*(each.average for each in data.sweeps), *data.rests]
     turned = [each.speed_rad_s * each.axis_flange for each in data.sweeps]
+    felt = np.array([*turned, *np.zeros((len(data.rests), 3))])
     seen = Repeated(
         means=np.array([each.mean_rad_s for each in averages]),
         variances=np.array([each.variance_rad2_s2 for each in averages]),
-        felt=np.array([*turned, *np.zeros((len(data.rests), 3))]),
-        places=np.zeros(len(averages)),
+        felt=felt,
+        places=places_of(felt, np.zeros((len(felt), 0))),
         windows_s=np.array([(each.start_s, each.end_s) for each in averages]),
         temperature_c=np.array([each.temperature_c for each in averages]),
     )
     if np.isnan(seen.temperature_c).any():
         raise NOT_RECORDED
-    seen = replace(seen, places=places_of(seen.felt, np.zeros((len(averages), 0))))
     found = over_temperature(seen, reference_c, ASSUMED_GRADIENT_K)
     means = found.at_reference(seen.means, seen.temperature_c)
     moved = [_average(each, mean, reference_c) for each, mean in zip(averages, means, strict=True)]

@@ -18,6 +18,7 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -49,7 +50,7 @@ class Repeated:
     means: Array
     variances: Array
     felt: Array
-    places: Array
+    places: NDArray[np.intp]
     windows_s: Array
     temperature_c: Array
     instability: float = 0.0
@@ -146,7 +147,8 @@ def check_inside(range_c: tuple[float, float], temperature_c: float) -> None:
 
 def powers_at(difference_k: float) -> Array:
     """(6, 24) what takes the coefficients to k and c, so far from the reference."""
-    return np.kron(np.eye(2), np.kron(difference_k ** np.arange(HIGHEST + 1), np.eye(3)))
+    rows = np.kron(np.eye(2), np.kron(difference_k ** np.arange(HIGHEST + 1), np.eye(3)))
+    return np.asarray(rows, dtype=np.float64)
 
 
 def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> OverTemperature:
@@ -167,7 +169,8 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
     seen = _repeated_often(seen)
     fits = _Fits(seen, reference_c, range_c)
     fits.refer(seen, fits.solve((fits.highest, fits.highest)))
-    tried = {orders: fits.solve(orders) for orders in product(range(fits.highest + 1), repeat=2)}
+    each = range(fits.highest + 1)
+    tried = {orders: fits.solve(orders) for orders in product(each, each)}
     best = min(tried, key=lambda orders: tried[orders].aicc)
     chosen = tried[best]
     centre = fits.centre(chosen)
@@ -250,7 +253,7 @@ class _Fits:
 
     def __init__(self, seen: Repeated, reference_c: float, range_c: tuple[float, float]) -> None:
         self.span = max(abs(each - reference_c) for each in range_c)
-        places = np.eye(int(seen.places.max()) + 1)[seen.places.astype(int)]
+        places = np.eye(int(seen.places.max()) + 1)[seen.places]
         self.repeats = int(places.sum(axis=0).min())
         self.highest = min(HIGHEST, self.repeats - 2)
         self.powers = np.vander((seen.temperature_c - reference_c) / self.span, HIGHEST + 1, increasing=True)
@@ -317,8 +320,8 @@ class _Fits:
             known = np.concatenate([*rests, -prior @ found])
             step, *_ = np.linalg.lstsq(np.vstack([design, prior]), known)
             found = found + step
-        rests = [self._rows(axis, orders, found)[1] for axis in range(3)]
-        square = float(sum(rest @ rest for rest in rests) + (found[-1] / LAG_STD_S) ** 2)
+        left = [self._rows(axis, orders, found)[1] for axis in range(3)]
+        square = float(sum(rest @ rest for rest in left) + (found[-1] / LAG_STD_S) ** 2)
         spread = np.linalg.inv(design.T @ design + prior.T @ prior)
         fixed = np.zeros_like(spread)
         if len(found) > 1:
@@ -362,8 +365,9 @@ class _Fits:
         if self.both_ways:  # a share of the reading is one of k with the other sign
             stds = np.sqrt(np.diag(spread))[:-1].reshape(3, each)[:, -2:]
             loop = (own[:, -2:] * [-1.0, 1.0]).T.ravel(), stds.T.ravel()
-        covariances = [take @ each_way @ take.T for each_way in (spread, fixed)]
-        return _Fit(relative, bias, *covariances, aicc, float(found[-1]), float(np.sqrt(spread[-1, -1])), loop)
+        lag_std_s = float(np.sqrt(spread[-1, -1]))
+        covariance, known_lag = take @ spread @ take.T, take @ fixed @ take.T
+        return _Fit(relative, bias, covariance, known_lag, aicc, float(found[-1]), lag_std_s, loop)
 
     def centre(self, fit: _Fit) -> Array:
         """(2, 3, 3) mean powers of T − reference, weighted as they tell k and c."""
@@ -445,7 +449,7 @@ def _repeated_often(seen: Repeated) -> Repeated:
     )  # fmt: skip
 
 
-def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> Array:
+def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> NDArray[np.intp]:
     """(N,) numbers of places: what was felt (N, 3), and what else stood there (N, q), as good as equal in each."""
 
     def scaled(columns: Array) -> Iterator[Array]:
@@ -453,7 +457,7 @@ def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> Array:
         yield columns / size if size > 0 else columns
 
     rows = np.column_stack([*scaled(felt), *scaled(beside)])
-    found, seen = np.empty(len(rows), dtype=int), list[Array]()
+    found, seen = np.empty(len(rows), dtype=np.intp), list[Array]()
     for i, row in enumerate(rows):
         near = [k for k, each in enumerate(seen) if np.abs(row - each).max() < tolerance]
         if not near:

@@ -1,6 +1,7 @@
 """Scale and bias over temperature: what the polynomials say, how well they say it, and where they say nothing."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -147,7 +148,7 @@ def test_the_lag_of_the_thermometer_is_found() -> None:
         ({"temperature_c": np.full(168, np.nan)}, "not_finite"),
     ],
 )
-def test_what_tells_no_polynomial_is_refused_by_name(changed: dict[str, Array], name: str) -> None:
+def test_what_tells_no_polynomial_is_refused_by_name(changed: dict[str, Any], name: str) -> None:
     sensor, rng = upright(0)
     of = session()
     with pytest.raises(Fault) as refused:

@@ -140,7 +140,8 @@ def named(lines: str, separator: str, name: int, value: int) -> dict[str, float]
 
 def ours(entry: OverTemperatureEntry, temperature_c: float) -> Array:
     """The reading less what it is off at no rate, by the nearer end outside."""
-    return READING + np.array(entry.at(float(np.clip(temperature_c, *entry.range_c)))[1])
+    found: Array = READING + np.array(entry.at(float(np.clip(temperature_c, *entry.range_c)))[1])
+    return found
 
 
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.analysis.elsewhere import budget_of, solve_swept
 from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference
@@ -73,7 +74,7 @@ class Session:
 
     windows_s: Array
     felt: Array
-    places: Array
+    places: NDArray[np.intp]
     temperature_c: Array
     warming_k_s: Array
 
@@ -101,10 +102,11 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
         rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
     )
     white = rng.normal(0, 1, of.felt.shape) * sensor.noise
-    return (
+    found: Array = (
         of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
         + sensor.leaning[of.places] + sensor.walk * wandered + white
     )  # fmt: skip
+    return found
 
 
 def repeated(means: Array, of: Session, noise: float) -> Repeated:
