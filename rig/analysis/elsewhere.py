@@ -107,6 +107,12 @@ def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
 def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
     chosen = None if name is None else estimator_among(BY_SWEEPS, name)
     data, polynomials = averaged(_samples(read), read.motion), None
+    if reference_c is not None and data.turned is not None:
+        raise Refused(
+            "bad_option",
+            "the body was turned from rest to rest, and over temperature mean rates are solved",
+            "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
+        )
     if reference_c is not None:
         data, polynomials = files_to_reference(data, reference_c)
     solution = solve_swept(data, chosen)

@@ -104,7 +104,7 @@ class OverTemperature:
 
     @property
     def coefficients(self) -> Array:
-        """(24,) in the order of the covariance."""
+        """Coefficients (24,) in the order of the covariance."""
         return np.concatenate([self.scale.ravel(), self.bias.ravel()])
 
     @property
@@ -430,7 +430,7 @@ def _gradient(found: OverTemperature, half_width_k: float) -> Line:
 
 
 def _repeated_often(seen: Repeated) -> Repeated:
-    """Those of places that were visited often enough. Raises Fault `too_few_observations`."""
+    """Readings of places that were visited often enough. Raises Fault `too_few_observations`."""
     numbers, counts = np.unique(seen.places, return_counts=True)
     often = numbers[counts >= FEWEST]
     kept = np.isin(seen.places, often)

@@ -11,7 +11,7 @@ EACH = 4  # of the table's rows are shown
 
 
 def shown_rows(found: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
-    """Both ends of the range, its middle, and what is half-way between."""
+    """The rows of both ends of the range, of its middle, and half-way between."""
     return found.table[::EACH]
 
 
@@ -21,7 +21,7 @@ def own_contributors(found: OverTemperatureEntry) -> Sequence[TemperatureLineEnt
 
 
 def about_lines(found: OverTemperatureEntry, quantity: Quantity) -> Iterator[str]:
-    """By what the polynomials are known, and what is not in their uncertainty."""
+    """Lines that say by what the polynomials are known, and what is not in their uncertainty."""
     low, high = found.range_c
     scale, bias = found.orders
     yield f"it holds from {low:.1f} to {high:.1f} °C only; the readings call for order {scale} of k and {bias} of b"

@@ -7,10 +7,15 @@ import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.analysis.outcome import Outcome
-from rig.data.quantity import RATE
+from rig.analysis.over_temperature import taken_to_reference
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import settings_from_json
+from rig.observation.observed_run import observe_runs
+from rig.observation.windows import Window
+from rig.plans.recorded import open_run
 from rig.report.document import document_of
+from support.frozen import RECORDINGS
 from support.synthetic_run import BIAS_RAD_S, SENSITIVITY, Motion, Setup, readings, run_data, sample_times, true_rate
 
 REFERENCE_C = 25.0
@@ -72,3 +77,36 @@ def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
 
 def test_the_settings_keep_the_reference(warmed: RunData) -> None:
     assert settings_from_json(warmed.settings.to_json()).reference_c == REFERENCE_C
+
+
+def test_an_accelerometer_in_dwells_is_taken_there_as_well() -> None:
+    """A real recording's dwells, gone through at six temperatures."""
+    runs = open_run(RECORDINGS / "rig.settings-6" / "bias_drift").movement
+    (recording, *_), settings = observe_runs(runs), replace(runs[0].settings, reference_c=REFERENCE_C)
+    (name,) = settings.to_calibrate
+    first = {planned.index for planned in settings.planned_dwells if planned.repeat == 0}
+    once = [dwell for dwell in recording.sensors[name].dwells if dwell.index in first]
+    means = np.array([dwell.reading.mean for dwell in once])
+    forces = -np.array([dwell.attitude for dwell in once]) @ settings.site.down_m_s2  # type: ignore[union-attr]
+    zero = np.linalg.lstsq(np.column_stack([forces, np.ones(len(once))]), means)[0][3]
+    again = []
+    for number, warm in enumerate((20.0, 31.0, 42.0, 50.0, 37.0, 26.0)):
+        for place, dwell in enumerate(once):
+            temperature_c = warm + 0.02 * place
+            away = temperature_c - REFERENCE_C
+            mean = (means[place] - zero) / (1 + SHARE * away) + zero + 20 * SLOPE * away
+            window = Window(dwell.window.start_s + 900.0 * number, dwell.window.end_s + 900.0 * number)
+            reading = replace(dwell.reading, mean=mean)
+            again.append(replace(dwell, reading=reading, window=window, temperature_c=temperature_c))
+    parts = {**recording.sensors, name: replace(recording.sensors[name], dwells=tuple(again), revolutions=(), rests=())}
+    warmed = replace(recording, sensors=parts)
+
+    taken = taken_to_reference([warmed], replace(settings, planned_sweeps=()), REFERENCE_C)
+
+    found = taken.polynomials[name][ACCELERATION]
+    moved = np.array([dwell.reading.mean for dwell in taken.recordings[0].sensors[name].dwells])
+    assert np.allclose(found.bias[1], 20 * SLOPE, rtol=0.05) and np.allclose(
+        found.scale[1] / found.scale[0], SHARE, rtol=0.05
+    )
+    assert np.abs(moved - np.tile(means, (6, 1))).max() < 2e-3
+    assert {dwell.temperature_c for dwell in taken.recordings[0].sensors[name].dwells} == {REFERENCE_C}

@@ -17,7 +17,7 @@ SHARES = (Unit("%", 1e-2), Unit("ppm", 1e-6))
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """Of each axis the band and the line as points of SVG; `ticks` are heights, `marks` temperatures."""
+    """A picture: of each axis the band and the line as points of SVG; `ticks` are heights, `marks` temperatures."""
 
     axes: tuple[tuple[str, str], ...]
     ticks: tuple[tuple[float, str], ...]
