@@ -183,6 +183,7 @@ class UncertaintySection(Section):
         le=20,
         description="of a calibration over temperature: by how much the part's thermometer and what it is beside may "
         "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
+        json_schema_extra={"unit": "K"},
     )
     angle_std_deg: float | None = Field(
         default=None,
