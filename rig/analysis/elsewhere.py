@@ -14,6 +14,7 @@ from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
+from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
 from rig.analysis.verdict import fitness
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
@@ -25,6 +26,7 @@ from rig.estimation.budget import Budget, Contributor
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
+from rig.estimation.over_temperature import OverTemperature
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import BIAS as OFFSET
 from rig.estimation.reference_model import F
@@ -49,7 +51,8 @@ class OfSensor:
     """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
 
     `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
-    rest; `of_kinds` is what solvers of installed kinds of sensors found.
+    rest; `of_kinds` is what solvers of installed kinds of sensors found; `polynomials` are there of a calibration over
+    temperature.
     """
 
     item: Item
@@ -59,6 +62,7 @@ class OfSensor:
     unsolved: Mapping[Quantity, Fault]
     turned: TurnedData | None = None
     of_kinds: tuple[KindFound, ...] = ()
+    polynomials: OverTemperature | None = None
 
 
 def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
@@ -69,7 +73,11 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     """
     if read.tells == "turns":
         return _by_hand(read, estimator)
-    found = _by_sweeps(read, estimator) if read.tells == "sweeps" else _by_attitudes(read, settings, estimator)
+    found = (
+        _by_sweeps(read, estimator, settings.reference_c)
+        if read.tells == "sweeps"
+        else _by_attitudes(read, settings, estimator)
+    )
     if found.gyroscope is None and not found.at_rest and not found.of_kinds:
         raise _nothing_solved(found.unsolved)
     return found
@@ -96,9 +104,17 @@ def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
     return OfSensor(read.item, solved_by_hand(read.item, _samples(read), read.motion), None, {}, {})
 
 
-def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
+def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
     chosen = None if name is None else estimator_among(BY_SWEEPS, name)
-    data = averaged(_samples(read), read.motion)
+    data, polynomials = averaged(_samples(read), read.motion), None
+    if reference_c is not None and data.turned is not None:
+        raise Refused(
+            "bad_option",
+            "the body was turned from rest to rest, and over temperature mean rates are solved",
+            "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
+        )
+    if reference_c is not None:
+        data, polynomials = files_to_reference(data, reference_c)
     solution = solve_swept(data, chosen)
     vector = solution if isinstance(solution, VectorSolution | TurnedSolution) else or_fault(lambda: _vector(data))
     gyroscope = SensorResult(
@@ -120,7 +136,9 @@ def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
         ),
     )
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
-    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns)
+    if polynomials is not None:
+        gyroscope, polynomials = with_rate_polynomials(gyroscope, polynomials)
+    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials)
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:

@@ -1,9 +1,10 @@
 """What recordings amount to: they are solved, verified and judged here for `rig.analysis.analyses`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,12 @@ from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.of_kinds import kinds_on_arm
 from rig.analysis.onboard_check import agreement
 from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.over_temperature import (
+    Polynomials,
+    taken_to_reference,
+    with_acceleration_polynomials,
+    with_rate_polynomials,
+)
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.vector_inputs import arms_of
 from rig.analysis.verdict import (
@@ -31,14 +38,17 @@ from rig.analysis.verdict import (
 )
 from rig.analysis.verification import Verification, verify
 from rig.data.motion_file import ReadElsewhere
-from rig.data.quantity import RATE
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import DecisionRule, RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.over_temperature import OverTemperature
 from rig.estimation.vector_fit import centripetal_m_s2
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun, observe_runs
+
+ResultT = TypeVar("ResultT")
 
 
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
@@ -54,11 +64,17 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
             "no finished sweep is recorded, and a calibration needs sweeps in six directions, or dwells in attitudes",
             "Record the movement; resume the run if it was interrupted",
         )
+    found: Polynomials = {}
+    if settings.reference_c is not None:
+        taken = taken_to_reference(recordings, settings, settings.reference_c)
+        recordings, found = taken.recordings, taken.polynomials
     if not settings.planned_sweeps:
-        return _in_attitudes(runs, recordings, drifting=drifting)
+        return _in_attitudes(runs, recordings, found, drifting=drifting)
     surroundings = surroundings_of(recordings)
     results = solve_observed(runs[0].measuring(RATE), recordings, chosen, surroundings, settings.matrix_corrected)
+    results, found = _over_temperature(results, RATE, with_rate_polynomials, found)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
+    accelerometers, found = _over_temperature(accelerometers, ACCELERATION, with_acceleration_polynomials, found)
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
@@ -92,7 +108,21 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         magnetometers=magnetometers,
         told_from=among_rates.told_from,
         told_from_in_reference=among_dwells.told_from,
+        polynomials=found,
     )
+
+
+def _over_temperature(
+    results: Mapping[str, ResultT],
+    quantity: Quantity,
+    together: Callable[[ResultT, OverTemperature], tuple[ResultT, OverTemperature]],
+    polynomials: Polynomials,
+) -> tuple[dict[str, ResultT], Polynomials]:
+    """Results of a quantity with what polynomials over temperature add to them, and these settled by them."""
+    settled = {name: together(results[name], of[quantity]) for name, of in polynomials.items() if quantity in of}
+    added = {name: result for name, (result, _) in settled.items()}
+    known = {name: {**polynomials[name], quantity: found} for name, (_, found) in settled.items()}
+    return {**results, **added}, {**polynomials, **known}
 
 
 def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> Outcome:
@@ -107,6 +137,7 @@ def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> 
         results={} if found.gyroscope is None else {name: found.gyroscope},
         elsewhere={name: found},
         of_kinds=found.of_kinds,
+        polynomials={} if found.polynomials is None else {name: {RATE: found.polynomials}},
     )
 
 
@@ -119,10 +150,13 @@ def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
     return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
 
 
-def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], *, drifting: bool) -> Outcome:
+def _in_attitudes(
+    runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], polynomials: Polynomials, *, drifting: bool
+) -> Outcome:
     """Accelerometers alone: no sweep was planned, from which a gyroscope could be calibrated."""
     settings = runs[0].settings
-    found = calibrate_accelerometers(recordings, settings)
+    found: dict[str, AccelerometerResult] = calibrate_accelerometers(recordings, settings)
+    found, polynomials = _over_temperature(found, ACCELERATION, with_acceleration_polynomials, polynomials)
     magnetometers = calibrate_magnetometers(recordings, settings, found)
     among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
     of_kinds = kinds_on_arm(recordings, settings)
@@ -137,6 +171,7 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
         magnetometers=magnetometers,
         told_from_in_reference=among_dwells.told_from,
         of_kinds=of_kinds,
+        polynomials=polynomials,
     )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rig.analysis.mounts import FoundMount
     from rig.analysis.of_kinds import KindFound
     from rig.analysis.onboard_check import Agreement
+    from rig.analysis.over_temperature import Polynomials
     from rig.analysis.told_from import ToldFrom
     from rig.analysis.verification import Verification
     from rig.data.provenance import Provenance
@@ -49,6 +50,7 @@ class Outcome:
     in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
     `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too. `of_kinds` is what the
     solvers of installed kinds of sensors found. `mounts` say how the item sat in the stages after the first.
+    `polynomials` are there of a calibration over temperature: then all else is of readings taken to the reference.
     """
 
     settings: "RunSettings"
@@ -67,6 +69,7 @@ class Outcome:
     elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
     of_kinds: "tuple[KindFound, ...]" = ()
     mounts: "tuple[FoundMount, ...]" = ()
+    polynomials: "Polynomials" = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:

@@ -41,6 +41,14 @@ def add(solve: ArgumentParser) -> None:
         metavar="TIME",
         help="when the readings were made (2026-11-25T08:30, UTC); left out, when their file was last written",
     )
+    swept = solve.add_argument_group("with --sweeps")
+    swept.add_argument(
+        "--reference-c",
+        type=float,
+        metavar="CELSIUS",
+        help="scale and bias over temperature: the sweeps are repeated at several, which the column temperature_c "
+        "tells; what is not a function of temperature is stated at this one",
+    )
     hand = solve.add_argument_group("with --turns")
     hand.add_argument(
         "--clock-ppm",
@@ -126,6 +134,10 @@ def _recording(options: Namespace) -> "RunData":
         if value is not None and not 0 < value < float("inf"):
             option = f"--{name.replace('_', '-')}"
             raise Refused("bad_option", f"{option} is {value:g}", "Give its size, in SI units")
+    if options.reference_c is not None and options.sweeps is None:
+        raise Refused(
+            "bad_option", "--reference-c is for sweeps that were repeated at several temperatures", "Give --sweeps"
+        )
     sign, axis = options.up
     x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
     said = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
@@ -161,6 +173,7 @@ def _recording(options: Namespace) -> "RunData":
             estimator=options.estimator,
         ),
         second_order=options.second_order,
+        reference_c=options.reference_c,
     )
 
 

@@ -177,6 +177,14 @@ class UncertaintySection(Section):
         description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
         "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
     )
+    thermometer_gradient_k: float = Field(
+        default=0.1,
+        ge=0,
+        le=20,
+        description="of a calibration over temperature: by how much the part's thermometer and what it is beside may "
+        "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
+        json_schema_extra={"unit": "K"},
+    )
     angle_std_deg: float | None = Field(
         default=None,
         ge=0,

@@ -37,6 +37,7 @@ from rig.data.result_types import (
     WhenEntry,
 )
 from rig.data.run_folder import RESULT
+from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 from rig.motion.geometry import OfJoints
 
@@ -406,6 +407,7 @@ class ResultDocument(Entry):
     It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
     were recorded; one that was recorded and not calibrated says why.
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
+    `over_temperature` holds calibrations over temperature in the same way: then all else is at their reference.
     `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
     `others` are results of kinds that packages add, by the kind's key: what stands there only the package knows.
     `mounts` are there of a run of several stages, for each but the first.
@@ -422,6 +424,7 @@ class ResultDocument(Entry):
     accelerometers: dict[SensorName, AccelerometerEntry] = Field(default_factory=dict)
     magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
     bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
+    over_temperature: dict[SensorName, dict[str, OverTemperatureEntry]] = Field(default_factory=dict)
     unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
     others: dict[str, dict[SensorName, JsonValue]] = Field(default_factory=dict)
     mounts: tuple[MountEntry, ...] = ()

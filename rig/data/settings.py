@@ -122,6 +122,7 @@ class Uncertainty:
     mount_deg: Annotated[float, Field(ge=0)] = 0.0  # … which know no stages
     acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
     angle_std_deg: Annotated[float, Field(ge=0)] | None = None
+    thermometer_gradient_k: Annotated[float, Field(ge=0)] = 0.1
     nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     asymmetry_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
@@ -219,6 +220,8 @@ class RunSettings:
 
     `mounts` are the nominal rotations from the flange's frame to the item's in the stages of the procedure, of which
     this recording is of number `stage`, from 0; none where the item stays mounted as it is.
+
+    `reference_c` is the temperature at which a calibration over temperature is stated; None of any other.
     """
 
     procedure: str
@@ -241,6 +244,7 @@ class RunSettings:
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
     by_hand: ByHand | None = None
+    reference_c: float | None = None
 
     @property
     def mount(self) -> Mounting:
@@ -329,6 +333,8 @@ class RunSettings:
             del document["elsewhere"]
         if self.by_hand is None:
             del document["by_hand"]
+        if self.reference_c is None:
+            del document["reference_c"]
         if not self.mounts:
             del document["mounts"], document["stage"]
         return document
@@ -387,6 +393,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         reckoning=RECKONING,
         mounts=tuple(stage.mount for stage in plan.stages),
         by_hand=_by_hand(config.procedure),
+        reference_c=getattr(config.procedure, "reference_c", None),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
         raise _angle_std_not_stated()

@@ -12,7 +12,7 @@ from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.tables import title_of
 from rig.report.exports.names import plain_names
 from rig.report.figures import save
-from rig.report.kinds.followed import CHANGES, EARTH, SLOPES
+from rig.report.kinds.followed import CHANGES, EARTH, SCALE_SLOPES, SLOPES
 from rig.study.style import style
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Of the figure's width and height. Letting the layout find them takes as long as drawing does.
 MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
-SHOWN = ("kx", "ky", "kz", "bx", "by", "bz", *CHANGES, *SLOPES, *EARTH[1:])
+SHOWN = ("kx", "ky", "kz", "bx", "by", "bz", *CHANGES, *SLOPES, *SCALE_SLOPES, *EARTH[1:])
 ACROSS = 3
 
 

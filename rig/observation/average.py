@@ -1,15 +1,17 @@
 """A sensor's samples on the controller's clock, and their averages with the variance of the mean."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE, TEMPERATURE
+from rig.data.quantity import RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
+from rig.estimation.over_temperature import OverTemperature
 from rig.observation.known_motion import KnownMotion
 from rig.observation.lines import in_hertz
 from rig.observation.mean import Mean
@@ -54,7 +56,7 @@ class Average:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """A sensor's samples in physical units, on the controller's clock."""
+    """A sensor's samples in physical units, on the controller's clock; by `polynomials` at one temperature."""
 
     sensor: RecordedSensor
     clock: TimeBase
@@ -62,6 +64,19 @@ class Stream:
     board_time_s: Array
     readings_rad_s: Array
     raw: NDArray[Any]
+    polynomials: Mapping[Quantity, OverTemperature] = field(default_factory=dict)
+
+    def at_reference(self, polynomials: Mapping[Quantity, OverTemperature]) -> "Stream":
+        """A stream whose readings are those at the reference of these polynomials."""
+        taken = replace(self, polynomials=polynomials)
+        return replace(taken, readings_rad_s=taken.taken(RATE, self.readings_rad_s, slice(None)))
+
+    def taken(self, quantity: Quantity, readings: Array, inside: slice) -> Array:
+        """Readings (n, 3) of the samples inside, at the reference temperature if there are polynomials of them."""
+        if quantity not in self.polynomials:
+            return readings
+        warm = self.sensor.channel(TEMPERATURE).values(self.raw[inside])
+        return self.polynomials[quantity].at_reference(readings, warm)
 
     def temperature_c(self, inside: slice) -> float:
         """The mean of the samples inside."""

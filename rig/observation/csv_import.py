@@ -63,6 +63,7 @@ def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
         np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
         np.column_stack([sweeps[name] for name in AXIS_COLUMNS]),
+        samples.temperature_c,
     )
     if "angle_rad" not in sweeps:
         return found
@@ -70,9 +71,10 @@ def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
     return replace(found, turned=turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests))
 
 
-def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
+def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
     """Samples (n, 4) = [time_s, x, y, z] averaged over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
+    `temperature_c` (n,) is how warm it was at each sample, None where nothing tells that.
     Raises Refused `time_not_increasing`, `overlapping_sweeps`; Fault `too_few_observations`, `lost_samples`,
     `wrong_unit`.
     """
@@ -90,9 +92,12 @@ def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
     interval_s = float(np.median(np.diff(time_s)))
     turns, rests = [], []
     for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
-        cut = readings[inside(time_s, window)]
+        within = inside(time_s, window)
+        cut = readings[within]
         check_complete(len(cut), window, interval_s, f"sweep {row}")
         mean = average_of(cut, window)
+        if temperature_c is not None:
+            mean = replace(mean, temperature_c=float(temperature_c[within].mean()))
         if speed == 0:
             rests.append(mean)
         else:

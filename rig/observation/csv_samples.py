@@ -2,8 +2,9 @@
 
 `time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (what an
 accelerometer feels: at rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` may
-stand there too, as `rig export` writes it; nothing depends on it. Columns may stand in any order; the first row holds
-their names. One recording serves every command: each uses the quantities it knows what to do with.
+stand there too, as `rig export` writes it: a calibration over temperature needs it, nothing else does. Columns may
+stand in any order; the first row holds their names. One recording serves every command: each uses the quantities it
+knows what to do with.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ import numpy as np
 
 from rig.data.installed_kinds import quantities
 from rig.data.motion_file import TIME, Columns, samples_header
-from rig.data.quantity import Quantity
+from rig.data.quantity import TEMPERATURE, Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import Mapped, read_columns
@@ -26,10 +27,14 @@ SAMPLES_MB = 256  # an hour at 1 kHz
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """A file's readings: `time_s` (n,), increasing, and (n, 3) of every quantity it holds, in SI units."""
+    """A file's readings: `time_s` (n,), increasing, and (n, 3) of every quantity it holds, in SI units.
+
+    `temperature_c` (n,) is None where there is no such column.
+    """
 
     time_s: Array
     readings: Mapping[Quantity, Array]
+    temperature_c: Array | None = None
 
 
 def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | None = None) -> Samples:
@@ -53,4 +58,4 @@ def samples_in(table: Columns, where: str) -> Samples:
         raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
     check_times(table[TIME])
     readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}
-    return Samples(table[TIME], readings)
+    return Samples(table[TIME], readings, table.get(TEMPERATURE.columns[0]))

@@ -10,7 +10,7 @@ import numpy as np
 from rig.config.column_map import ColumnMap, ColumnSection
 from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
-from rig.data.quantity import RATE
+from rig.data.quantity import RATE, TEMPERATURE
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
@@ -42,8 +42,13 @@ class Files:
     columns: ColumnMap = AS_NAMED_HERE
 
 
-def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False) -> RunData:
-    """The recording. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`."""
+def recorded_in_files(
+    files: Files, site: Site, asked: Elsewhere, *, second_order: bool = False, reference_c: float | None = None
+) -> RunData:
+    """The recording; with a reference that of a calibration over temperature.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
+    """
     told = files.columns
     needed = () if files.tells == "attitudes" else [RATE]
     samples = read_samples(files.readings, needed, _mapped(told.samples, told.samples_skip_lines))
@@ -52,6 +57,8 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         for quantity, readings in samples.readings.items()
         for i, name in enumerate(quantity.columns)
     }
+    if reference_c is not None and samples.temperature_c is not None:
+        columns |= dict.fromkeys(TEMPERATURE.columns, samples.temperature_c)
     began = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
     read_elsewhere = ReadElsewhere(files.item, columns, files.tells, _motion(files))
     return RunData(
@@ -69,6 +76,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             second_order=second_order,
             reckoning=RECKONING,
             elsewhere=asked,
+            reference_c=reference_c,
         ),
         provenance=provenance_of_files(
             entry_of(files.readings),

@@ -1,15 +1,16 @@
 """A recording and all it tells: the arm's motion, and of each sensor its time, its revolutions and its rests."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
 
-from rig.data.quantity import RATE
+from rig.data.quantity import RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.estimation.arrays import Array
+from rig.estimation.over_temperature import OverTemperature
 from rig.observation.arm_motion import ArmMotion, motion_of, refuse_elsewhere
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
@@ -29,15 +30,20 @@ class Delay:
 
 @dataclass(frozen=True, slots=True)
 class ObservedRun:
-    """One recording, observed once; `sensors` by name."""
+    """One recording, observed once; `sensors` by name.
+
+    By `polynomials` its readings were taken to one temperature, and are whenever they are asked for.
+    """
 
     run: RunData
     motion: ArmMotion
     sensors: Mapping[str, SensorObservations]
+    polynomials: Mapping[str, Mapping[Quantity, OverTemperature]] = field(default_factory=dict)
 
     def stream(self, sensor: str) -> Stream:
         """A sensor's samples in rad/s on the arm's clock."""
-        return on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
+        stream = on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
+        return stream.at_reference(self.polynomials[sensor]) if sensor in self.polynomials else stream
 
     def one_clock(self, sensor: str, other: str) -> bool:
         """Whether one clock stamps the samples of both."""

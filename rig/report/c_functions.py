@@ -18,7 +18,7 @@ def gyroscope_lines(found: Found[SensorEntry], sensed: Mapping[str, Array]) -> I
     """C of a gyroscope that was calibrated; none of a reference."""
     if found.entry.role != "calibrate":
         return
-    prefix, sensitivity = _prefix(found.sensor), sensed.get(found.sensor)
+    prefix, sensitivity = prefix_of(found.sensor), sensed.get(found.sensor)
     yield from _correction(prefix, found.entry)
     if sensitivity is not None:
         yield from _without_gravity(prefix, sensitivity)
@@ -49,7 +49,7 @@ def _warm(temperature_c: float | None) -> str:
     return "" if temperature_c is None else f", at {temperature_c:.1f} °C"
 
 
-def _prefix(name: str) -> str:
+def prefix_of(name: str) -> str:
     """What a sensor's names in C begin with."""
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
@@ -62,7 +62,7 @@ def _correction(prefix: str, sensor: SensorEntry) -> Iterator[str]:
         f"/* {_comment(about)}. */",
         f"static const float {prefix}_scale[3] = {_array(sensor.scale)};",
         f"static const float {prefix}_bias_rad_s[3] = {_array(sensor.bias_rad_s)};",
-        f"static const float {prefix}_matrix[3][3] = {_rows(np.diag(sensor.scale) if whole is None else whole)};",
+        f"static const float {prefix}_matrix[3][3] = {c_rows(np.diag(sensor.scale) if whole is None else whole)};",
         "",
         f"static inline void {prefix}_calibrate(const float reading_rad_s[3], float rate_rad_s[3])",
         "{",
@@ -80,7 +80,7 @@ def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
         "",
         "/* The same without what gravity adds to a reading: gravity_m_s2 points down, in the frame of the corrected",
         " * rates; it is an accelerometer's reading at rest with the other sign. */",
-        f"static const float {prefix}_g_sensitivity_rad_s_per_m_s2[3][3] = {_rows(sensitivity)};",
+        f"static const float {prefix}_g_sensitivity_rad_s_per_m_s2[3][3] = {c_rows(sensitivity)};",
         "",
         f"static inline void {prefix}_calibrate_with_gravity(",
         "    const float reading_rad_s[3], const float gravity_m_s2[3], float rate_rad_s[3])",
@@ -100,14 +100,14 @@ def _subtracting(
     found: Found[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
     """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
-    of, unit = f"{_prefix(found.sensor)}_{found.quantity}", found.quantity.suffix
+    of, unit = f"{prefix_of(found.sensor)}_{found.quantity}", found.quantity.suffix
     yield from (
         "",
         *about,
         f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
-        f"static const float {of}_matrix[3][3] = {_rows(matrix)};",
+        f"static const float {of}_matrix[3][3] = {c_rows(matrix)};",
         "",
-        f"static inline void {_prefix(found.sensor)}_calibrate_{found.quantity}("
+        f"static inline void {prefix_of(found.sensor)}_calibrate_{found.quantity}("
         f"const float reading_{unit}[3], float {true}[3])",
         "{",
         "    for (int i = 0; i < 3; i++) {",
@@ -119,7 +119,8 @@ def _subtracting(
     )
 
 
-def _rows(matrix: Iterable[Iterable[float]]) -> str:
+def c_rows(matrix: Iterable[Iterable[float]]) -> str:
+    """The rows of a matrix as C has them."""
     return "{" + ", ".join(_array(row) for row in matrix) + "}"
 
 

@@ -14,14 +14,14 @@ from rig.report.header import calibration_header
 from rig.report.kinds.kind import ResultKind, Without
 from rig.report.kinds.registry import followed, kinds
 from rig.report.table import print_result
-from support.certified import LABORATORY, certificate, everything, read
+from support.certified import LABORATORY, certificate, everything, over_temperature, read
 
 NAMES = [kind.name for kind in kinds()]
 
 
 @pytest.fixture(scope="module")
 def document() -> ResultDocument:
-    return everything()
+    return everything().model_copy(update={"over_temperature": {"gyro": {"rate": over_temperature()}}})
 
 
 @pytest.mark.parametrize("kind", kinds(), ids=NAMES)

@@ -19,6 +19,7 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.data.result_types import Matrix3, Vector3
+from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.reference_budget import KnownSize, Spread, reference_budget
 from rig.motion.geometry import NOMINAL
@@ -219,6 +220,35 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
             "largest_change": (8e-6, 2e-6, 1e-6),
             "over_temperature": found if slope else {"error": "temperature_range_too_small: 1 °C"},
             "earth_rate_known": False,
+        }
+    )
+
+
+def over_temperature() -> OverTemperatureEntry:
+    """A gyroscope from 20 to 40 °C, whose scale factors rise and whose biases bend."""
+    nothing, steps = (0.0, 0.0, 0.0), range(17)
+    row = {"scale": (1.1, 1.2, 1.3), "bias": (0.01, 0.02, 0.03), "expanded_scale": (1e-4,) * 3}
+    return OverTemperatureEntry.model_validate(
+        {
+            "part": "lsm9ds1",
+            "serial_number": "LSM9DS1-001",
+            "full_scale": 4.276,
+            "unit": "rad/s",
+            "reference_c": 25.0,
+            "range_c": (20.0, 40.0),
+            "orders": (1, 2),
+            "repeats": 6,
+            "scale": ((1.1, 1.2, 1.3), (1e-4, 2e-4, 3e-4), nothing, nothing),
+            "bias": ((0.01, 0.02, 0.03), (1e-4, 2e-4, -1e-4), (1e-6, 0.0, -1e-6), nothing),
+            "covariance": (1e-12 * np.eye(24)).tolist(),
+            "contributors": [],
+            "table": [
+                {**row, "temperature_c": 20 + 1.25 * step, "expanded_bias": (1e-5 + step * 1e-7,) * 3} for step in steps
+            ],
+            "lag_s": 1.0,
+            "lag_std_s": 2.0,
+            "hysteresis": None,
+            "hysteresis_std": None,
         }
     )
 

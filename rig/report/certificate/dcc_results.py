@@ -10,6 +10,8 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
+from rig.data.temperature_entries import OverTemperatureEntry
+from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
@@ -101,6 +103,21 @@ deviation of {found.common_std[i]!r} {found.unit}. ± U of what differs"
         low, high = slope.range_c
         said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
         yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), unit + KELVIN)
+
+
+def over_temperature(found: OverTemperatureEntry) -> Iterator[Element]:
+    """Scale and bias of each axis at the temperatures of the table, with U."""
+    unit = RATE if found.unit == "rad/s" else ACCELERATION
+    low, high = found.range_c
+    labels = [f"{row.temperature_c:.6g}_degC" for row in found.table]
+    held = f"At temperatures of the item's own thermometer; holds from {low!r} to {high!r} °C only"
+    for i, axis in enumerate(AXES):
+        for name, of, units in (("scale factor", "scale", ONE), ("bias", "bias", unit)):
+            values = [getattr(row, of)[i] for row in found.table]
+            widths = [getattr(row, f"expanded_{of}")[i] for row in found.table]
+            stated = Expanded(widths, *([each] * len(labels) for each in (COVERAGE_FACTOR, PROBABILITY)))
+            yield _result(f"{name} along {axis} over temperature", f"{held}. ± U, about 95 %.",
+                          real_list(labels, values, [units], expanded=stated))  # fmt: skip
 
 
 def verification(found: VerificationEntry) -> Iterator[Element]:

@@ -130,7 +130,7 @@ def _marked(
 ) -> Residuals:
     """Values (n, 3) side by side, their bars two standard deviations, in a unit that suits the largest."""
     bars = 2 * std
-    reach, unit = _scale(float((np.abs(left) + bars).max()), quantity.residuals)
+    reach, unit = reach_in(float((np.abs(left) + bars).max()), quantity.residuals)
     across = (WIDTH - LEFT - RIGHT) / len(left)
 
     def height(value: float) -> float:
@@ -147,7 +147,7 @@ def _marked(
     return Residuals(points, ticks, height(0.0), begins, unit.name, int((np.abs(left) <= bars).sum()), shown, of)
 
 
-def _scale(largest: float, units: Sequence[Unit]) -> tuple[float, Unit]:
+def reach_in(largest: float, units: Sequence[Unit]) -> tuple[float, Unit]:
     """A round reach above it, and the unit that is in: the first in which it is above 1."""
     unit = next((each for each in units if largest >= each.size), units[-1])
     shown = largest / unit.size

@@ -17,10 +17,11 @@ from rig.data.result_file import ResultDocument, SensorEntry
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
+from rig.report.exports.over_temperature import ardupilot_parameters, px4_parameters
 from rig.report.exports.parameters import origin
 
 GAUSS_T, MILLIGAUSS_T = 1e-4, 1e-7
-PX4_FLOAT = 9  # MAV_PARAM_TYPE_REAL32
+PX4_FLOAT, PX4_INT = 9, 6  # MAV_PARAM_TYPE_REAL32, _INT32
 HEADING = (
     "# Offsets in each sensor's own axes. Gyroscopes, rad/s: rate = reading - offset, offset = -b at zero gravity.",
     "# Accelerometers, m/s^2: (reading - offset) * scale. Magnetometers: a symmetric matrix times what is left,",
@@ -50,8 +51,7 @@ class Autopilot:
 
         Sensors keep the number that their place in the configuration gives them, and an accelerometer its gyroscope's.
         """
-        gyroscopes = [name for name, each in result.sensors.items() if each.role == "calibrate"]
-        places = {name: i for i, name in enumerate(dict.fromkeys([*gyroscopes, *result.accelerometers]))}
+        gyroscopes, places = _gyroscopes(result), _places(result)
         fields = [(i, *each) for i, each in enumerate(result.magnetometers.items())]
         found = [(i, name, each) for i, name, each in fields if isinstance(each, MagnetometerEntry)]
         if not (places or found):
@@ -79,15 +79,37 @@ def px4_files(result: ResultDocument) -> Mapping[str, str]:
         "# sensor's ID. Magnetic fields are in gauss.",
         *PX4.lines(result, lambda name, value: f"1\t1\t{name}\t{value!r}\t{PX4_FLOAT}"),
     ]
+    if result.over_temperature:
+        lines += [
+            "# Over temperature: reading - (X1 d + X2 d^2 + X3 d^3) - offset, d = T - TREF, T within TMIN and TMAX.",
+            "# Lost: scale factors over temperature; TC_Gn_ID, TC_An_ID, which only the vehicle knows.",
+        ]
+    for name, value in px4_parameters(result, _places(result)):
+        lines.append(f"1\t1\t{name}\t{value!r}\t{PX4_INT if isinstance(value, int) else PX4_FLOAT}")
     return {"px4.params": "\n".join(lines) + "\n"}
 
 
 def ardupilot_files(result: ResultDocument) -> Mapping[str, str]:
     """`ardupilot.param`: name, value."""
     lines = [*HEADING, *OF_ARDUPILOT, *ARDUPILOT.lines(result, lambda name, value: f"{name},{value!r}")]
+    if result.over_temperature:
+        lines += [
+            "# Over temperature: reading - P(T - 35) + P(CALTEMP - 35) - offset, P(u) = 1e-6 (c1 u + c2 u^2 + c3 u^3),",
+            "# temperatures within TMIN and TMAX. Lost: scale factors over temperature.",
+            *(f"{name},{value!r}" for name, value in ardupilot_parameters(result, _places(result))),
+        ]
     if any(line.startswith("INS_GYR") for line in lines):
         lines += ["# Without this ArduPilot finds offsets of gyroscopes of its own at each boot.", "INS_GYR_CAL,0"]
     return {"ardupilot.param": "\n".join(lines) + "\n"}
+
+
+def _gyroscopes(result: ResultDocument) -> list[str]:
+    return [name for name, each in result.sensors.items() if each.role == "calibrate"]
+
+
+def _places(result: ResultDocument) -> dict[str, int]:
+    """The number of each IMU: the first is 0."""
+    return {name: i for i, name in enumerate(dict.fromkeys([*_gyroscopes(result), *result.accelerometers]))}
 
 
 def symmetric(matrix: Array) -> Array:

@@ -31,7 +31,9 @@ def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c:
         change = _change(drift, name, "acceleration", each.temperature_c, temperature_c)
         moved = _vector(np.array(each.bias_m_s2) + change)
         accelerometers[name] = each.model_copy(update={"bias_m_s2": moved, "temperature_c": temperature_c})
-    return result.model_copy(update={"sensors": sensors, "accelerometers": accelerometers})
+    polynomials: dict[str, object] = {}  # those that there are stand about the other temperature
+    changed = {"sensors": sensors, "accelerometers": accelerometers, "over_temperature": polynomials}
+    return result.model_copy(update=changed)
 
 
 def _change(

@@ -2,8 +2,9 @@
 
 Names: kx ky kz scale factors, k their mean, bx by bz biases; nonorth_yz nonorth_zx nonorth_xy the angles between axes
 less 90°; gxx … gzz what an acceleration adds to a rate (first letter the gyroscope's axis); dx dy dz the largest change
-of a bias between repeats, sx sy sz its slope over temperature; e ex ey ez the Earth's rate found and its parts in the
-axes of the base. The mean is one of its own because a gyroscope's only standard of size, the clock, moves all alike.
+of a bias between repeats, sx sy sz its slope over temperature, tx ty tz that of a scale factor; e ex ey ez the Earth's
+rate found and its parts in the axes of the base. The mean is one of its own because a gyroscope's only standard of
+size, the clock, moves all alike.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 ANGLES = ("nonorth_yz", "nonorth_zx", "nonorth_xy")
 SENSITIVITIES = tuple(f"g{row}{column}" for row in "xyz" for column in "xyz")
 CHANGES, SLOPES, EARTH = ("dx", "dy", "dz"), ("sx", "sy", "sz"), ("e", "ex", "ey", "ez")
-ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *SENSITIVITIES, *CHANGES, *SLOPES, *EARTH)
+SCALE_SLOPES = ("tx", "ty", "tz")
+ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *SENSITIVITIES, *CHANGES, *SLOPES, *SCALE_SLOPES, *EARTH)
 
 
 @dataclass(frozen=True, slots=True)

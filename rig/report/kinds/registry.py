@@ -13,10 +13,11 @@ from rig.report.kinds.followed import Followed
 from rig.report.kinds.gyroscope import GYROSCOPE
 from rig.report.kinds.kind import ResultKind, Shown, Without
 from rig.report.kinds.magnetometer import MAGNETOMETER
+from rig.report.kinds.over_temperature import OVER_TEMPERATURE
 from rig.report.kinds.verification import VERIFICATION
 
 OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
-    GYROSCOPE, EARTH_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, VERIFICATION,
+    GYROSCOPE, EARTH_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, OVER_TEMPERATURE, VERIFICATION,
 )  # fmt: skip
 
 

@@ -1,0 +1,92 @@
+"""The certificate's picture and table of a calibration over temperature."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.quantity import Quantity, Unit
+from rig.data.temperature_entries import OverTemperatureEntry
+from rig.estimation.arrays import Array
+from rig.report.certificate.plots import HEIGHT, LEFT, RIGHT, TOP, WIDTH, reach_in
+from rig.report.certificate.tables import Pair, pair
+from rig.report.temperature_words import shown_rows
+
+SHARES = (Unit("%", 1e-2), Unit("ppm", 1e-6))
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """A picture: of each axis the band and the line as points of SVG; `ticks` are heights, `marks` temperatures."""
+
+    axes: tuple[tuple[str, str], ...]
+    ticks: tuple[tuple[float, str], ...]
+    marks: tuple[tuple[float, str], ...]
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class TemperatureRow:
+    """A row of the table: k of the three axes, then b."""
+
+    temperature: str
+    values: tuple[Pair, ...]
+
+
+def temperature_rows(found: OverTemperatureEntry, unit: Unit) -> list[TemperatureRow]:
+    """The rows with U, biases in that unit."""
+    return [
+        TemperatureRow(
+            f"{row.temperature_c:.1f}",
+            (
+                *map(pair, row.scale, row.expanded_scale),
+                *(pair(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True)),
+            ),
+        )
+        for row in shown_rows(found)
+    ]
+
+
+def scale_curves(found: OverTemperatureEntry) -> Curves:
+    """How the scale factors change from the reference."""
+    first = np.array(found.scale[0])
+    values = np.array([row.scale for row in found.table]) / first - 1
+    return _curves(found, values, np.array([row.expanded_scale for row in found.table]) / first, SHARES)
+
+
+def bias_curves(found: OverTemperatureEntry, quantity: Quantity) -> Curves:
+    """How the biases change from the reference."""
+    values = np.array([row.bias for row in found.table]) - np.array(found.bias[0])
+    return _curves(found, values, np.array([row.expanded_bias for row in found.table]), quantity.residuals)
+
+
+def _curves(found: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[Unit]) -> Curves:
+    reach, unit = reach_in(float((np.abs(values) + widths).max()), units)
+    low, high = found.range_c
+
+    def points(temperatures: Sequence[float], heights: Array) -> str:
+        return " ".join(
+            f"{_across(at, low, high)},{_height(y, unit, reach)}" for at, y in zip(temperatures, heights, strict=True)
+        )
+
+    warm = [row.temperature_c for row in found.table]
+    axes = tuple(
+        (
+            points([*warm, *reversed(warm)], np.r_[values[:, i] + widths[:, i], (values[:, i] - widths[:, i])[::-1]]),
+            points(warm, values[:, i]),
+        )
+        for i in range(3)
+    )
+    ticks = tuple(
+        (_height(at * unit.size, unit, reach), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1)
+    )
+    marks = tuple((_across(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(found))
+    return Curves(axes, ticks, marks, unit.name)
+
+
+def _across(temperature_c: float, low: float, high: float) -> float:
+    return round(LEFT + 12 + (WIDTH - LEFT - RIGHT - 30) * (temperature_c - low) / (high - low), 1)
+
+
+def _height(value: float, unit: Unit, reach: float) -> float:
+    return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)

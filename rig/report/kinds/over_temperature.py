@@ -1,0 +1,121 @@
+"""Scale and bias as polynomials of temperature."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.data.installed_kinds import quantities
+from rig.data.motion_file import Item
+from rig.data.quantity import Unit
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.result_file import ResultDocument
+from rig.data.temperature_entries import OverTemperatureEntry
+from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.report.certificate import dcc_results
+from rig.report.kinds.followed import SCALE_SLOPES, SLOPES, Followed, known, parameters
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
+from rig.report.rounding import plus_minus
+from rig.report.temperature_c_functions import temperature_lines
+from rig.report.temperature_entry import temperature_entry
+from rig.report.temperature_words import about_lines, shown_rows
+from rig.station.plain_text import plain
+
+PPM = 1e-6
+SCALE_SLOPE, BIAS_SLOPE = slice(3, 6), slice(15, 18)  # of the covariance
+
+
+def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
+    return {
+        name: {
+            quantity.name: temperature_entry(quantity, found, _sensor(outcome, name))
+            for quantity, found in each.items()
+        }
+        for name, each in outcome.polynomials.items()
+    }
+
+
+def _sensor(outcome: Outcome, name: str) -> RecordedSensor | Item:
+    if name in outcome.elsewhere:
+        return outcome.elsewhere[name].item
+    return outcome.recordings[0].run.sensors[name]
+
+
+def _found(document: ResultDocument) -> Iterator[Found[OverTemperatureEntry]]:
+    for name, each in document.over_temperature.items():
+        yield from (Found(name, quantities()[quantity], entry) for quantity, entry in each.items())
+
+
+def _printed(found: Found[OverTemperatureEntry]) -> Iterator[Table | str]:
+    entry, unit = found.entry, found.quantity.bias
+    title = f"{found.sensor}, {found.quantity.sensor}: over temperature, ± U"
+    table = Table(title=plain(title, "table.title"))
+    table.title_justify = "left"
+    for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):
+        table.add_column(heading, justify="right")
+    for row in shown_rows(entry):
+        scales = map(plus_minus, row.scale, row.expanded_scale)
+        biases = (plus_minus(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True))
+        table.add_row(f"{row.temperature_c:.1f}", *scales, *biases)
+    yield table
+    yield from about_lines(entry, found.quantity)
+
+
+def _shown(found: Found[OverTemperatureEntry]) -> Shown:
+    """The slopes at the reference."""
+    entry, unit = found.entry, found.quantity.drift
+    _, bias = _slopes(entry)
+    name = f"{found.sensor}, {found.quantity.sensor}: change per kelvin at {entry.reference_c:g} °C"
+    three = Three(*([each / unit.size for each in values] for values in bias))
+    return Shown(name, Unit(f"{unit.name}/K", unit.size), three, combined=True)
+
+
+def _slopes(entry: OverTemperatureEntry) -> tuple[tuple[Sequence[float], Sequence[float]], ...]:
+    """Slopes of scale and of bias, with their U."""
+    stds = np.sqrt(np.diag(np.array(entry.covariance)).clip(min=0.0))
+    return tuple(
+        (cubic[1], (COVERAGE_FACTOR * stds[part]).tolist())
+        for cubic, part in ((entry.scale, SCALE_SLOPE), (entry.bias, BIAS_SLOPE))
+    )
+
+
+def _followed(found: Found[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
+    """The slopes at the reference; scale and bias there are those of the sensor's calibration."""
+    entry = found.entry
+    scale, bias = ((values, [each / COVERAGE_FACTOR for each in expanded]) for values, expanded in _slopes(entry))
+    rows = [
+        *parameters(SLOPES, *bias, None, f"{entry.unit}/K"),
+        *parameters(SCALE_SLOPES, *scale, None, "1/K"),
+    ]
+    return Followed(
+        found.sensor,
+        f"{found.quantity} over temperature",
+        entry.part,
+        entry.serial_number,
+        entry.full_scale or 0.0,
+        "polynomials",
+        entry.reference_c,
+        known(rows),
+    )
+
+
+def _measured(found: Found[OverTemperatureEntry], _: object) -> Measured:
+    entry, of = found.entry, found.quantity
+    name, results = f"{found.sensor}, {of.sensor}, over temperature", dcc_results.over_temperature(entry)
+    return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
+
+
+OVER_TEMPERATURE = ResultKind(
+    name="over temperature",
+    key="over_temperature",
+    entries=_entries,
+    found=_found,
+    printed=_printed,
+    shown=_shown,
+    followed=_followed,
+    header=temperature_lines,
+    figures="rig.report.temperature_figures:write_temperature_figures",
+    block="over_temperature.html.j2:over_temperature",
+    measured=_measured,
+)

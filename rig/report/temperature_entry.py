@@ -1,0 +1,51 @@
+"""A calibration over temperature as `result.json` has it."""
+
+import numpy as np
+
+from rig.data.motion_file import Item
+from rig.data.quantity import RATE, Quantity
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureLineEntry
+from rig.estimation.over_temperature import COEFFICIENTS, OverTemperature, powers_at
+from rig.report.entry import counted, entry
+
+ROWS = 17  # of the table: each fourth stands on a certificate
+
+
+def temperature_entry(
+    quantity: Quantity, found: OverTemperature, sensor: RecordedSensor | Item
+) -> OverTemperatureEntry:
+    """The polynomials of that sensor, in SI units; of a gyroscope b = −c, which g = K (m + b) adds."""
+    sign = -1.0 if quantity == RATE else 1.0
+    signs = np.repeat([1.0, sign], COEFFICIENTS // 2)
+    at = powers_at(0.0)
+    return entry(
+        OverTemperatureEntry, found,
+        part=sensor.part,
+        serial_number=sensor.serial_number,
+        full_scale=None if isinstance(sensor, Item) else sensor.channel(quantity).range,
+        unit=quantity.unit,
+        bias=sign * found.bias,
+        covariance=np.outer(signs, signs) * found.covariance,
+        contributors=[
+            entry(TemperatureLineEntry, line,
+                  freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
+                  std=np.sqrt(np.diag(at @ line.covariance @ at.T).clip(min=0.0)))
+            for line in found.lines
+        ],
+        table=[_row(found, temperature_c, sign) for temperature_c in np.linspace(*found.range_c, ROWS).tolist()],
+        hysteresis=None if found.hysteresis is None else found.hysteresis[0] * np.repeat([1.0, sign], 3),
+        hysteresis_std=None if found.hysteresis is None else found.hysteresis[1],
+    )  # fmt: skip
+
+
+def _row(found: OverTemperature, temperature_c: float, sign: float) -> AtTemperatureEntry:
+    held = found.at(temperature_c)
+    return entry(
+        AtTemperatureEntry,
+        temperature_c=temperature_c,
+        scale=held.values[:3],
+        bias=sign * held.values[3:],
+        expanded_scale=held.expanded[:3],
+        expanded_bias=held.expanded[3:],
+    )
