@@ -24,7 +24,7 @@ from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import METHODS
 
 IMAGE = Path(__file__).parent / "firmware" / "image"
-FLASH_LIMIT_BYTES = 32 * 1024
+FLASH_LIMIT_BYTES = 40 * 1024  # of the 224 KB that the image may use
 RAM_LIMIT_BYTES = 40 * 1024  # of the 48 KB that the image may use
 RANGE_G = 8.0  # which every gyroscope's accelerometer has
 RAM = range(0x2000_0000, 0x2000_C000)

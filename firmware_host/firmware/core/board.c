@@ -5,6 +5,7 @@
 #include "acquisition.h"
 #include "calibrating.h"
 #include "clock.h"
+#include "hand.h"
 #include "link.h"
 #include "port.h"
 #include "reply.h"
@@ -25,6 +26,7 @@ void board_reset(void)
     link_reset();
     acquisition_reset();
     calibrating_reset();
+    hand_reset();
     sensors_reset();
     setups_reset();
     last_beacon_us = clock_now();
@@ -74,6 +76,7 @@ static void on_configure(const struct frame *request)
     struct setup_payload setup = *setups_of(wanted.sensor);
     acquisition_set_rate(wanted.sensor, setup.rate_hz);
     calibrating_forget(wanted.sensor);
+    hand_forget(wanted.sensor);
     if (error) {
         reply_refused(request, error, wanted.sensor);
         return;
@@ -171,6 +174,9 @@ static const struct {
     {MESSAGE_READ_CALIBRATION, sizeof(struct read_calibration_payload), stored_on_read},
     {MESSAGE_WRITE_CALIBRATION, sizeof(struct write_calibration_payload), stored_on_write},
     {MESSAGE_ERASE_CALIBRATION, sizeof(struct erase_calibration_payload), stored_on_erase},
+    {MESSAGE_BY_HAND, sizeof(struct by_hand_payload), hand_on_begin},
+    {MESSAGE_HAND_STATUS, 0, hand_on_status},
+    {MESSAGE_HAND_SOLVE, 0, hand_on_solve},
 };
 
 static void answer(const struct frame *request)
