@@ -10,7 +10,7 @@ from firmware_host.frames import Frame
 
 @dataclass(frozen=True, slots=True)
 class HandReport:
-    """A `hand_report`: how it goes, and the move that was judged last, by board times in microseconds.
+    """A `hand_report`: how a session goes, and the move that was judged last, by board times in microseconds.
 
     `state` is one of `protocol.HAND_STATES`, `outcome` of `protocol.HAND_OUTCOMES`; `before` and `after` are faces of
     `protocol.HAND_FACES`, None on none. Of the rest before it, what was used begins at `rest_us` and ends where the

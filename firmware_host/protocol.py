@@ -414,7 +414,7 @@ MESSAGES = (
             Field("state", "u8", "enum hand_state"),
             Field("outcome", "u8", "enum hand_outcome, of the move judged last"),
             Field("before", "u8", "face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none"),
-            Field("after", "u8", "face it ended on"),
+            Field("after", "u8", "face it ended on; before any move, the one it lay on at first"),
             Field("whole", "u8", "1 = whole turns on a face, which count as closed"),
             Field("settled", "u8", "1 = what was known after it is what the equations are linear about from then on"),
             Field("judged", "u16", "moves judged so far"),

@@ -5,7 +5,7 @@ moves there are is the board's word. So what differs is the board's arithmetic a
 another matter: that is its stated uncertainty, and a verification.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,26 +22,33 @@ BIAS_LIMIT_RAD_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
+class BoardReadings:
+    """Readings (n, 3), rad/s, at times (n,) of the board's counter, with their numbers (n,).
+
+    `microsecond_s` is what the counter's microsecond lasts.
+    """
+
+    times_us: NDArray[np.integer]
+    sequence: NDArray[np.integer]
+    rates: Array
+    microsecond_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class HandAgreement:
-    """The same in double precision, and the largest difference of the matrix, and of the bias, from the board's."""
+    """A solution in double precision, and the largest difference of the board's matrix, and bias, from it."""
 
     host: BoardsSolution
     matrix_difference: float
     bias_difference_rad_s: float
 
 
-def hand_agreement(
-    times_us: NDArray[np.integer],
-    sequence: NDArray[np.integer],
-    rates: Array,
-    reports: Sequence[HandReport],
-    solved: HandSolved,
-) -> HandAgreement:
-    """The board's solution against the same readings (n, 3), rad/s, with their board times and numbers (n,).
+def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solved: HandSolved) -> HandAgreement:
+    """The board's solution against the same readings.
 
     Raises Fault `board_unverified` where readings or reports are missing, `board_disagrees` beyond the limits.
     """
-    host = solve_as_the_board(_moves(times_us, sequence, rates, reports))
+    host = solve_as_the_board(tuple(_moves(readings, reports)))
     if (taken := sum(each.outcome == "taken" for each in reports)) != solved.taken:
         raise _unverified(f"it has taken {solved.taken} moves, of which {taken} were seen here")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
@@ -56,36 +63,36 @@ def hand_agreement(
     return HandAgreement(host, matrix, bias)
 
 
-def _moves(
-    times_us: NDArray[np.integer], sequence: NDArray[np.integer], rates: Array, reports: Sequence[HandReport]
-) -> list[TakenMove]:
-    found, before_counts = [], False
+def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[TakenMove]:
+    counted = False  # whether the rest before is in the solution
     for report in reports:
-        if report.outcome == "taken":
-            found.append(_move(times_us, sequence, rates, report, follows=before_counts))
-        before_counts = report.outcome == "taken"
-    return found
+        taken = report.outcome == "taken"
+        if taken:
+            yield _move(readings, report, follows=counted)
+        counted = taken
 
 
-def _move(
-    times_us: NDArray[np.integer], sequence: NDArray[np.integer], rates: Array, report: HandReport, *, follows: bool
-) -> TakenMove:
+def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> TakenMove:
     assert report.before is not None and report.after is not None, "taken moves are between faces"
-    marks = [report.rest_us, report.move_us, report.after_us, report.end_us]
+    times_us, rates, marks = readings.times_us, readings.rates, _marks(report)
     first, begin, end, last = np.searchsorted(times_us, marks).tolist()
-    whole = begin > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
-    if not whole or (np.diff(sequence[begin - 1 : end]) != 1).any() or (np.diff(sequence[first:last]) != 1).any():
+    there = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
+    if not there or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
         raise _unverified(f"readings of its move from {report.before} to {report.after} did not arrive here")
     return TakenMove(
         before=OnFace(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
         after=OnFace(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
         rates=rates[begin:end],
-        steps_s=1e-6 * np.diff(times_us[begin - 1 : end]),
+        steps_s=readings.microsecond_s * np.diff(times_us[begin - 1 : end]),
         noise_rad_s=report.noise_rad_s,
         whole=report.whole,
         follows=follows,
         settled=report.settled,
     )
+
+
+def _marks(report: HandReport) -> list[int]:
+    return [report.rest_us, report.move_us, report.after_us, report.end_us]
 
 
 def _unverified(what: str) -> Fault:

@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_host.frames import Frame
 from firmware_host.hand_answers import HandReport, HandSolved
-from rig.analysis.hand_on_board import HandAgreement, hand_agreement
+from rig.analysis.hand_on_board import BoardReadings, HandAgreement, hand_agreement
 from rig.estimation.arrays import Array
 from support.handled_body import Recorded
 from support.host_board import HostBoard, configured
@@ -43,7 +43,12 @@ class Played:
 
     @property
     def agreement(self) -> HandAgreement:
-        return hand_agreement(self.times_us, np.arange(len(self.times_us)), self.rates, self.reports, self.solved)
+        return hand_agreement(self.readings, self.reports, self.solved)
+
+    @property
+    def readings(self) -> BoardReadings:
+        """What the host would have received."""
+        return BoardReadings(self.times_us, np.arange(len(self.times_us)), self.rates, 1e-6)
 
 
 def begun(rate_hz: float = 119.0, moves: int = 12, scale_std: float = 1e-3) -> tuple[HostBoard, dict[str, Any]]:

@@ -5,6 +5,7 @@
 #include "clock.h"
 #include "hand_solver.h"
 #include "link.h"
+#include "port.h"
 #include "reply.h"
 #include "sensors.h"
 #include "setups.h"
@@ -23,6 +24,7 @@
 #define WHOLE_RAD 3.1415927f  /* turned further on its face, it is meant to be a whole turn */
 #define REFUSED_IN_A_ROW 10u  /* and the session ends: something else is wrong */
 #define NO_FACE 255u
+#define CRYSTALS_US (1e-6f * 4e6f / (122.0f * 32768.0f)) /* the clock that follows the crystal makes 122 of 4 MHz */
 
 /* Sums of readings, in counts. */
 struct block {
@@ -45,7 +47,7 @@ struct rest {
 /* Of two rests that follow each other; what is between them is the move. */
 static struct {
     uint8_t sensor, state, wanted, taken, refused;
-    float wanted_std, scale_std, sensitivity, noise_rad_s, first_rad_s[3];
+    float wanted_std, scale_std, sensitivity, microsecond_s, noise_rad_s, first_rad_s[3];
     int32_t end_of_range;
     uint32_t per_block, sequence;
     uint64_t last_us, judged_us;
@@ -84,6 +86,9 @@ void hand_begin(uint8_t sensor, uint8_t moves, float scale_std)
     hand.wanted = moves;
     hand.wanted_std = scale_std;
     hand.sensitivity = (float)setup->sensitivity_rad_s;
+    struct port_health health;
+    port_health(&health);
+    hand.microsecond_s = health.clock_locked ? CRYSTALS_US : 1e-6f;
     float range = 0.995f * (float)setup->range_deg_s * 0.017453293f / hand.sensitivity;
     hand.end_of_range = range < 32767.0f ? (int32_t)range : INT16_MAX;
     uint32_t per_block = (uint32_t)(BLOCK_S * (float)setup->rate_hz);
@@ -210,7 +215,6 @@ static void judge(struct rest *after)
     uint8_t outcome = outcome_of(after);
     report->outcome = outcome;
     report->before = hand.before.face;
-    report->after = after->face;
     report->judged++;
     report->angle_rad = hand.ended.path_rad;
     report->noise_rad_s = hand.noise_rad_s;
@@ -233,7 +237,7 @@ static void settled(void)
         rest_mean(after, hand.first_rad_s);
     if (first || noise_rad_s < hand.noise_rad_s)
         hand.noise_rad_s = noise_rad_s;
-    after->face = face_of(after);
+    after->face = hand.report.after = face_of(after);
     if (!first)
         judge(after);
     hand.before = *after;
@@ -307,7 +311,7 @@ static void block_ended(void)
 static void take(uint64_t time_us, const struct reading *reading)
 {
     struct block *block = &hand.block;
-    float rate[3], dt_s = (float)(time_us - hand.last_us) * 1e-6f;
+    float rate[3], dt_s = (float)(time_us - hand.last_us) * hand.microsecond_s;
     if (block->samples == 0)
         block->start_us = time_us;
     for (unsigned axis = 0; axis < 3; axis++) {

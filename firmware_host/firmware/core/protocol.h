@@ -402,7 +402,7 @@ struct hand_report_payload {
     uint8_t state; /* enum hand_state */
     uint8_t outcome; /* enum hand_outcome, of the move judged last */
     uint8_t before; /* face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none */
-    uint8_t after; /* face it ended on */
+    uint8_t after; /* face it ended on; before any move, the one it lay on at first */
     uint8_t whole; /* 1 = whole turns on a face, which count as closed */
     uint8_t settled; /* 1 = what was known after it is what the equations are linear about from then on */
     uint16_t judged; /* moves judged so far */

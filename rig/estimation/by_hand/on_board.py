@@ -153,7 +153,7 @@ def _of_move(centre: Array, move: TakenMove) -> Iterator[Equation]:
 
 
 def _attitudes(steps: Array) -> tuple[Array, Array]:
-    """After rotation vectors (n, 3): the attitude (3, 3), and those (n, 3, 3) in the middle of each."""
+    """The attitude (3, 3) after rotation vectors (n, 3), and those (n, 3, 3) in the middle of each."""
     from scipy.spatial.transform import Rotation
 
     halves = np.asarray(Rotation.from_rotvec(steps / 2).as_matrix(), dtype=np.float64)

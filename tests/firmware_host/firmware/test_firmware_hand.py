@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from firmware_host.hand_answers import HandReport
-from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, hand_agreement
+from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
 from rig.errors import Fault
 from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
 from support.hand_on_board import Played, asked, begun, give, in_counts, play
@@ -147,17 +147,16 @@ def test_a_box_that_is_held_askew_in_the_hand_is_asked_again() -> None:
 
 def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) -> None:
     kept = np.arange(len(played.times_us)) != np.searchsorted(played.times_us, played.reports[2].move_us + 500_000)
+    gappy = BoardReadings(played.times_us[kept], np.flatnonzero(kept), played.rates[kept], 1e-6)
     with pytest.raises(Fault, match="did not arrive") as missing:
-        hand_agreement(played.times_us[kept], np.flatnonzero(kept), played.rates[kept], played.reports, played.solved)
+        hand_agreement(gappy, played.reports, played.solved)
     assert missing.value.name == "board_unverified"
     with pytest.raises(Fault, match="taken 12 moves, of which 11 were seen"):
-        hand_agreement(
-            played.times_us, np.arange(len(played.times_us)), played.rates, played.reports[1:], played.solved
-        )
+        hand_agreement(played.readings, played.reports[1:], played.solved)
     (mxx, mxy, mxz), second, third = played.solved.matrix
     wrong = replace(played.solved, matrix=((mxx * 1.00003, mxy, mxz), second, third))
     with pytest.raises(Fault) as differs:
-        hand_agreement(played.times_us, np.arange(len(played.times_us)), played.rates, played.reports, wrong)
+        hand_agreement(played.readings, played.reports, wrong)
     assert differs.value.name == "board_disagrees"
 
 
