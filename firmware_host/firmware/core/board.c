@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "acquisition.h"
+#include "alone.h"
 #include "calibrating.h"
 #include "clock.h"
 #include "hand.h"
@@ -29,6 +30,7 @@ void board_reset(void)
     hand_reset();
     sensors_reset();
     setups_reset();
+    alone_reset();
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
@@ -209,6 +211,7 @@ void board_run(void)
     while (link_receive(&request))
         answer(&request);
     acquisition_run();
+    alone_run();
     if (stop_to_acknowledge != 0 && acquisition_is_empty() && link_has_room()) {
         reply_done(stop_to_acknowledge);
         stop_to_acknowledge = 0;

@@ -195,3 +195,72 @@ def test_the_lamp_tells_rest_taken_again_and_done() -> None:
     assert all(lit["settled"])
     assert 0.2 < np.mean(lit["resting"]) < 0.8
     assert 0.05 < np.mean(lit["done"]) < 0.2
+
+
+# Without a computer: the button
+
+
+def pressed(board: HostBoard, begin_us: int, lasts_us: int) -> None:
+    """The button is down for so long, while the main loop runs."""
+    board.core.host_press(True)
+    for time_us in range(begin_us, begin_us + lasts_us, 5_000):
+        board.set_time(time_us)
+        board.run()
+    board.core.host_press(False)
+    board.run()
+
+
+def alone(*, locked: bool = True) -> HostBoard:
+    """A board that nobody has asked for anything."""
+    board = HostBoard()
+    board.core.host_lock_clock(locked)
+    return board
+
+
+def state_of(board: HostBoard) -> str:
+    return HandReport.of(asked(board, "hand_status")).state
+
+
+def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None:
+    board = alone()
+    pressed(board, 0, 20_000)
+    assert state_of(board) == "idle", "it only rattled"
+    pressed(board, 100_000, 60_000)
+    assert state_of(board) == "starting"
+    assert asked(board, "status").values["streaming"] == 1
+    recorded = twelve()
+    setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}
+    times_us, counts, forces = in_counts(recorded, setup)
+    for number, (time_us, rate, force) in enumerate(zip(times_us.tolist(), counts, forces, strict=True)):
+        give(board, 200_000 + time_us, number, rate, force)
+    assert state_of(board) == "done"
+
+
+def test_the_button_begins_anew_with_the_sensor_that_streams_accelerations_already() -> None:
+    board, _ = begun()
+    board.core.host_lock_clock(True)
+    assert [frame.name for frame in board.ask("start", 2, sensors=0)] == ["ack"]
+    recorded = twelve()
+    times_us, counts, forces = in_counts(
+        recorded, {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.0012}
+    )
+    for number, (time_us, rate, force) in enumerate(zip(times_us[:400].tolist(), counts, forces, strict=False)):
+        give(board, time_us, number, rate, force)
+    assert state_of(board) in ("resting", "moving")
+    assert board.core.host_lamp() == (state_of(board) == "resting")
+    for number in range(400, 430):  # it moves, so the lamp is dark
+        give(board, 4_000_000 + 8_403 * number, number, np.array([9000, 0, 0]), forces[0])
+    assert state_of(board) == "moving"
+    pressed(board, 8_000_000, 60_000)
+    assert state_of(board) == "starting"
+
+
+def test_no_button_changes_a_stream_without_accelerations_or_begins_by_a_clock_without_its_crystal() -> None:
+    board = alone()
+    configured(board, 0, 119.0, 500.0)
+    board.ask("start", 2, sensors=0)
+    pressed(board, 0, 60_000)
+    assert state_of(board) == "idle"
+    board = alone(locked=False)
+    pressed(board, 0, 60_000)
+    assert state_of(board) == "idle"
