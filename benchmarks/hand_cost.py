@@ -52,7 +52,7 @@ def main() -> int:
         np.round(each / per).astype(np.int16)
         for each, per in ((noisy, PER_RAD_S), (felt.specific_force_m_s2, PER_M_S2))
     )
-    setup = dict.fromkeys((field.name for field in MESSAGE_BY_NAME["setup"].fields), 0)
+    setup: dict[str, float] = dict.fromkeys((field.name for field in MESSAGE_BY_NAME["setup"].fields), 0)
     setup |= {"rate_hz": RATE_HZ, "range_deg_s": 500.0, "sensitivity_rad_s": PER_RAD_S, "range_m_s2": 40.0}
     costs: list[Cost] = []
     with tempfile.TemporaryDirectory() as folder:

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from firmware_host.emulator.gpio import Port
 from firmware_host.hand_answers import HandReport
 from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
 from rig.errors import Fault
 from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
+from support.emulated_session import Session
 from support.hand_on_board import Played, asked, begun, give, in_counts, play
 from support.handled_body import LSM9DS1, TWELVE, Recorded, handle
 from support.host_board import HostBoard, configured, core, error_of
@@ -17,6 +19,7 @@ from support.host_board import HostBoard, configured, core, error_of
 pytestmark = pytest.mark.slow
 
 REST_S = 1.6
+BUTTON = 6  # of port B
 SIXTEEN: tuple[Action, ...] = (*TWELVE, Turn(1), Turn(-1), Flip("+x"), Turn(1))
 
 
@@ -264,3 +267,18 @@ def test_no_button_changes_a_stream_without_accelerations_or_begins_by_a_clock_w
     board = alone(locked=False)
     pressed(board, 0, 60_000)
     assert state_of(board) == "idle"
+
+
+def test_the_button_of_the_shipped_image_lights_the_lamp_at_the_first_rest() -> None:
+    session = Session(rate_at=lambda _time_s: (0.0, 0.0, 0.0), noise_rad_s=0.002)
+    (port,) = (each for each in session.board.peripherals if isinstance(each, Port) and each.name == "GPIOB")
+    session.run(2.5)  # until the crystal swings
+    port.drive(BUTTON, high=True)
+    session.run(0.1)
+    port.drive(BUTTON, high=False)
+    assert session.ask("status").values["streaming"] == 1
+    assert HandReport.of(session.ask("hand_status")).state == "starting"
+    assert port.is_input(BUTTON)
+    session.run(1.8)
+    assert HandReport.of(session.ask("hand_status")).state == "resting"
+    assert not port.is_input(BUTTON), "the lamp is lit"
