@@ -394,8 +394,7 @@ MESSAGES = (
         0x30,
         "by_hand",
         "host",
-        "begin anew to calibrate a configured sensor that is turned by hand, from its readings with accelerations; "
-        "answered by ack",
+        "begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack",
         (
             SENSOR,
             Field("moves", "u8", "it is done when so many moves are taken, at least"),

@@ -386,7 +386,7 @@ struct field_samples_item {
 } __attribute__((packed));
 _Static_assert(sizeof(struct field_samples_item) == 10, "field_samples_item");
 
-/* by_hand, from the host: begin anew to calibrate a configured sensor that is turned by hand, from its readings with accelerations; answered by ack */
+/* by_hand, from the host: begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack */
 struct by_hand_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t moves; /* it is done when so many moves are taken, at least */
