@@ -22,6 +22,7 @@ from firmware_host.answers import (
 )
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame
+from firmware_host.hand_answers import HandReport, HandSolved
 from firmware_host.link import BoardLink
 
 __all__ = [
@@ -124,6 +125,21 @@ class Board:
     def solve(self, sensor: int, method: str = "closed_form") -> BoardSolution:
         """Lets the board calibrate a sensor from its observations by one of `protocol.METHODS`."""
         return BoardSolution.of(self._ask("solve", {"sensor": sensor, "method": protocol.METHODS.index(method)}))
+
+    def begin_by_hand(self, sensor: int, moves: int, scale_std: float) -> None:
+        """Lets the board calibrate a sensor, set up with accelerations, that a hand turns while it streams.
+
+        It is done after so many `moves` (1 to 255), at least, and when the scale's standard uncertainty is no larger.
+        """
+        self._ask("by_hand", {"sensor": sensor, "moves": moves, "scale_std": scale_std})
+
+    def hand_report(self) -> HandReport:
+        """How the calibration by hand goes."""
+        return HandReport.of(self._ask("hand_status"))
+
+    def hand_solution(self) -> HandSolved:
+        """What the calibration by hand has found so far."""
+        return HandSolved.of(self._ask("hand_solve"))
 
     def read_calibration(self, sensor: int) -> StoredCalibration | None:
         """The calibration stored on the board for a sensor; None when there is none."""

@@ -22,7 +22,7 @@ import numpy as np
 from firmware_host.problem import Problem
 
 PROTOCOL_VERSION = 5
-FIRMWARE_VERSION = "0.7.0"  # of the shipped image
+FIRMWARE_VERSION = "0.8.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -44,6 +44,10 @@ RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
 MODELS = ("none", "k_times_m_plus_b", "matrix_times_m_plus_b")
 METHODS = ("closed_form", "algorithm_1")
 SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
+# Of a session by hand, and what became of the last move.
+HAND_STATES = ("idle", "starting", "moving", "resting", "done", "failed")
+HAND_OUTCOMES = ("nothing", "taken", "clipped", "lost", "no_face", "contradicts")
+HAND_FACES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the sensor's axis that points upwards
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
     "reset_cause": ("RESET", RESET_CAUSES),
     "sample_mode": ("MODE", MODES),
@@ -51,6 +55,8 @@ ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 
     "calibration_model": ("MODEL", MODELS),
     "solve_method": ("METHOD", METHODS),
     "solution_status": ("SOLUTION", SOLUTION_STATUSES),
+    "hand_state": ("HAND", HAND_STATES),
+    "hand_outcome": ("MOVE", HAND_OUTCOMES),
 }
 
 # kind → (struct code, C type, C array suffix)
@@ -384,6 +390,59 @@ MESSAGES = (
         BATCH,
         (DELTA, Field("field", "vector_i16", "magnetic flux density: x, y, z as the part reports them, right-handed")),
     ),
+    Message(
+        0x30,
+        "by_hand",
+        "host",
+        "begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack",
+        (
+            SENSOR,
+            Field("moves", "u8", "it is done when so many moves are taken, at least"),
+            Field("scale_std", "f32", "and the scale's standard uncertainty is no larger"),
+        ),
+    ),
+    Message(0x31, "hand_status", "host", "how does the calibration by hand go? answered by hand_report"),
+    Message(
+        0x32,
+        "hand_report",
+        "board",
+        "how a calibration by hand goes, and the move judged last",
+        (
+            REPLY_TO,
+            SENSOR,
+            Field("state", "u8", "enum hand_state"),
+            Field("outcome", "u8", "enum hand_outcome, of the move judged last"),
+            Field("before", "u8", "face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none"),
+            Field("after", "u8", "face it ended on; before any move, the one it lay on at first"),
+            Field("whole", "u8", "1 = whole turns on a face, which count as closed"),
+            Field("settled", "u8", "1 = what was known after it is what the equations are linear about from then on"),
+            Field("judged", "u16", "moves judged so far"),
+            Field("taken", "u8", "of them taken"),
+            Field("angle_rad", "f32", "how far that move turned, there and back"),
+            Field("noise_rad_s", "f32", "standard deviation of a reading at rest, as it was weighed with"),
+            Field("scale_std", "f32", "largest standard uncertainty of a scale factor"),
+            Field("rest_us", "u64", "board time of the first sample of the rest before"),
+            Field("move_us", "u64", "of the first of the move, which is the first after that rest"),
+            Field("after_us", "u64", "of the first of the rest after, which is the first after the move"),
+            Field("end_us", "u64", "of the first after what was used of that rest"),
+        ),
+    ),
+    Message(0x33, "hand_solve", "host", "what has the calibration by hand found? answered by hand_solution"),
+    Message(
+        0x34,
+        "hand_solution",
+        "board",
+        "a calibration g = C (m + b) by hand in single precision, m counted from the g-sensitivity's part",
+        (
+            REPLY_TO,
+            SENSOR,
+            Field("state", "u8", "enum hand_state"),
+            Field("taken", "u8", "moves it is made of"),
+            Field("matrix", "matrix_f32", "C, row by row"),
+            Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
+            Field("g_sensitivity_rad_s", "matrix_f32", "of a reading, rad/s per g of specific force, row by row"),
+        ),
+    ),
 )
 
 
@@ -425,6 +484,8 @@ ANSWERS = {
     "recall": "observed",
     "solve": "solution",
     "read_calibration": "calibration",
+    "hand_status": "hand_report",
+    "hand_solve": "hand_solution",
 }
 SAMPLES = ("samples", "imu_samples", "field_samples", "rates")  # the messages of a stream
 MESSAGE_BY_CODE = {message.code: message for message in MESSAGES}

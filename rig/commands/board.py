@@ -19,6 +19,9 @@ def add(board: ArgumentParser) -> None:
     info = added(commands, "info", "what the board is, how it fares, which sensors and calibrations it has")
     add_config(info)
     add_json(info)
+    from rig.commands.hand_on_board import add_arguments
+
+    add_arguments(added(commands, "hand", "let the board itself calibrate a gyroscope that is turned by hand"))
     text = "the calibrations in the board's flash"
     stored = commands.add_parser("calibration", help=text, description=text).add_subparsers(
         title="commands", required=True, metavar="COMMAND"
@@ -47,6 +50,10 @@ def run(options: Namespace) -> int:
         from rig.commands.flash import flash
 
         return flash(options)
+    if options.of_board == "hand":
+        from rig.commands.hand_on_board import hand
+
+        return hand(options)
     from rig.commands import board_commands as board
 
     commands = {"info": board.info, "read": board.read, "write": board.write, "erase": board.erase}

@@ -68,6 +68,8 @@ class HostBoard:
         self.core.host_connect(*self._callbacks)
         self.core.host_watch_lines(self._line_callback)
         self.core.host_flash_clear()
+        self.core.host_press(False)
+        self.core.host_lock_clock(False)
         self.set_time(0)
         self.core.board_reset()
 

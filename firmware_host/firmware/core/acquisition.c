@@ -4,6 +4,7 @@
 
 #include "batch.h"
 #include "clock.h"
+#include "hand.h"
 #include "kept.h"
 #include "link.h"
 #include "port.h"
@@ -240,8 +241,10 @@ static void acquire(unsigned sensor)
     stream->conversions += conversions;
     stream->dropped += conversions - 1;
     bool good = result == READ_FRESH && !stream->overtaken;
-    if (good)
+    if (good) {
         kept_add(sensor, time_us, reading.counts);
+        hand_add(sensor, time_us, stream->conversions, &reading);
+    }
     bool full = stream->written - stream->read == stream->ring_size;
     if (!good || full) {
         stream->dropped++;

@@ -3,8 +3,10 @@
 #include <string.h>
 
 #include "acquisition.h"
+#include "alone.h"
 #include "calibrating.h"
 #include "clock.h"
+#include "hand.h"
 #include "link.h"
 #include "port.h"
 #include "reply.h"
@@ -25,8 +27,10 @@ void board_reset(void)
     link_reset();
     acquisition_reset();
     calibrating_reset();
+    hand_reset();
     sensors_reset();
     setups_reset();
+    alone_reset();
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
@@ -74,6 +78,7 @@ static void on_configure(const struct frame *request)
     struct setup_payload setup = *setups_of(wanted.sensor);
     acquisition_set_rate(wanted.sensor, setup.rate_hz);
     calibrating_forget(wanted.sensor);
+    hand_forget(wanted.sensor);
     if (error) {
         reply_refused(request, error, wanted.sensor);
         return;
@@ -171,6 +176,9 @@ static const struct {
     {MESSAGE_READ_CALIBRATION, sizeof(struct read_calibration_payload), stored_on_read},
     {MESSAGE_WRITE_CALIBRATION, sizeof(struct write_calibration_payload), stored_on_write},
     {MESSAGE_ERASE_CALIBRATION, sizeof(struct erase_calibration_payload), stored_on_erase},
+    {MESSAGE_BY_HAND, sizeof(struct by_hand_payload), hand_on_begin},
+    {MESSAGE_HAND_STATUS, 0, hand_on_status},
+    {MESSAGE_HAND_SOLVE, 0, hand_on_solve},
 };
 
 static void answer(const struct frame *request)
@@ -203,6 +211,7 @@ void board_run(void)
     while (link_receive(&request))
         answer(&request);
     acquisition_run();
+    alone_run();
     if (stop_to_acknowledge != 0 && acquisition_is_empty() && link_has_room()) {
         reply_done(stop_to_acknowledge);
         stop_to_acknowledge = 0;

@@ -22,6 +22,10 @@ void port_listen(uint8_t mask);
 /* Whether a sensor's data-ready line is up now. */
 bool port_line_is_high(unsigned sensor);
 
+/* A lamp, and a button on the same wire: while the lamp is lit nobody can tell whether the button is down. */
+void port_set_lamp(bool lit);
+bool port_button_is_down(void);
+
 /* Starts sending; the bytes stay untouched until the port calls link_sent(). */
 void port_transmit(const uint8_t *bytes, size_t size);
 

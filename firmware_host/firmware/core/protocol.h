@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 5u
-#define FIRMWARE_VERSION "0.7.0"
+#define FIRMWARE_VERSION "0.8.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
@@ -40,6 +40,11 @@ enum message_type {
     MESSAGE_RECALL = 23,
     MESSAGE_IMU_SAMPLES = 24,
     MESSAGE_FIELD_SAMPLES = 25,
+    MESSAGE_BY_HAND = 48,
+    MESSAGE_HAND_STATUS = 49,
+    MESSAGE_HAND_REPORT = 50,
+    MESSAGE_HAND_SOLVE = 51,
+    MESSAGE_HAND_SOLUTION = 52,
 };
 
 enum error_code {
@@ -100,6 +105,24 @@ enum solution_status {
     SOLUTION_TOO_FEW_OBSERVATIONS = 1,
     SOLUTION_DEGENERATE = 2,
     SOLUTION_NOT_CONVERGED = 3,
+};
+
+enum hand_state {
+    HAND_IDLE = 0,
+    HAND_STARTING = 1,
+    HAND_MOVING = 2,
+    HAND_RESTING = 3,
+    HAND_DONE = 4,
+    HAND_FAILED = 5,
+};
+
+enum hand_outcome {
+    MOVE_NOTHING = 0,
+    MOVE_TAKEN = 1,
+    MOVE_CLIPPED = 2,
+    MOVE_LOST = 3,
+    MOVE_NO_FACE = 4,
+    MOVE_CONTRADICTS = 5,
 };
 
 /* hello, from the host: who is there? answered by identity */
@@ -362,5 +385,49 @@ struct field_samples_item {
     int16_t field[3]; /* magnetic flux density: x, y, z as the part reports them, right-handed */
 } __attribute__((packed));
 _Static_assert(sizeof(struct field_samples_item) == 10, "field_samples_item");
+
+/* by_hand, from the host: begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack */
+struct by_hand_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t moves; /* it is done when so many moves are taken, at least */
+    float scale_std; /* and the scale's standard uncertainty is no larger */
+} __attribute__((packed));
+_Static_assert(sizeof(struct by_hand_payload) == 6, "by_hand_payload");
+
+/* hand_status, from the host: how does the calibration by hand go? answered by hand_report */
+/* hand_report, from the board: how a calibration by hand goes, and the move judged last */
+struct hand_report_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t state; /* enum hand_state */
+    uint8_t outcome; /* enum hand_outcome, of the move judged last */
+    uint8_t before; /* face it began on: 0 to 5 are +x -x +y -y +z -z upwards, 255 none */
+    uint8_t after; /* face it ended on; before any move, the one it lay on at first */
+    uint8_t whole; /* 1 = whole turns on a face, which count as closed */
+    uint8_t settled; /* 1 = what was known after it is what the equations are linear about from then on */
+    uint16_t judged; /* moves judged so far */
+    uint8_t taken; /* of them taken */
+    float angle_rad; /* how far that move turned, there and back */
+    float noise_rad_s; /* standard deviation of a reading at rest, as it was weighed with */
+    float scale_std; /* largest standard uncertainty of a scale factor */
+    uint64_t rest_us; /* board time of the first sample of the rest before */
+    uint64_t move_us; /* of the first of the move, which is the first after that rest */
+    uint64_t after_us; /* of the first of the rest after, which is the first after the move */
+    uint64_t end_us; /* of the first after what was used of that rest */
+} __attribute__((packed));
+_Static_assert(sizeof(struct hand_report_payload) == 55, "hand_report_payload");
+
+/* hand_solve, from the host: what has the calibration by hand found? answered by hand_solution */
+/* hand_solution, from the board: a calibration g = C (m + b) by hand in single precision, m counted from the g-sensitivity's part */
+struct hand_solution_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t state; /* enum hand_state */
+    uint8_t taken; /* moves it is made of */
+    float matrix[3][3]; /* C, row by row */
+    float bias_rad_s[3]; /* b, in the units of the reading */
+    float g_sensitivity_rad_s[3][3]; /* of a reading, rad/s per g of specific force, row by row */
+} __attribute__((packed));
+_Static_assert(sizeof(struct hand_solution_payload) == 88, "hand_solution_payload");
 
 #endif

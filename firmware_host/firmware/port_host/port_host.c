@@ -15,11 +15,15 @@ static transmit_function on_transmit;
 static restart_function on_restart;
 static line_function on_line;
 static uint32_t time_us;
+static bool button_is_down, lamp_is_lit, clock_is_locked;
 static const uint8_t unique_id[12] = {0x01, 0x23, 0x45, 0x67, 0x89, 0xAB, 0xCD, 0xEF, 0x01, 0x23, 0x45, 0x67};
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart);
 void host_watch_lines(line_function line);
 void host_set_time_us(uint32_t now_us);
+void host_press(bool down);
+bool host_lamp(void);
+void host_lock_clock(bool locked);
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart)
 {
@@ -37,6 +41,32 @@ void host_watch_lines(line_function line)
 void host_set_time_us(uint32_t now_us)
 {
     time_us = now_us;
+}
+
+void host_press(bool down)
+{
+    button_is_down = down;
+}
+
+bool host_lamp(void)
+{
+    return lamp_is_lit;
+}
+
+void host_lock_clock(bool locked)
+{
+    clock_is_locked = locked;
+}
+
+void port_set_lamp(bool lit)
+{
+    lamp_is_lit = lit;
+}
+
+/* The lamp's wire is high too. */
+bool port_button_is_down(void)
+{
+    return button_is_down || lamp_is_lit;
 }
 
 uint32_t port_time_us(void)
@@ -78,6 +108,7 @@ void port_health(struct port_health *health)
 {
     memset(health, 0, sizeof *health);
     health->reset_cause = RESET_POWER;
+    health->clock_locked = clock_is_locked;
 }
 
 const uint8_t *port_unique_id(void)

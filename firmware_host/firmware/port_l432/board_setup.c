@@ -65,6 +65,9 @@ static void setup_pins(void)
     GPIOB_OSPEEDR = (GPIOB_OSPEEDR & ~(PIN_MASK(3u) | PIN_MASK(5u))) | PER_PIN(3u, SPEED_MEDIUM) | PER_PIN(5u, SPEED_MEDIUM);
     GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) | PER_PIN(3u, PIN_ALTERNATE) |
                   PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
+
+    GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(LAMP_PIN)) | PER_PIN(LAMP_PIN, PULL_DOWN);
+    GPIOB_BSRR = 1u << LAMP_PIN; /* it is an output while the lamp is lit, and no other time */
     wiring_setup();
 }
 

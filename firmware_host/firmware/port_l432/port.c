@@ -7,6 +7,7 @@
 #include "board.h"
 #include "board_setup.h"
 #include "link.h"
+#include "pins.h"
 #include "registers.h"
 #include "sensors.h"
 #include "startup.h"
@@ -47,6 +48,19 @@ void port_listen(uint8_t mask)
 bool port_line_is_high(unsigned sensor)
 {
     return (*ready_lines[sensor].level & ready_lines[sensor].bit) != 0;
+}
+
+/* The wire is high when the lamp is to be lit, or when the button joins it with the supply; nothing ever drives it low. */
+void port_set_lamp(bool lit)
+{
+    uint32_t mode = PER_PIN(LAMP_PIN, lit ? PIN_OUTPUT : PIN_INPUT);
+    if ((GPIOB_MODER & PIN_MASK(LAMP_PIN)) != mode)
+        GPIOB_MODER = (GPIOB_MODER & ~PIN_MASK(LAMP_PIN)) | mode;
+}
+
+bool port_button_is_down(void)
+{
+    return (GPIOB_IDR & 1u << LAMP_PIN) != 0;
 }
 
 static void set_bus_clock(uint32_t max_hz)

@@ -1,0 +1,73 @@
+#include "alone.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "acquisition.h"
+#include "calibrating.h"
+#include "clock.h"
+#include "hand.h"
+#include "port.h"
+#include "sensors.h"
+#include "setups.h"
+
+#define PRESSED_US 30000u /* so long a button is down that does not only rattle */
+#define MOVES 12u
+#define SCALE_STD 1e-3f
+#define RATE_HZ 200.0f /* of a sensor that nobody has set up; the nearest it has */
+#define RANGE_DEG_S 500.0f
+#define RANGE_G 8.0f /* every part has it */
+#define NONE SENSOR_COUNT
+
+static uint64_t up_us; /* when the button was last seen up */
+static bool heard;     /* and has been down for long enough since */
+
+void alone_reset(void)
+{
+    up_us = clock_now();
+    heard = false;
+}
+
+/* The first gyroscope that streams its accelerations too; nobody's stream is changed. Where none runs, the first that is
+   there and can be set up. */
+static uint8_t gyroscope(void)
+{
+    for (uint8_t i = 0; i < GYROSCOPE_COUNT; i++) {
+        struct configure_payload wanted = {.sensor = i, .rate_hz = RATE_HZ, .range_deg_s = RANGE_DEG_S, .range_g = RANGE_G};
+        uint16_t who_am_i;
+        if (acquisition_is_running() ? setups_of(i)->range_m_s2 > 0.0
+                                     : sensors_identify(i, &who_am_i) == 0 && setups_configure(&wanted) == 0)
+            return i;
+    }
+    return NONE;
+}
+
+static void begin(void)
+{
+    struct correction corrections[SENSOR_COUNT];
+    struct port_health health;
+    port_health(&health);
+    uint8_t sensor = health.clock_locked ? gyroscope() : NONE; /* no reading shows that a clock without its crystal is wrong */
+    if (sensor == NONE)
+        return;
+    if (!acquisition_is_running()) {
+        acquisition_set_rate(sensor, setups_of(sensor)->rate_hz);
+        calibrating_forget(sensor);
+        acquisition_start(0, corrections);
+    }
+    hand_begin(sensor, MOVES, SCALE_STD);
+}
+
+void alone_run(void)
+{
+    uint64_t now_us = clock_now();
+    bool lit = hand_lamp(now_us);
+    port_set_lamp(lit);
+    if (lit || !port_button_is_down()) {
+        up_us = now_us;
+        heard = heard && lit; /* the lamp is on the button's wire */
+    } else if (!heard && now_us - up_us >= PRESSED_US) {
+        heard = true;
+        begin();
+    }
+}

@@ -1,0 +1,8 @@
+/* The board without a computer: a button begins a calibration by hand, and a lamp tells how it goes. */
+#ifndef ALONE_H
+#define ALONE_H
+
+void alone_reset(void);
+void alone_run(void);
+
+#endif

@@ -1,0 +1,401 @@
+#include "hand.h"
+
+#include <string.h>
+
+#include "clock.h"
+#include "hand_solver.h"
+#include "link.h"
+#include "port.h"
+#include "reply.h"
+#include "sensors.h"
+#include "setups.h"
+
+#define BLOCK_S 0.1f          /* readings are looked at in blocks */
+#define BLOCK_LEAST 4u        /* readings in one */
+#define REST_US 1000000u      /* so long a rest lasts at least */
+#define SETTLED_RAD_S 0.05f   /* no larger is the scatter of a rest, */
+#define NOISIER 4.0f          /* nor so many times the quietest one's, as squares, */
+#define TREMOR_RAD_S 0.002f   /* beyond this */
+#define WANDERS 5.0f          /* standard deviations of a block's mean; more, */
+#define WANDERS_RAD_S 0.0015f /* and this, and it has begun to move */
+#define TURNING_RAD_S 0.03f   /* from the first rest's mean; more is no bias that wandered, and no g-sensitivity */
+#define ON_FACE 0.97f         /* cosine squared of the reading's angle from an axis: 10 degrees */
+#define NUDGE_RAD 0.5f        /* so little on one face is no move */
+#define WHOLE_RAD 3.1415927f  /* turned further on its face, it is meant to be a whole turn */
+#define REFUSED_IN_A_ROW 10u  /* and the session ends: something else is wrong */
+#define NO_FACE 255u
+#define CRYSTALS_US (1e-6f * 4e6f / (122.0f * 32768.0f)) /* the clock that follows the crystal makes 122 of 4 MHz */
+
+/* Sums of readings, in counts. */
+struct block {
+    uint64_t start_us; /* of the first reading */
+    int32_t sums[3], acceleration[3];
+    int64_t squares; /* of all three axes */
+    uint32_t samples;
+    float lasts_s; /* from the reading before it to its last */
+};
+
+struct rest {
+    uint64_t start_us;
+    int64_t sums[3], acceleration[3];
+    uint32_t samples, blocks;
+    float variance; /* of a reading: the sum over its blocks */
+    uint8_t face;
+    bool counted; /* its mean is in the estimate */
+};
+
+/* Of two rests that follow each other; what is between them is the move. */
+static struct {
+    uint8_t sensor, state, wanted, taken, refused;
+    float wanted_std, scale_std, sensitivity, microsecond_s, noise_rad_s, first_rad_s[3];
+    int32_t end_of_range;
+    uint32_t per_block, sequence;
+    uint64_t last_us, judged_us;
+    bool begun, lies; /* readings have come; the block before was still */
+    bool lost, clipped; /* in the move */
+
+    struct block block, pending; /* `pending`: of a rest, but the move may already have begun in it */
+    struct rest before, now;     /* `now` has not lasted long enough yet */
+    uint64_t pending_since_us;   /* of the move that goes on, its first reading */
+    float level[3], bias[3], up[3];
+    struct motion motion, ended; /* `ended` as it was when the rest after it began */
+    struct estimate estimate;
+
+    struct hand_report_payload report; /* what is told of the move judged last */
+} hand;
+
+_Static_assert(sizeof hand <= 4096u, "a session by hand takes 4 KB of RAM at most");
+
+void hand_reset(void)
+{
+    memset(&hand, 0, sizeof hand);
+}
+
+void hand_forget(unsigned sensor)
+{
+    if (hand.state != HAND_IDLE && hand.sensor == sensor)
+        hand_reset();
+}
+
+void hand_begin(uint8_t sensor, uint8_t moves, float scale_std)
+{
+    const struct setup_payload *setup = setups_of(sensor);
+    hand_reset();
+    hand.sensor = sensor;
+    hand.state = HAND_STARTING;
+    hand.wanted = moves;
+    hand.wanted_std = scale_std;
+    hand.sensitivity = (float)setup->sensitivity_rad_s;
+    struct port_health health;
+    port_health(&health);
+    hand.microsecond_s = health.clock_locked ? CRYSTALS_US : 1e-6f;
+    float range = 0.995f * (float)setup->range_deg_s * 0.017453293f / hand.sensitivity;
+    hand.end_of_range = range < 32767.0f ? (int32_t)range : INT16_MAX;
+    uint32_t per_block = (uint32_t)(BLOCK_S * (float)setup->rate_hz);
+    hand.per_block = per_block > BLOCK_LEAST ? per_block : BLOCK_LEAST;
+    hand.before.face = NO_FACE;
+    hand.report.before = hand.report.after = NO_FACE;
+    estimate_begin(&hand.estimate);
+    hand.scale_std = estimate_scale_std(&hand.estimate);
+    motion_begin(&hand.motion);
+}
+
+/* The mean of a block, rad/s, and the variance of a reading in it. */
+static float mean_of(const struct block *block, float mean_rad_s[3])
+{
+    float samples = (float)block->samples;
+    int64_t of_means = 0;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        of_means += (int64_t)block->sums[axis] * block->sums[axis];
+        mean_rad_s[axis] = (float)block->sums[axis] / samples * hand.sensitivity;
+    }
+    int64_t scatter = block->squares * (int64_t)block->samples - of_means; /* whole numbers: nothing is rounded off */
+    return (float)scatter / (3.0f * samples * (samples - 1.0f)) * hand.sensitivity * hand.sensitivity;
+}
+
+static void rest_mean(const struct rest *rest, float mean_rad_s[3])
+{
+    for (unsigned axis = 0; axis < 3; axis++)
+        mean_rad_s[axis] = (float)rest->sums[axis] / (float)rest->samples * hand.sensitivity;
+}
+
+static void rest_add(struct rest *rest, const struct block *block, float variance)
+{
+    if (rest->samples == 0)
+        rest->start_us = block->start_us;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        rest->sums[axis] += block->sums[axis];
+        rest->acceleration[axis] += block->acceleration[axis];
+    }
+    rest->samples += block->samples;
+    rest->blocks++;
+    rest->variance += variance;
+}
+
+/* The face that is up, by the largest of three accelerations. */
+static uint8_t face_of(const struct rest *rest)
+{
+    float square = 0.0f, largest = 0.0f;
+    uint8_t face = NO_FACE;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        float reading = (float)rest->acceleration[axis];
+        square += reading * reading;
+        if (__builtin_fabsf(reading) > __builtin_fabsf(largest)) {
+            largest = reading;
+            face = (uint8_t)(2u * axis + (reading < 0.0f));
+        }
+    }
+    return largest * largest > ON_FACE * square ? face : NO_FACE;
+}
+
+/* The move that may follow begins with the last block of the rest, taken as one step. */
+static void begin_move(void)
+{
+    const struct block *block = &hand.pending;
+    float rate[3], mean_rad_s[3];
+    rest_mean(&hand.before, hand.bias);
+    mean_of(block, mean_rad_s);
+    for (unsigned axis = 0; axis < 3; axis++)
+        rate[axis] = mean_rad_s[axis] - hand.bias[axis];
+    hand.lost = hand.clipped = false;
+    hand.pending_since_us = block->start_us;
+    motion_begin(&hand.motion);
+    motion_add(&hand.motion, hand.estimate.centre, hand.up, rate, block->lasts_s, block->samples);
+}
+
+static struct hand_rest as_rest(const struct rest *rest)
+{
+    struct hand_rest found = {.face = rest->face, .samples = rest->samples};
+    rest_mean(rest, found.mean_rad_s);
+    return found;
+}
+
+static float length2(const float a[3])
+{
+    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+}
+
+static uint8_t outcome_of(struct rest *after)
+{
+    struct rest *before = &hand.before;
+    const struct motion *motion = &hand.ended;
+    if (after->face == NO_FACE)
+        return MOVE_NO_FACE;
+    bool stays = after->face == before->face;
+    if (before->face == NO_FACE || (stays && length2(motion->swept) < NUDGE_RAD * NUDGE_RAD))
+        return MOVE_NOTHING;
+    if (hand.clipped)
+        return MOVE_CLIPPED;
+    if (hand.lost)
+        return MOVE_LOST;
+    const struct hand_rest rests[2] = {as_rest(before), as_rest(after)};
+    float about = motion->swept[0] * hand.up[0] + motion->swept[1] * hand.up[1] + motion->swept[2] * hand.up[2];
+    const struct hand_move move = {
+        .motion = motion,
+        .before = &rests[0],
+        .after = &rests[1],
+        .noise_rad_s = hand.noise_rad_s,
+        .whole = stays && __builtin_fabsf(about) > WHOLE_RAD && hand.estimate.settled,
+    };
+    hand.report.whole = move.whole;
+    if (!estimate_take(&hand.estimate, &move, !before->counted))
+        return MOVE_CONTRADICTS;
+    hand.report.settled = hand.estimate.settled;
+    after->counted = true;
+    if (hand.taken < UINT8_MAX)
+        hand.taken++;
+    hand.scale_std = estimate_scale_std(&hand.estimate);
+    return MOVE_TAKEN;
+}
+
+static void judge(struct rest *after)
+{
+    struct hand_report_payload *report = &hand.report;
+    report->whole = report->settled = 0;
+    uint8_t outcome = outcome_of(after);
+    report->outcome = outcome;
+    report->before = hand.before.face;
+    report->judged++;
+    report->angle_rad = hand.ended.path_rad;
+    report->noise_rad_s = hand.noise_rad_s;
+    report->rest_us = hand.before.start_us;
+    report->move_us = hand.pending_since_us;
+    report->after_us = after->start_us;
+    report->end_us = hand.pending.start_us;
+    hand.judged_us = hand.last_us;
+    if (outcome != MOVE_NOTHING)
+        hand.refused = outcome == MOVE_TAKEN ? 0 : hand.refused + 1;
+}
+
+/* It has lain still for long enough. */
+static void settled(void)
+{
+    struct rest *after = &hand.now;
+    bool first = hand.before.samples == 0;
+    float noise_rad_s = __builtin_sqrtf(after->variance / (float)after->blocks);
+    if (first)
+        rest_mean(after, hand.first_rad_s);
+    if (first || noise_rad_s < hand.noise_rad_s)
+        hand.noise_rad_s = noise_rad_s;
+    after->face = hand.report.after = face_of(after);
+    if (!first)
+        judge(after);
+    hand.before = *after;
+    memset(after, 0, sizeof *after);
+    if (hand.before.face != NO_FACE)
+        estimate_up(&hand.estimate, hand.before.face, hand.up);
+    begin_move();
+    if (hand.taken >= hand.wanted && hand.scale_std <= hand.wanted_std)
+        hand.state = HAND_DONE;
+    else
+        hand.state = hand.refused < REFUSED_IN_A_ROW ? HAND_RESTING : HAND_FAILED;
+}
+
+/* Whether a block is of a rest, and of the one that goes on. */
+static bool is_still(const float mean_rad_s[3], float variance)
+{
+    bool first = hand.before.samples == 0;
+    float noise2 = first ? variance : hand.noise_rad_s * hand.noise_rad_s;
+    float limit = first ? SETTLED_RAD_S * SETTLED_RAD_S : NOISIER * noise2 + TREMOR_RAD_S * TREMOR_RAD_S;
+    if (variance > limit)
+        return false;
+    float wanders = WANDERS * __builtin_sqrtf(noise2 / (float)hand.per_block) + WANDERS_RAD_S;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        if (hand.lies && __builtin_fabsf(mean_rad_s[axis] - hand.level[axis]) > wanders)
+            return false;
+        if (!first && __builtin_fabsf(mean_rad_s[axis] - hand.first_rad_s[axis]) > TURNING_RAD_S)
+            return false;
+    }
+    return true;
+}
+
+static void moves(void)
+{
+    hand.state = hand.before.samples != 0 ? HAND_MOVING : HAND_STARTING;
+    hand.lies = false;
+}
+
+/* A rest takes a block in when the next one has been seen to be of it too. */
+static void take_pending(struct rest *rest)
+{
+    if (hand.pending.samples != 0) {
+        float mean_rad_s[3];
+        rest_add(rest, &hand.pending, mean_of(&hand.pending, mean_rad_s));
+        rest_mean(rest, hand.level);
+    }
+    hand.pending = hand.block;
+}
+
+static void block_ended(void)
+{
+    float mean_rad_s[3], variance = mean_of(&hand.block, mean_rad_s);
+    if (!is_still(mean_rad_s, variance)) {
+        moves();
+    } else if (hand.state == HAND_RESTING) {
+        take_pending(&hand.before);
+        begin_move();
+    } else if (!hand.lies) { /* the first block still belongs to the move */
+        hand.lies = true;
+        hand.ended = hand.motion;
+        hand.pending.samples = 0;
+        memset(&hand.now, 0, sizeof hand.now);
+        memcpy(hand.level, mean_rad_s, sizeof hand.level);
+    } else {
+        take_pending(&hand.now);
+        if (hand.now.samples != 0 && hand.last_us - hand.now.start_us >= REST_US)
+            settled();
+    }
+    memset(&hand.block, 0, sizeof hand.block);
+}
+
+static void take(uint64_t time_us, const struct reading *reading)
+{
+    struct block *block = &hand.block;
+    float rate[3], dt_s = (float)(time_us - hand.last_us) * hand.microsecond_s;
+    if (block->samples == 0)
+        block->start_us = time_us;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        int32_t counts = reading->counts[axis];
+        hand.clipped = hand.clipped || counts >= hand.end_of_range || counts <= -hand.end_of_range;
+        rate[axis] = (float)counts * hand.sensitivity - hand.bias[axis];
+        block->sums[axis] += counts;
+        block->acceleration[axis] += reading->acceleration[axis];
+        block->squares += counts * counts;
+    }
+    block->samples++;
+    block->lasts_s += dt_s;
+    motion_add(&hand.motion, hand.estimate.centre, hand.up, rate, dt_s, 1);
+}
+
+void hand_add(unsigned sensor, uint64_t time_us, uint32_t sequence, const struct reading *reading)
+{
+    if (sensor != hand.sensor || hand.state == HAND_IDLE || hand.state >= HAND_DONE)
+        return;
+    bool follows = hand.begun && sequence == hand.sequence + 1u;
+    if (follows) {
+        take(time_us, reading);
+    } else { /* neither a block nor a rest goes over a gap */
+        hand.lost = true;
+        memset(&hand.block, 0, sizeof hand.block);
+        moves();
+    }
+    hand.begun = true;
+    hand.sequence = sequence;
+    hand.last_us = time_us;
+    if (hand.block.samples == hand.per_block)
+        block_ended();
+}
+
+#define SHOWN_MS 2000u
+
+bool hand_lamp(uint64_t now_us)
+{
+    uint32_t since_ms = (uint32_t)((now_us - hand.judged_us) / 1000u);
+    bool again = hand.report.outcome > MOVE_TAKEN;
+    if (hand.state == HAND_DONE)
+        return since_ms % 1000u < 100u;
+    if (hand.state == HAND_FAILED)
+        return since_ms / 50u % 2u != 0;
+    if (hand.state != HAND_RESTING)
+        return false;
+    return since_ms >= SHOWN_MS || hand.report.outcome == MOVE_NOTHING || since_ms / (again ? 50u : 250u) % 2u != 0;
+}
+
+void hand_on_begin(const struct frame *request)
+{
+    struct by_hand_payload wanted;
+    memcpy(&wanted, request->payload, sizeof wanted);
+    enum error_code error = setups_check(wanted.sensor);
+    if (!error && !(setups_of(wanted.sensor)->range_m_s2 > 0.0))
+        error = ERROR_BAD_RANGE;
+    if (error) {
+        reply_refused(request, error, wanted.sensor);
+        return;
+    }
+    hand_begin(wanted.sensor, wanted.moves, wanted.scale_std);
+    reply_done(request->sequence);
+}
+
+void hand_on_status(const struct frame *request)
+{
+    struct hand_report_payload report = hand.report;
+    report.reply_to = request->sequence;
+    report.sensor = hand.sensor;
+    report.state = hand.state;
+    report.taken = hand.taken;
+    report.scale_std = hand.scale_std;
+    link_send(MESSAGE_HAND_REPORT, &report, sizeof report);
+}
+
+void hand_on_solve(const struct frame *request)
+{
+    float found[HAND_UNKNOWNS];
+    estimate_solution(&hand.estimate, found);
+    struct hand_solution_payload answer = {
+        .reply_to = request->sequence, .sensor = hand.sensor, .state = hand.state, .taken = hand.taken};
+    memcpy(answer.matrix, &found[HAND_MATRIX], sizeof answer.matrix);
+    memcpy(answer.g_sensitivity_rad_s, &found[HAND_GRAVITY], sizeof answer.g_sensitivity_rad_s);
+    for (unsigned axis = 0; axis < 3; axis++)
+        answer.bias_rad_s[axis] = -found[HAND_BIAS + axis];
+    link_send(MESSAGE_HAND_SOLUTION, &answer, sizeof answer);
+}

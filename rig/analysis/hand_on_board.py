@@ -1,0 +1,103 @@
+"""A calibration by hand that the board has made, held against double precision. Pure.
+
+The host integrates the very same readings by the same equations (`rig.estimation.by_hand.on_board`); which rests and
+moves there are is the board's word. So what differs is the board's arithmetic alone. How good such a calibration is
+another matter: that is its stated uncertainty, and a verification.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.hand_answers import HandReport, HandSolved
+from firmware_host.protocol import HAND_FACES
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.on_board import BoardsSolution, OnFace, TakenMove, solve_as_the_board
+
+SCALE_LIMIT = 1e-5  # of an element of the matrix
+BIAS_LIMIT_RAD_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class BoardReadings:
+    """Readings (n, 3), rad/s, at times (n,) of the board's counter, with their numbers (n,).
+
+    `microsecond_s` is what the counter's microsecond lasts.
+    """
+
+    times_us: NDArray[np.integer]
+    sequence: NDArray[np.integer]
+    rates: Array
+    microsecond_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class HandAgreement:
+    """A solution in double precision, and the largest difference of the board's matrix, and bias, from it."""
+
+    host: BoardsSolution
+    matrix_difference: float
+    bias_difference_rad_s: float
+
+
+def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solved: HandSolved) -> HandAgreement:
+    """The board's solution against the same readings.
+
+    Raises Fault `board_unverified` where readings or reports are missing, `board_disagrees` beyond the limits.
+    """
+    host = solve_as_the_board(tuple(_moves(readings, reports)))
+    if (taken := sum(each.outcome == "taken" for each in reports)) != solved.taken:
+        raise _unverified(f"it has taken {solved.taken} moves, of which {taken} were seen here")
+    matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
+    bias = float(np.max(np.abs(np.array(solved.bias_rad_s) - host.bias_rad_s)))
+    if not (matrix <= SCALE_LIMIT and bias <= BIAS_LIMIT_RAD_S):
+        raise Fault(
+            "board_disagrees",
+            f"from the same readings the board finds a matrix that differs by {matrix:.1g}, and biases by "
+            f"{bias:.1g} rad/s, from those of double precision",
+            "Calibrate again; if it comes back, keep the readings (rig record) and report it",
+        )
+    return HandAgreement(host, matrix, bias)
+
+
+def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[TakenMove]:
+    counted = False  # whether the rest before is in the solution
+    for report in reports:
+        taken = report.outcome == "taken"
+        if taken:
+            yield _move(readings, report, follows=counted)
+        counted = taken
+
+
+def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> TakenMove:
+    assert report.before is not None and report.after is not None, "taken moves are between faces"
+    times_us, rates, marks = readings.times_us, readings.rates, _marks(report)
+    first, begin, end, last = np.searchsorted(times_us, marks).tolist()
+    there = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
+    if not there or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
+        raise _unverified(f"readings of its move from {report.before} to {report.after} did not arrive here")
+    return TakenMove(
+        before=OnFace(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
+        after=OnFace(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
+        rates=rates[begin:end],
+        steps_s=readings.microsecond_s * np.diff(times_us[begin - 1 : end]),
+        noise_rad_s=report.noise_rad_s,
+        whole=report.whole,
+        follows=follows,
+        settled=report.settled,
+    )
+
+
+def _marks(report: HandReport) -> list[int]:
+    return [report.rest_us, report.move_us, report.after_us, report.end_us]
+
+
+def _unverified(what: str) -> Fault:
+    return Fault(
+        "board_unverified",
+        f"the board's calibration by hand cannot be checked: {what}",
+        "Look at the cable, and calibrate again",
+    )

@@ -1,0 +1,284 @@
+"""A calibration by hand that the board's core makes by itself, against double precision and against the truth."""
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from firmware_host.emulator.gpio import Port
+from firmware_host.hand_answers import HandReport
+from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
+from rig.errors import Fault
+from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
+from support.emulated_session import Session
+from support.hand_on_board import Played, asked, begun, give, in_counts, play
+from support.handled_body import LSM9DS1, TWELVE, Recorded, handle
+from support.host_board import HostBoard, configured, core, error_of
+
+pytestmark = pytest.mark.slow
+
+REST_S = 1.6
+BUTTON = 6  # of port B
+SIXTEEN: tuple[Action, ...] = (*TWELVE, Turn(1), Turn(-1), Flip("+x"), Turn(1))
+
+
+def twelve(mistake_at: int | None = None, kind: Kind = "held", seed: int = 3) -> Recorded:
+    """Twelve flips, one of them with a mistake."""
+    actions = list(TWELVE)
+    if mistake_at is not None:
+        flip = actions[mistake_at]
+        assert isinstance(flip, Flip)
+        actions[mistake_at] = replace(flip, mistake=Mistake(kind))
+    return handle(actions, seed, rest_s=REST_S)
+
+
+def lamp(now_us: int) -> bool:
+    """Whether the board's lamp is lit."""
+    lit = core().hand_lamp
+    lit.restype = ctypes.c_bool
+    return bool(lit(ctypes.c_uint64(now_us)))
+
+
+@pytest.fixture(scope="module")
+def played() -> Played:
+    return play(twelve())
+
+
+def test_twelve_flips_are_found_and_taken(played: Played) -> None:
+    assert played.outcomes == ["taken"] * 12
+    assert [report.after for report in played.reports] == [flip.to for flip in TWELVE if isinstance(flip, Flip)]
+    assert played.solved.state == "done"
+    assert played.solved.taken == 12
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_board_agrees_with_double_precision_and_with_the_truth(seed: int) -> None:
+    recorded = twelve(seed=seed)
+    played = play(recorded)
+    agreement = played.agreement
+    assert agreement.matrix_difference < SCALE_LIMIT / 2
+    assert agreement.bias_difference_rad_s < BIAS_LIMIT_RAD_S / 2
+    assert agreement.host.scale_std == pytest.approx(played.reports[-1].scale_std, rel=1e-3)
+    assert np.max(np.abs(played.scale / recorded.truth[:3] - 1)) < 3.5 * played.reports[-1].scale_std
+    assert np.max(np.abs(np.array(played.solved.bias_rad_s) - recorded.truth[3:])) < 3e-4
+
+
+def test_a_scale_of_the_turntables_part_needs_more_moves_and_whole_turns_count() -> None:
+    recorded = handle(SIXTEEN, 5, rest_s=REST_S)
+    off = 1.1771
+    recorded = replace(recorded, rates=recorded.rates / off, matrix=recorded.matrix / off, bias=recorded.bias / off)
+    played = play(recorded, moves=16, scale_std=2e-3)
+    assert played.outcomes == ["taken"] * 16
+    assert [report.whole for report in played.reports[12:]] == [True, True, False, True]
+    assert played.agreement.matrix_difference < SCALE_LIMIT / 2
+    assert np.max(np.abs(played.scale / recorded.truth[:3] - 1)) < 2e-3
+
+
+def test_a_slow_part_that_is_left_alone_for_a_minute() -> None:
+    actions = (*TWELVE[:4], Flip("-y", Mistake("left", 60.0)), *TWELVE[5:])
+    slow = play(handle(actions, 1, replace(LSM9DS1, rate_hz=59.5), rest_s=2.0))
+    assert slow.outcomes == ["taken"] * 12
+    assert slow.agreement.matrix_difference < SCALE_LIMIT
+
+
+def test_a_touched_box_costs_nothing() -> None:
+    actions = (*TWELVE[:4], Flip("-x", Mistake("lifted")), *TWELVE[4:])  # lifted by a corner, and on that face already
+    played = play(handle(actions, 1, rest_s=REST_S))
+    assert [each for each in played.outcomes if each != "nothing"] == ["taken"] * 12
+    assert "nothing" in played.outcomes
+    assert played.agreement.matrix_difference < SCALE_LIMIT
+
+
+def test_a_move_beyond_the_range_is_asked_again() -> None:
+    recorded = twelve(5, "too_fast")
+    played = play(recorded)
+    assert np.abs(recorded.rates).max() > np.radians(573)
+    assert played.outcomes[5] == "clipped"
+    assert played.outcomes.count("taken") == 11
+    assert played.solved.state == "resting"
+
+
+def test_a_move_in_which_readings_are_missing_is_asked_again() -> None:
+    recorded = twelve(5, "cable_pulled")
+    numbers = np.round(recorded.time_s * 119.0).astype(int)  # the board counts what it did not get as well
+    played = play(recorded, number=numbers)
+    assert played.outcomes[5] == "lost"
+    assert played.outcomes.count("taken") == 11
+
+
+def test_a_box_that_lies_on_no_face_is_asked_again_and_the_move_from_there_tells_nothing() -> None:
+    recorded = twelve()
+    played = play(recorded)
+    third = played.reports[3]
+    lies = (played.times_us >= third.after_us) & (played.times_us <= played.reports[4].move_us + 50_000)
+    leaning = recorded.acceleration.copy()
+    leaning[lies] = [5.0, 5.0, 7.0]
+    again = play(replace(recorded, acceleration=leaning))
+    assert again.outcomes[3:5] == ["no_face", "nothing"]
+    assert again.reports[3].after is None
+    assert again.outcomes.count("taken") == 10
+
+
+def test_a_turn_that_ends_short_contradicts_what_is_known() -> None:
+    played = play(handle((*TWELVE, Turn(1, Mistake("short")), Turn(1)), 3, rest_s=REST_S), moves=14)
+    assert played.outcomes == [*["taken"] * 12, "contradicts", "taken"]
+
+
+def test_a_box_on_another_face_than_its_accelerometer_says_is_far_from_what_is_known() -> None:
+    recorded = twelve()
+    reports = play(recorded).reports
+    swapped = recorded.acceleration.copy()
+    swapped[recorded.time_s > reports[0].after_us * 1e-6 - 0.2] *= -1.0
+    played = play(replace(recorded, acceleration=swapped))
+    assert played.outcomes[0] == "contradicts"
+
+
+def test_after_ten_refused_moves_in_a_row_it_gives_up() -> None:
+    recorded = twelve()
+    played = play(replace(recorded, rates=np.clip(recorded.rates, -0.9, 0.9) * 12.0))  # at its end in every move
+    assert played.outcomes == ["clipped"] * 10
+    assert played.solved.state == "failed"
+    now_us = int(played.times_us[-1])
+    assert {lamp(now_us + 10_000 * each) for each in range(20)} == {True, False}
+
+
+def test_a_box_that_is_held_askew_in_the_hand_is_asked_again() -> None:
+    played = play(twelve(2, "held"))
+    assert played.outcomes == ["taken", "taken", "no_face", "nothing", *["taken"] * 8]
+
+
+def test_what_is_missing_in_the_readings_of_the_host_is_named(played: Played) -> None:
+    kept = np.arange(len(played.times_us)) != np.searchsorted(played.times_us, played.reports[2].move_us + 500_000)
+    gappy = BoardReadings(played.times_us[kept], np.flatnonzero(kept), played.rates[kept], 1e-6)
+    with pytest.raises(Fault, match="did not arrive") as missing:
+        hand_agreement(gappy, played.reports, played.solved)
+    assert missing.value.name == "board_unverified"
+    with pytest.raises(Fault, match="taken 12 moves, of which 11 were seen"):
+        hand_agreement(played.readings, played.reports[1:], played.solved)
+    (mxx, mxy, mxz), second, third = played.solved.matrix
+    wrong = replace(played.solved, matrix=((mxx * 1.00003, mxy, mxz), second, third))
+    with pytest.raises(Fault) as differs:
+        hand_agreement(played.readings, played.reports, wrong)
+    assert differs.value.name == "board_disagrees"
+
+
+def test_what_is_asked_of_a_board_that_cannot_is_refused() -> None:
+    board = HostBoard()
+    assert error_of(board.ask("by_hand", sensor=9, moves=12, scale_std=1e-3)) == "no_such_sensor"
+    assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "not_configured"
+    configured(board, 0, 119.0, 500.0)
+    assert error_of(board.ask("by_hand", sensor=0, moves=12, scale_std=1e-3)) == "bad_range"
+    assert HandReport.of(asked(board, "hand_status")).state == "idle"
+
+
+def test_a_sensor_set_up_anew_ends_its_session_and_no_other() -> None:
+    board, _ = begun()
+    configured(board, 1, 200.0, 250.0)
+    assert HandReport.of(asked(board, "hand_status")).state == "starting"
+    configured(board, 0, 119.0, 500.0, 4.0)
+    assert HandReport.of(asked(board, "hand_status")).state == "idle"
+
+
+def test_the_lamp_tells_rest_taken_again_and_done() -> None:
+    recorded = handle((*TWELVE[:4], Turn(1), *TWELVE[4:]), 3, rest_s=4.0)
+    board, setup = begun()
+    times_us, counts, forces = in_counts(recorded, setup)
+    lit: dict[str, list[bool]] = {}
+    since_us, judged = 0, 0
+    end = np.searchsorted(times_us, times_us[-1] - 3_000_000)
+    for number, (time_us, rate, force) in enumerate(zip(times_us[:end].tolist(), counts, forces, strict=False)):
+        give(board, time_us, number, rate, force)
+        report = HandReport.of(asked(board, "hand_status"))
+        if report.judged != judged:
+            judged, since_us = report.judged, time_us
+        told = "settled" if report.state == "resting" and time_us > since_us + 2_000_000 else report.state
+        lit.setdefault(told, []).append(lamp(time_us))
+    assert not any(lit["starting"]) and not any(lit["moving"])
+    assert all(lit["settled"])
+    assert 0.2 < np.mean(lit["resting"]) < 0.8
+    assert 0.05 < np.mean(lit["done"]) < 0.2
+
+
+# Without a computer: the button
+
+
+def pressed(board: HostBoard, begin_us: int, lasts_us: int) -> None:
+    """The button is down for so long, while the main loop runs."""
+    board.core.host_press(True)
+    for time_us in range(begin_us, begin_us + lasts_us, 5_000):
+        board.set_time(time_us)
+        board.run()
+    board.core.host_press(False)
+    board.run()
+
+
+def alone(*, locked: bool = True) -> HostBoard:
+    """A board that nobody has asked for anything."""
+    board = HostBoard()
+    board.core.host_lock_clock(locked)
+    return board
+
+
+def state_of(board: HostBoard) -> str:
+    return HandReport.of(asked(board, "hand_status")).state
+
+
+def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None:
+    board = alone()
+    pressed(board, 0, 20_000)
+    assert state_of(board) == "idle", "it only rattled"
+    pressed(board, 100_000, 60_000)
+    assert state_of(board) == "starting"
+    assert asked(board, "status").values["streaming"] == 1
+    recorded = twelve()
+    setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}
+    times_us, counts, forces = in_counts(recorded, setup)
+    for number, (time_us, rate, force) in enumerate(zip(times_us.tolist(), counts, forces, strict=True)):
+        give(board, 200_000 + time_us, number, rate, force)
+    assert state_of(board) == "done"
+
+
+def test_the_button_begins_anew_with_the_sensor_that_streams_accelerations_already() -> None:
+    board, _ = begun()
+    board.core.host_lock_clock(True)
+    assert [frame.name for frame in board.ask("start", 2, sensors=0)] == ["ack"]
+    recorded = twelve()
+    times_us, counts, forces = in_counts(
+        recorded, {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.0012}
+    )
+    for number, (time_us, rate, force) in enumerate(zip(times_us[:400].tolist(), counts, forces, strict=False)):
+        give(board, time_us, number, rate, force)
+    assert state_of(board) in ("resting", "moving")
+    assert board.core.host_lamp() == (state_of(board) == "resting")
+    for number in range(400, 430):  # it moves, so the lamp is dark
+        give(board, 4_000_000 + 8_403 * number, number, np.array([9000, 0, 0]), forces[0])
+    assert state_of(board) == "moving"
+    pressed(board, 8_000_000, 60_000)
+    assert state_of(board) == "starting"
+
+
+def test_no_button_changes_a_stream_without_accelerations_or_begins_by_a_clock_without_its_crystal() -> None:
+    board = alone()
+    configured(board, 0, 119.0, 500.0)
+    board.ask("start", 2, sensors=0)
+    pressed(board, 0, 60_000)
+    assert state_of(board) == "idle"
+    board = alone(locked=False)
+    pressed(board, 0, 60_000)
+    assert state_of(board) == "idle"
+
+
+def test_the_button_of_the_shipped_image_lights_the_lamp_at_the_first_rest() -> None:
+    session = Session(rate_at=lambda _time_s: (0.0, 0.0, 0.0), noise_rad_s=0.002)
+    (port,) = (each for each in session.board.peripherals if isinstance(each, Port) and each.name == "GPIOB")
+    session.run(2.5)  # until the crystal swings
+    port.drive(BUTTON, high=True)
+    session.run(0.1)
+    port.drive(BUTTON, high=False)
+    assert session.ask("status").values["streaming"] == 1
+    assert HandReport.of(session.ask("hand_status")).state == "starting"
+    assert port.is_input(BUTTON)
+    session.run(1.8)
+    assert HandReport.of(session.ask("hand_status")).state == "resting"
+    assert not port.is_input(BUTTON), "the lamp is lit"
