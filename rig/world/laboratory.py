@@ -1,6 +1,7 @@
 """The simulated laboratory without its sockets: what turns, board and sensors on one clock, deterministic."""
 
 from collections.abc import Sequence
+from hashlib import sha256
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import ArmSection, RigConfig
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import mount_matrix
-from rig.config.world_models import WorldSection
+from rig.config.world_models import SimulatedPartSection, WorldSection
 from rig.world.autopilot.mounting import autopilot_mounts
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -119,6 +120,18 @@ class Laboratory:
     def unplug(self) -> None:
         """Take the board's power away; its flash keeps what it holds."""
         self.board = None
+
+    def fit(self, part: str) -> bool:
+        """Lay the board of another part in, without power yet: a chip of its own, with nothing stored.
+
+        Returns whether the operator plugs it in.
+        """
+        said = self._world.tray.get(part, SimulatedPartSection())
+        unique_id = said.unique_id or sha256(part.encode()).hexdigest()[:24]
+        board = self._world.board.model_copy(update={"unique_id": unique_id})
+        self._world = self._world.model_copy(update={"board": board})
+        self._flash = flash_of(None)
+        return said.plugged_in
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
         """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.
