@@ -31,6 +31,7 @@ _COMMANDS = {
     "record": "record the sensors alone, while something else turns them; nothing moves",
     "resume": "go on with an interrupted run",
     "station": "one part after the other: number, checks, run, verdict, label",
+    "floor": "what several rigs that share a history do now, in a browser",
     "watch": "a recorded run in a browser, as it was",
     "solve": "recompute the calibration from a recording",
     "allan": "random walk and bias instability, by the Allan deviation of what was recorded at rest",

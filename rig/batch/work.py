@@ -1,13 +1,13 @@
 """One part after the other until none follows: what is entered, asked and written between their runs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
 from rig.batch import label, table
-from rig.batch.batch import BatchEnded, Chip, Doubt, Part, PartBegun, PartEnded, doubt_of
+from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Part, PartBegun, PartEnded, doubt_of
 from rig.batch.journal import Journal
 from rig.config.station_section import StationSection
 from rig.config.written_file import write_new
@@ -86,22 +86,24 @@ class Desk:
 
 @dataclass(slots=True)
 class Work:
-    """A batch at work."""
+    """A batch at work; `told` hears of it whenever something has been entered."""
 
     journal: Journal
     section: StationSection
     operator: Operator
     bench: Bench
+    told: Callable[[Batch], None] = lambda batch: None
 
     def all_parts(self) -> None:
         """Run parts until none follows, each as far as it comes. Raises Fault where nobody can decide what follows."""
         self._written()
+        self.told(self.journal.batch)
         while True:
             part = self.journal.batch.in_hand or self._named()
             if part is None:
                 break
             self._carried_out(part)
-        self.journal.enter(BatchEnded(now_utc()))
+        self._enter(BatchEnded(now_utc()))
         self._written()
 
     def _named(self) -> Part | None:
@@ -110,7 +112,7 @@ class Work:
             doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today(serial))
             right = doubt is None or (not doubt.final and self.operator.goes_on(doubt))
             if right or not self.operator.attended:
-                self.journal.enter(PartBegun(serial, self.journal.batch.folder_of(serial), now_utc()))
+                self._enter(PartBegun(serial, self.journal.batch.folder_of(serial), now_utc()))
             if right:
                 return self.journal.batch.in_hand
             if doubt is not None and not self.operator.attended:
@@ -151,7 +153,7 @@ class Work:
             )
 
     def _ended(self, ended: PartEnded) -> None:
-        self.journal.enter(ended)
+        self._enter(ended)
         part = self.journal.batch.parts[-1]
         if ended.outcome == "pass":
             self._labelled(part, ended)
@@ -165,6 +167,10 @@ class Work:
         folder.mkdir(exist_ok=True)
         for ending, content in label.files_of(made).items():
             write_new(folder / f"{part.folder}{ending}", content)
+
+    def _enter(self, entry: Entry) -> None:
+        self.journal.enter(entry)
+        self.told(self.journal.batch)
 
     def _written(self) -> None:
         batch, folder = self.journal.batch, self.journal.folder

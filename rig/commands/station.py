@@ -4,6 +4,8 @@ import json
 import shlex
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +17,8 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.batch.operators import AtTheTerminal
     from rig.commands.configured import Configured
+    from rig.config.models import RigConfig
+    from rig.floor.heartbeat import Heartbeat
 
 
 def add(parser: ArgumentParser) -> None:
@@ -68,10 +72,13 @@ def _carried_out(options: Namespace, found: "Configured", operator: "AtTheTermin
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
-    station = Station(operator.attended, said.operator, said.work_order)
     try:
-        with bench(found, folder, station) as at:
-            Work(journal, config.station, operator, at).all_parts()
+        with beating(config, simulated=found.loaded.simulated) as heart:
+            listeners = () if heart is None else (heart,)
+            station = Station(operator.attended, said.operator, said.work_order, listeners)
+            with bench(found, folder, station) as at:
+                told = (lambda batch: None) if heart is None else heart.batch
+                Work(journal, config.station, operator, at, told).all_parts()
     except (Fault, KeyboardInterrupt):
         say(f"the batch is kept in {folder}; go on with: {_again(options, folder)}", sys.stderr)
         raise
@@ -81,6 +88,21 @@ def _carried_out(options: Namespace, found: "Configured", operator: "AtTheTermin
     else:
         say(f"{summary(batch)}; {folder / CSV}")
     return 0 if batch.passed else 1
+
+
+@contextmanager
+def beating(config: "RigConfig", *, simulated: bool) -> "Iterator[Heartbeat | None]":
+    """The station's heartbeat in the history that its runs are entered in, None where they are entered in none."""
+    from rig.floor.heartbeat import heartbeat
+    from rig.floor.now import Now
+    from rig.history.place import chosen_place
+
+    place = chosen_place(config.history)
+    if place is None:
+        yield None
+        return
+    with heartbeat(config.history.rig or config.turner.address or "by hand", place, Now(simulated=simulated)) as heart:
+        yield heart
 
 
 def _again(options: Namespace, folder: Path) -> str:
