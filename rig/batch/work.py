@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.batch import label, table
-from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Part, PartBegun, PartEnded, doubt_of
+from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Outcome, Part, PartBegun, PartEnded, doubt_of
 from rig.batch.journal import Journal
 from rig.config.station_section import StationSection
 from rig.config.written_file import write_new
@@ -130,7 +130,7 @@ class Work:
                 if isinstance(error, Fault) and not self.operator.attended:
                     raise  # the arm was stopped: nobody has looked why, so nothing may move after it
                 if not self.operator.tries_again(part, error):
-                    outcome = "refused" if isinstance(error, Refused) else "fault"
+                    outcome: Outcome = "refused" if isinstance(error, Refused) else "fault"
                     return self._ended(PartEnded(outcome, now_utc(), f"{error.name}: {error.what}"))
 
     def refuse_same_chip(self, part: Part, chip: Chip) -> None:

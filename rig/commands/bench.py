@@ -1,7 +1,7 @@
 """The bench of a station: what stays between two parts, and a part's run on it.
 
-The claims, the simulated laboratory, the configuration and its script stay. A turner is connected for each run: once
-stopped, which every run ends with, its driver moves it no more.
+The claims, the simulated laboratory, the configuration and its script stay. What turns is connected anew, since a run
+ends with it stopped for good, but ahead: while the part is changed.
 """
 
 import json
@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
@@ -24,15 +25,17 @@ from rig.commands.remember import remember
 from rig.config.models import RigConfig
 from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
-from rig.data.run_folder import CONFIG, LOG, WORLD_LATE, discard, new_folder
+from rig.data.run_folder import ARM_LOG, CONFIG, LOG, WORLD_LATE, discard, new_folder
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.stated import of_configuration
+from rig.runner.ahead import Ahead
 from rig.runner.phases import Run
 from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten
 from rig.station.log import log
 from rig.station.station import Listener, Stations
 from rig.station.view import view
+from rig.turners.registry import kind_of
 
 
 @dataclass(slots=True)
@@ -63,11 +66,15 @@ class Station:
 
 @dataclass(frozen=True, slots=True)
 class RigBench:
-    """A bench with the rig of a configuration. `control` is its simulated laboratory's, None for a real one."""
+    """A bench with the rig of a configuration. `control` is its simulated laboratory's, None for a real one.
+
+    `ahead` connects what turns.
+    """
 
     configured: Configured
     control: str | None
     station: Station
+    ahead: Ahead
 
     @property
     def simulated(self) -> bool:
@@ -116,6 +123,8 @@ class RigBench:
             if new:
                 discard(folder)
             raise
+        finally:
+            self.ahead.begin()
         why = "" if outcome.passed else ", ".join(each.name for each in outcome.checks if not each.passed)
         return PartEnded(
             "pass" if outcome.passed else "fail",
@@ -133,7 +142,8 @@ class RigBench:
         with log(folder / LOG) as logged, view() as seen:
             station = Stations((logged, seen, heard, *self.station.listeners), answer, attended=self.station.attended)
             station.mount = None if self.control is None else hands_of(self.control)
-            this = Run(folder, of_part.loaded, of_part.script, station, remembered(config, frozenset()))
+            memory = remembered(config, frozenset())
+            this = Run(folder, of_part.loaded, of_part.script, station, memory, self.ahead.connected)
             phase = of_part.phase
             for repeated in range(config.station.repeats + 1):
                 left, heard.repeats = config.station.repeats - repeated, False
@@ -178,7 +188,11 @@ def bench(configured: Configured, folder: Path, station: Station) -> Iterator[Ri
         control = None
         if configured.loaded.simulated:
             control = held.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
-        yield RigBench(configured, control, station)
+        connect = partial(kind_of(config.turner).connect, config.turner)
+        ahead = Ahead(connect, folder / ARM_LOG)
+        held.callback(ahead.close)
+        ahead.begin()
+        yield RigBench(configured, control, station, ahead)
 
 
 def refuse_other_sensors(config: RigConfig) -> None:

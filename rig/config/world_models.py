@@ -414,7 +414,9 @@ class SimulatedPartSection(Section):
         description="its microcontroller's own number; if left out, one that is made of its serial number",
         json_schema_extra={"allowed": "24 hexadecimal digits, small letters"},
     )
-    plugged_in: bool = Field(default=True, description="whether its board is plugged in when it is mounted")
+    plugged_in: bool = Field(
+        default=True, description="whether its board is plugged in when it is mounted for the first time"
+    )
 
 
 class WorldSection(Section):

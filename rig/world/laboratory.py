@@ -45,6 +45,7 @@ class Laboratory:
         self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self._mount = np.eye(3)  # from the flange's frame to the item's
+        self._laid_in: set[str] = set()  # parts of a series
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
         self.autopilots = autopilot_mounts(config, world)
@@ -124,14 +125,16 @@ class Laboratory:
     def fit(self, part: str) -> bool:
         """Lay the board of another part in, without power yet: a chip of its own, with nothing stored.
 
-        Returns whether the operator plugs it in.
+        Returns whether the operator plugs it in: one that was forgotten is not forgotten twice.
         """
         said = self._world.tray.get(part, SimulatedPartSection())
         unique_id = said.unique_id or sha256(part.encode()).hexdigest()[:24]
         board = self._world.board.model_copy(update={"unique_id": unique_id})
         self._world = self._world.model_copy(update={"board": board})
         self._flash = flash_of(None)
-        return said.plugged_in
+        forgotten = not said.plugged_in and part not in self._laid_in
+        self._laid_in.add(part)
+        return not forgotten
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
         """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.

@@ -46,7 +46,7 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
 
 def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: Path) -> None:
     config, out = configuration(tmp_path), tmp_path / "batch"
-    command = ["station", config, "--series", series(tmp_path, "G-001", "G-002"), "--out", out]
+    command: list[str | Path] = ["station", config, "--series", series(tmp_path, "G-001", "G-002"), "--out", out]
     begun = subprocess.Popen(
         [sys.executable, "-m", "rig", *map(str, command)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
     )
