@@ -35,6 +35,11 @@ class Chip:
     board: str
     who_am_i: tuple[int, ...] = ()
 
+    def is_that(self, other: "Chip") -> bool:
+        """Whether it is the same; sensors that nobody asked tell no difference."""
+        asked = self.who_am_i and other.who_am_i
+        return self.board == other.board and (not asked or self.who_am_i == other.who_am_i)
+
     def __str__(self) -> str:
         """The chip as people are told of it."""
         identities = ", ".join(f"0x{each:02x}" for each in self.who_am_i)
@@ -113,8 +118,11 @@ class Batch:
 
     def same_chip(self, chip: Chip, serial: str) -> Part | None:
         """The part of another number, with a verdict, that had this chip."""
-        others = (each for each in reversed(self.parts) if each.serial != serial and _judged(each))
-        return next((each for each in others if each.ended is not None and each.ended.chip == chip), None)
+        for each in reversed(self.parts):
+            seen = each.ended.chip if each.ended is not None and _judged(each) else None
+            if each.serial != serial and seen is not None and seen.is_that(chip):
+                return each
+        return None
 
     def folder_of(self, serial: str) -> str:
         """A folder's name for the next part: its place and what of its number a file system takes."""

@@ -29,6 +29,11 @@ class AtTheTerminal:
         """Whether somebody sits there who can answer."""
         return self.asked
 
+    @property
+    def listed(self) -> bool:
+        """Whether the numbers come from a list."""
+        return self.numbers is not None
+
     def next_part(self, done: Sequence[Part]) -> str | None:
         """The next number of the list, or the one that is typed or scanned."""
         if self.numbers is not None:

@@ -17,10 +17,16 @@ LABELS = "labels"
 
 
 class Operator(Protocol):
-    """Whoever names the parts and is asked; not `attended`, nobody can say that a doubt is none."""
+    """Whoever names the parts and is asked; not `attended`, nobody can say that a doubt is none.
+
+    Where the numbers are `listed`, one that is not run stands in the table; one that was typed is typed again.
+    """
 
     @property
     def attended(self) -> bool: ...
+
+    @property
+    def listed(self) -> bool: ...
 
     def next_part(self, done: Sequence[Part]) -> str | None:
         """The next serial number; None where no part follows."""
@@ -111,11 +117,11 @@ class Work:
         while (serial := self.operator.next_part(self.journal.batch.parts)) is not None:
             doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today(serial))
             right = doubt is None or (not doubt.final and self.operator.goes_on(doubt))
-            if right or not self.operator.attended:
+            if right or self.operator.listed:
                 self._enter(PartBegun(serial, self.journal.batch.folder_of(serial), now_utc()))
             if right:
                 return self.journal.batch.in_hand
-            if doubt is not None and not self.operator.attended:
+            if doubt is not None and self.operator.listed:
                 self._ended(PartEnded("refused", now_utc(), doubt.why))
         return None
 

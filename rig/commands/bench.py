@@ -25,13 +25,13 @@ from rig.commands.remember import remember
 from rig.config.models import RigConfig
 from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
-from rig.data.run_folder import ARM_LOG, CONFIG, LOG, WORLD_LATE, discard, new_folder
+from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, WORLD_LATE, discard, new_folder
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.stated import of_configuration
 from rig.runner.ahead import Ahead
 from rig.runner.phases import Run
-from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten
+from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten, SamplingStarted
 from rig.station.log import log
 from rig.station.station import Listener, Stations
 from rig.station.view import view
@@ -40,9 +40,11 @@ from rig.turners.registry import kind_of
 
 @dataclass(slots=True)
 class Heard:
-    """A listener of one run: what board it met, and whether its end says that refused sweeps can be repeated."""
+    """A listener of one run: what board it met, whether anything was recorded, and whether its end says that refused
+    sweeps can be repeated."""
 
     chip: Chip | None = None
+    recorded: bool = False
     repeats: bool = False
 
     def event(self, event: RunEvent) -> None:
@@ -50,6 +52,8 @@ class Heard:
         match event:
             case BoardConnected(_, identity):
                 self.chip = Chip(identity.unique_id, tuple(each.who_am_i for each in identity.sensors if each.present))
+            case SamplingStarted():
+                self.recorded = True
             case Advice(_, repeats):
                 self.repeats = repeats
 
@@ -108,6 +112,8 @@ class RigBench:
     def run(self, part: Part, folder: Path, desk: Desk) -> PartEnded:
         """Run the part in `folder`, or go on there; refused sweeps are repeated at once. Raises Refused, Fault."""
         of_part = self._of(part.serial)
+        if (folder / RESULT).exists() and (ended := _finished(folder, of_part)) is not None:
+            return ended
         new = _prepared(folder, of_part)
         heard, began_s = Heard(), time.monotonic()
 
@@ -120,7 +126,7 @@ class RigBench:
         try:
             outcome, repeated = self._outcome(folder, of_part, heard, answer)
         except Refused:
-            if new:
+            if new and not heard.recorded:
                 discard(folder)
             raise
         finally:
@@ -204,6 +210,17 @@ def refuse_other_sensors(config: RigConfig) -> None:
             f"station.sensors names {', '.join(others)}; calibrated are {', '.join(config.to_calibrate)}",
             "Name sensors with role: calibrate, or leave station.sensors out",
         )
+
+
+def _finished(folder: Path, of_part: Configured) -> PartEnded | None:
+    """What came of a run that had its result when the station was killed; None where sweeps are left to repeat."""
+    found = read_result(folder)
+    failed = [check for check in found.checks if not check.passed]
+    if any(check.means.sweep is not None for check in failed):
+        return None
+    remember(folder, of_part.loaded.config.history)
+    why, chip = ", ".join(check.name for check in failed), Chip(found.provenance.board_unique_id)
+    return PartEnded(found.verdict, now_utc(), why, _certificate(folder, of_part), chip=chip)
 
 
 def _prepared(folder: Path, of_part: Configured) -> bool:

@@ -59,3 +59,11 @@ def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: P
     assert done.returncode == 0, done.stderr + done.stdout
     assert [(each["serial_number"], each["verdict"]) for each in rows(out)] == [("G-001", "pass"), ("G-002", "pass")]
     assert len(list((out / "01-G-001").glob("run*.h5"))) == 2  # what was recorded before the kill counts
+
+    # A kill between the result and its entry: the part is not run again.
+    journal = out / "batch.jsonl"
+    journal.write_text("".join(journal.read_text(encoding="utf-8").splitlines(keepends=True)[:-2]), encoding="utf-8")
+    done = rig(*command)
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert [each["verdict"] for each in rows(out)] == ["pass", "pass"]
+    assert "sampling" not in done.stderr
