@@ -159,12 +159,12 @@ class Work:
             )
 
     def _ended(self, ended: PartEnded) -> None:
-        self._enter(ended)
         part = self.journal.batch.parts[-1]
         if ended.outcome == "pass":
-            self._labelled(part, ended)
+            self._labelled(part, ended)  # first: what has ended is not looked at again after a kill
+        self._enter(ended)
         self._written()
-        self.operator.hears(part)
+        self.operator.hears(self.journal.batch.parts[-1])
 
     def _labelled(self, part: Part, ended: PartEnded) -> None:
         marks = "SIMULATED, NOT A MEASUREMENT" if self.bench.simulated else ""

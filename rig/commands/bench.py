@@ -155,7 +155,7 @@ class RigBench:
                 left, heard.repeats = config.station.repeats - repeated, False
                 try:
                     outcome = this.carry_out(phase)
-                    if not left or all(each.passed or each.means.sweep is None for each in outcome.checks):
+                    if outcome.passed or not left or not this.refused_sweeps(phase):
                         break
                 except Fault:
                     if not (left and heard.repeats):

@@ -25,7 +25,7 @@ def run(options: Namespace) -> int:
     from rig.history.place import own_place
     from rig.history.store import open_history
     from rig.page.control import Control
-    from rig.page.serving import serving
+    from rig.page.serving import Page, serving
 
     place = own_place(named_history(options.history))
     if place is None or (isinstance(place.where, Path) and not place.where.exists()):
@@ -34,7 +34,7 @@ def run(options: Namespace) -> int:
     with open_history(place):
         pass  # one that cannot be read is refused before there is a page
     address = PageWish(options.page_address, token_said(options)).address()
-    with looking(place) as feed, serving(feed, Control(may_answer=False), None, address, "floor.html") as url:
+    with looking(place) as feed, serving(feed, Control(may_answer=False), None, address, Page("floor.html")) as url:
         say(f"page: {url}", sys.stderr)
         wait_for_interrupt()
     return 0

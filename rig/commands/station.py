@@ -5,20 +5,22 @@ import shlex
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
+from rig.commands.page_arguments import add_place, wish
 from rig.errors import Fault
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.batch.operators import AtTheTerminal
+    from rig.batch.now import Present
+    from rig.batch.operators import Asked, Voice
     from rig.commands.configured import Configured
+    from rig.commands.page_arguments import PageWish
     from rig.config.models import RigConfig
-    from rig.floor.heartbeat import Heartbeat
 
 
 def add(parser: ArgumentParser) -> None:
@@ -37,6 +39,9 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument("--operator", default="", metavar="NAME", help="who runs the rig, for the history")
     parser.add_argument("--work-order", default="", metavar="NUMBER", help="what the parts belong to, for the history")
     parser.add_argument("--yes", action="store_true", help="with --series: ask nothing, not even before the arm moves")
+    parser.add_argument("--page", action="store_true", help="ask the operator in a browser, and show the tray there")
+    parser.set_defaults(confirm_on_page=False)
+    add_place(parser)
     add_json(parser)
 
 
@@ -46,21 +51,27 @@ def run(options: Namespace) -> int:
     Raises Refused as `configured`, `claimed`, `numbers_in` and `opened`; `missing_extra`, `not_confirmed`.
     """
     from rig.batch.label import refuse_without_library
-    from rig.batch.operators import AtTheTerminal, refuse_without_terminal
+    from rig.batch.now import Now, Present
+    from rig.batch.operators import Asked, Terminal, refuse_without_terminal
     from rig.batch.series import numbers_in
     from rig.commands.configured import configured_here
 
     refuse_without_library()
     numbers = None if options.series is None else numbers_in(options.series)
-    with configured_here(options.config, options.overrides, options.script) as found:
+    page = wish(options)
+    with configured_here(options.config, options.overrides, options.script) as found, ExitStack() as stack:
+        present = Present(Now(simulated=found.loaded.simulated))
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
-        asked = numbers is None or not (options.yes or found.loaded.simulated)
-        if asked:
+        voice: Voice | None = None
+        if page is not None:
+            voice = stack.enter_context(_page(page, present))
+        elif numbers is None or not (options.yes or found.loaded.simulated):
             refuse_without_terminal()
-        return _carried_out(options, found, AtTheTerminal(asked, numbers))
+            voice = Terminal()
+        return _carried_out(options, found, Asked(voice, numbers), present)
 
 
-def _carried_out(options: Namespace, found: "Configured", operator: "AtTheTerminal") -> int:
+def _carried_out(options: Namespace, found: "Configured", operator: "Asked", present: "Present") -> int:
     from rig.batch.batch import Begun
     from rig.batch.journal import opened
     from rig.batch.table import CSV, summary
@@ -72,13 +83,10 @@ def _carried_out(options: Namespace, found: "Configured", operator: "AtTheTermin
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
+    station = Station(operator.attended, said.operator, said.work_order, (present,))
     try:
-        with beating(config, simulated=found.loaded.simulated) as heart:
-            listeners = () if heart is None else (heart,)
-            station = Station(operator.attended, said.operator, said.work_order, listeners)
-            with bench(found, folder, station) as at:
-                told = (lambda batch: None) if heart is None else heart.batch
-                Work(journal, config.station, operator, at, told).all_parts()
+        with _beating(config, present), bench(found, folder, station) as at:
+            Work(journal, config.station, operator, at, present.batch).all_parts()
     except (Fault, KeyboardInterrupt):
         say(f"the batch is kept in {folder}; go on with: {_again(options, folder)}", sys.stderr)
         raise
@@ -91,18 +99,35 @@ def _carried_out(options: Namespace, found: "Configured", operator: "AtTheTermin
 
 
 @contextmanager
-def beating(config: "RigConfig", *, simulated: bool) -> "Iterator[Heartbeat | None]":
-    """The station's heartbeat in the history that its runs are entered in, None where they are entered in none."""
+def _beating(config: "RigConfig", present: "Present") -> Iterator[None]:
+    """The station's heartbeat in the history that its runs are entered in; none where they are entered in none."""
     from rig.floor.heartbeat import heartbeat
-    from rig.floor.now import Now
     from rig.history.place import chosen_place
 
     place = chosen_place(config.history)
     if place is None:
-        yield None
+        yield
         return
-    with heartbeat(config.history.rig or config.turner.address or "by hand", place, Now(simulated=simulated)) as heart:
-        yield heart
+    with heartbeat(config.history.rig or config.turner.address or "by hand", place, present.now) as heart:
+        present.hears = (*present.hears, heart.hear)
+        yield
+
+
+@contextmanager
+def _page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
+    """The station's page, on which the operator is asked."""
+    from rig.batch.on_page import OnPage
+    from rig.page.control import Control
+    from rig.page.sections import Sections
+    from rig.page.serving import Page, serving
+
+    sections, control = Sections(), Control(may_answer=False)
+    voice = OnPage(sections, control)
+    with serving(sections, control, None, wanted.address(), Page("station.html", voice.routes)) as url:
+        say(f"page: {url}", sys.stderr)
+        present.hears = (*present.hears, voice.hear)
+        with control.stoppable():
+            yield voice
 
 
 def _again(options: Namespace, folder: Path) -> str:
@@ -110,6 +135,6 @@ def _again(options: Namespace, folder: Path) -> str:
     series = [] if options.series is None else ["--series", str(options.series)]
     script = [] if options.script is None else ["--script", str(options.script)]
     changes = [word for each in options.overrides for word in ("--set", each)]
-    agreed = ["--yes"] if options.yes else []
+    agreed = [*(["--yes"] if options.yes else []), *(["--page"] if options.page else [])]
     words = ["rig", "station", str(options.config), *changes, *script, "--out", str(folder), *series, *agreed]
     return shlex.join(words)

@@ -4,7 +4,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from typing import Any
 
 from sqlalchemy import func, select
 
@@ -13,48 +12,16 @@ from rig.floor import shown
 from rig.history import schema, stations
 from rig.history.place import Place
 from rig.history.store import History, open_history
-from rig.page.feed import frame_of
+from rig.page.sections import Sections
 
 LOOK_S = 1.0
 
 
-class FloorFeed:
-    """All that is shown; `history` says whether it answers."""
-
-    ended = False
-
-    def __init__(self, label: str) -> None:
-        self._lock = threading.Lock()
-        self._shown: dict[str, Any] = {"history": {"label": label, "silent": None}}
-        self._changed: dict[str, Any] = {}
-
-    def put(self, sections: dict[str, Any]) -> None:
-        """Show sections; what is as before is no news."""
-        with self._lock:
-            for name, section in sections.items():
-                if self._shown.get(name) != section:
-                    self._shown[name] = self._changed[name] = section
-
-    def silent(self, why: str | None) -> None:
-        """The history does not answer, and why; None when it does."""
-        self.put({"history": {**self._shown["history"], "silent": why}})
-
-    def whole(self) -> bytes:
-        """Everything, for a browser that has nothing yet."""
-        with self._lock:
-            return frame_of("all", self._shown)
-
-    def news(self) -> bytes | None:
-        """What has changed since the last time, None if nothing has."""
-        with self._lock:
-            changed, self._changed = self._changed, {}
-        return frame_of("some", changed) if changed else None
-
-
 @contextmanager
-def looking(place: Place) -> Iterator[FloorFeed]:
+def looking(place: Place) -> Iterator[Sections]:
     """A feed that is kept up to date for the length of the `with` block; the history is only read."""
-    feed, over = FloorFeed(place.label), threading.Event()
+    feed, over = Sections(), threading.Event()
+    feed.put(history={"label": place.label, "silent": None})
     thread = threading.Thread(target=_look, args=(place, feed, over), name="floor", daemon=True)
     thread.start()
     try:
@@ -64,32 +31,28 @@ def looking(place: Place) -> Iterator[FloorFeed]:
         thread.join(LOOK_S)
 
 
-def _look(place: Place, feed: FloorFeed, over: threading.Event) -> None:
+def _look(place: Place, feed: Sections, over: threading.Event) -> None:
     while not over.is_set():
         try:
             with open_history(place) as history:
+                feed.put(history={"label": place.label, "silent": None})
                 _follow(history, feed, over)
         except Exception as error:  # the page says it, and goes on trying
-            feed.silent(error.what if isinstance(error, Refused) else f"{type(error).__name__}: {error}")
+            why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+            feed.put(history={"label": place.label, "silent": why})
             over.wait(LOOK_S)
 
 
-def _follow(history: History, feed: FloorFeed, over: threading.Event) -> None:
-    before: Any = None
+def _follow(history: History, feed: Sections, over: threading.Event) -> None:
+    before: object = None
     while not over.is_set():
         today = datetime.now(UTC).date()
-        feed.put({"rigs": shown.rigs(stations.heard(history.engine))})
+        feed.put(rigs=shown.rigs(stations.heard(history.engine)))
         entered = today, _entered(history)
         if entered != before:  # trends of a long history take longer than a second
             before, pasts = entered, history.calibrations()
-            feed.put(
-                {
-                    "today": shown.todays(pasts, today),
-                    "standards": shown.standards(pasts),
-                    "recalls": shown.recalls(pasts, today),
-                }
-            )
-        feed.silent(None)
+            recalls = shown.recalls(pasts, today)
+            feed.put(today=shown.todays(pasts, today), standards=shown.standards(pasts), recalls=recalls)
         over.wait(LOOK_S)
 
 

@@ -10,12 +10,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rig.batch.batch import Batch
-from rig.floor.now import Now, after, of_batch
+from rig.batch.now import Now
 from rig.history import stations
 from rig.history.place import Place
 from rig.history.store import open_history
-from rig.station.events import Progress, RunEvent
 
 if TYPE_CHECKING:
     from sqlalchemy import Engine
@@ -26,7 +24,7 @@ LAST_BEAT_S = 2.0  # that the last word may take
 
 
 class Heartbeat:
-    """What the station says of itself; a listener of its runs, and told of its batch."""
+    """What the station says of itself."""
 
     def __init__(self, rig: str, place: Place, now: Now) -> None:
         self._rig, self._place, self._now = rig, place, now
@@ -34,16 +32,12 @@ class Heartbeat:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._beat, name="heartbeat", daemon=True)
 
-    def event(self, event: RunEvent) -> None:
-        """Take an event, as a Listener does."""
-        before, self._now = self._now, after(self._now, event)
-        if self._now.state != before.state and not isinstance(event, Progress):
+    def hear(self, now: Now) -> None:
+        """What the station does has changed; a new state is told at once."""
+        news = now.state != self._now.state or now.part != self._now.part
+        self._now = now
+        if news:
             self._changed.set()
-
-    def batch(self, batch: Batch) -> None:
-        """The batch has changed."""
-        self._now = of_batch(self._now, batch)
-        self._changed.set()
 
     def start(self) -> None:
         """Begin to tell."""

@@ -1,10 +1,10 @@
 """What the floor's page shows, made of what stations tell and of what a history has. Pure."""
 
+import json
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, timedelta
 from typing import Any
 
-from rig.floor.now import read
 from rig.history.series import rig_states, subjects, trends
 from rig.history.stations import Told
 from rig.history.store import Past
@@ -19,7 +19,7 @@ def rigs(told: Iterable[Told]) -> list[dict[str, Any]]:
     """Each rig as it is now; one that is silent without a last word is dead, whatever it said before."""
     shown = []
     for each in told:
-        said = read(each.told)
+        said = _read(each.told)
         state = str(said.get("state", "ended"))
         if said.get("over"):
             state = state if state in ENDINGS else "ended"
@@ -68,3 +68,12 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
             row = {"day": day.isoformat(), "overdue": day < today, "serial": serial, "sensor": f"{part}, {quantity}"}
             found.append({**row, "parameter": name, "simulated": simulated})
     return sorted(found, key=lambda row: str(row["day"]))[:MOST]
+
+
+def _read(told: str) -> dict[str, Any]:
+    """What a station told; nothing of what is no such text."""
+    try:
+        said = json.loads(told)
+    except ValueError:
+        return {}
+    return said if isinstance(said, dict) else {}

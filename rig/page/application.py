@@ -51,14 +51,27 @@ def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
     return [*files, Route("/events", stream)]
 
 
+def acting(door: Door, handler: Handler) -> Handler:
+    """A handler for those alone who have the token."""
+
+    async def allowed(request: Request) -> Response:
+        return await handler(request) if door.may_act(request.headers) else _refused()
+
+    return allowed
+
+
+async def body_of(request: Request) -> bytes:
+    """A request's body; nothing of one that is longer than any that is wanted."""
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LARGEST_BODY:
+            return b""
+    return body
+
+
 def of_a_run(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
     """The addresses of a run in `folder`: its certificate, and the two that act."""
-
-    def acting(handler: Handler) -> Handler:
-        async def allowed(request: Request) -> Response:
-            return await handler(request) if door.may_act(request.headers) else _refused()
-
-        return allowed
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):
@@ -90,8 +103,8 @@ def of_a_run(broadcast: Broadcast, control: Control, door: Door, folder: Path) -
 
     return [
         Route(f"/{CERTIFICATE}", certificate),
-        Route("/stop", acting(stop), methods=["POST"]),
-        Route("/answer", acting(answer), methods=["POST"]),
+        Route("/stop", acting(door, stop), methods=["POST"]),
+        Route("/answer", acting(door, answer), methods=["POST"]),
     ]
 
 
@@ -107,13 +120,8 @@ def _file(name: str) -> Handler:
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
     """The question's number and the answer; None for anything else."""
-    body = b""
-    async for piece in request.stream():
-        body += piece
-        if len(body) > LARGEST_BODY:
-            return None
     try:
-        said = json.loads(body)
+        said = json.loads(await body_of(request))
     except ValueError:
         return None
     if not isinstance(said, dict) or type(said.get("number")) is not int or type(said.get("agreed")) is not bool:

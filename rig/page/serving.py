@@ -4,7 +4,7 @@ import asyncio
 import socket
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -20,6 +20,7 @@ from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     import uvicorn
+    from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
 LAST_NEWS_S = 2.0  # for browsers to take what was shown last
@@ -48,13 +49,22 @@ class Address:
             return self.host == "localhost"
 
 
-@contextmanager
-def serving(
-    feed: Source, control: Control, folder: Path | None, address: Address, home: str = "page.html"
-) -> Iterator[str]:
-    """Show `feed` to browsers, on the page `home`, for the length of the block; yields its address, with the token.
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Which page opens first, its `home`, and the addresses that it has beyond those to look on."""
 
-    Without a `folder` there is no run behind it: nothing that acts, and no certificate.
+    home: str = "page.html"
+    routes: "Callable[[Door], Sequence[Route]]" = lambda door: ()
+
+
+RUN = Page()
+
+
+@contextmanager
+def serving(feed: Source, control: Control, folder: Path | None, address: Address, shown: Page = RUN) -> Iterator[str]:
+    """Show `feed` to browsers on a page for the length of the block; yields its address, with the token.
+
+    Without a `folder` there is no run behind it, which could be stopped, and no certificate.
     A page that fails says so on stderr and is gone: what it shows goes on. Raises Refused `page_address`.
     """
     check(address)
@@ -65,7 +75,7 @@ def serving(
     token = address.token or new_token()
     door = Door(frozenset(f"{name}:{port}".lower() for name in names), token, not address.loopback)
     broadcast = Broadcast(feed)
-    server = _server(broadcast, control, door, folder, home)
+    server = _server(broadcast, control, door, folder, shown)
     loop, over = asyncio.new_event_loop(), asyncio.Event()
 
     async def serve() -> None:
@@ -108,13 +118,13 @@ def serving(
         thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
 
 
-def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, home: str) -> "uvicorn.Server":
+def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
     import uvicorn
 
     from rig.page.application import guarded, looking, of_a_run
 
     connections = Connections()
-    served = looking(broadcast, door, home)
+    served = [*looking(broadcast, door, shown.home), *shown.routes(door)]
     if folder is not None:
         served = [*served, *of_a_run(broadcast, control, door, folder)]
     config = uvicorn.Config(

@@ -75,6 +75,14 @@ class Run:
             outcome = self._judged(phase, runs, outcome)
         return self._written(outcome)
 
+    def refused_sweeps(self, phase: Phase) -> bool:
+        """Whether sweeps or dwells of a phase that was carried out do not count: to carry it out again repeats them."""
+        if phase.procedure.reads_corrected:
+            return False
+        plan = phase.plan()
+        planned = {each.index for each in (*plan.sweeps, *plan.dwells)}
+        return bool(planned - self._resumed(phase).done)
+
     def _resumed(self, phase: Phase) -> Resumption:
         """What counts of the phase's recordings before. Corrected readings are compared as one movement: none do."""
         if phase.procedure.reads_corrected:

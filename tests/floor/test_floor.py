@@ -16,16 +16,17 @@ import numpy as np
 import pytest
 
 from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
+from rig.batch.now import Now, after, of_batch
 from rig.errors import Fault, Refused
 from rig.floor import shown
-from rig.floor.feed import FloorFeed, looking
-from rig.floor.now import Now, after, of_batch
+from rig.floor.feed import looking
 from rig.history import stations
 from rig.history.place import place
 from rig.history.stations import Told
 from rig.history.store import open_history
 from rig.page.control import Control
-from rig.page.serving import Address, serving
+from rig.page.sections import Sections
+from rig.page.serving import Address, Page, serving
 from rig.station.events import Failed, Prompt, SamplingStarted
 from support.past_runs import FIRST, finished
 from support.postgres import postgresql
@@ -130,8 +131,8 @@ def test_the_database_alone_tells_ages(tmp_path: Path) -> None:
 
 def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tmp_path: Path) -> None:
     token = "a-token-of-two-and-twenty"
-    feed = FloorFeed("history.sqlite")
-    with serving(feed, Control(may_answer=False), None, Address(port=0, token=token), "floor.html") as page:
+    feed = Sections()
+    with serving(feed, Control(may_answer=False), None, Address(port=0, token=token), Page("floor.html")) as page:
         port = urlsplit(page).port or 0
 
         def asked(method: str, path: str, **headers: str) -> tuple[int, str]:
@@ -162,12 +163,12 @@ def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
             process.kill()
 
 
-def sections(feed: FloorFeed) -> dict[str, Any]:
+def sections(feed: Sections) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(feed.whole().split(b"data: ", 1)[1])
     return found
 
 
-def until(feed: FloorFeed, so: Callable[[dict[str, str]], bool], within_s: float) -> None:
+def until(feed: Sections, so: Callable[[dict[str, str]], bool], within_s: float) -> None:
     deadline_s = time.monotonic() + within_s
     states: dict[str, str] = {}
     while not so(states):

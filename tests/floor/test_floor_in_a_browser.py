@@ -8,13 +8,14 @@ import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
-from rig.floor.feed import FloorFeed, looking
-from rig.floor.now import Now
+from rig.batch.now import Now
+from rig.floor.feed import looking
 from rig.history import stations
 from rig.history.place import place
 from rig.history.store import open_history
 from rig.page.control import Control
-from rig.page.serving import Address, serving
+from rig.page.sections import Sections
+from rig.page.serving import Address, Page, serving
 from support.browser import legible, needs_browser, picture, screen, text, until
 from support.past_runs import FIRST, finished
 
@@ -29,7 +30,7 @@ SAID = {
 
 
 @pytest.fixture
-def feed(tmp_path: Path) -> Iterator[FloorFeed]:
+def feed(tmp_path: Path) -> Iterator[Sections]:
     where = place(str(tmp_path / "history.sqlite"))
     days = (datetime.now(UTC) - FIRST).total_seconds() / 86400
     with open_history(where) as history:
@@ -42,8 +43,8 @@ def feed(tmp_path: Path) -> Iterator[FloorFeed]:
             yield found
 
 
-def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: FloorFeed) -> None:
-    with serving(feed, Control(may_answer=False), None, Address(port=0), "floor.html") as url:
+def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections) -> None:
+    with serving(feed, Control(may_answer=False), None, Address(port=0), Page("floor.html")) as url:
         driver.get(url)
         until(lambda: len(cards(driver)) == len(SAID), "a card for each rig")
         names = [each.text for each in driver.find_elements(By.CSS_SELECTOR, ".rig h3 span:first-child")]

@@ -6,9 +6,9 @@ A line on its standard input is the name of an error that ends its run.
 import sys
 
 from rig.batch.batch import Begun, PartBegun, state_of
+from rig.batch.now import Now, Present
 from rig.errors import Fault
 from rig.floor.heartbeat import heartbeat
-from rig.floor.now import Now
 from rig.history.place import place
 from rig.station.events import Failed, SamplingStarted
 
@@ -16,11 +16,12 @@ from rig.station.events import Failed, SamplingStarted
 def main(url: str, rig: str) -> None:
     begun = Begun("A. Person", "W-17", "2026-11-25T08:00:00+00:00")
     with heartbeat(rig, place(url), Now()) as heart:
-        heart.batch(state_of([begun, PartBegun(f"{rig}-001", "01", begun.at_utc)]))
-        heart.event(SamplingStarted())
+        present = Present(Now(), (heart.hear,))
+        present.batch(state_of([begun, PartBegun(f"{rig}-001", "01", begun.at_utc)]))
+        present.event(SamplingStarted())
         print("beats", flush=True)
         for line in sys.stdin:
-            heart.event(Failed(Fault(line.strip(), "the cable was pulled out", "Plug it in")))
+            present.event(Failed(Fault(line.strip(), "the cable was pulled out", "Plug it in")))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """What a station is doing at this moment, made of its batch and of the events of its runs."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from rig.batch.batch import Batch
@@ -46,6 +47,31 @@ class Now:
         return json.dumps(asdict(self), separators=(",", ":"), ensure_ascii=False)
 
 
+@dataclass(slots=True)
+class Present:
+    """What a station is doing, kept up to date: a listener of its runs, and told of its batch.
+
+    `hears` are told of every change, and must not block.
+    """
+
+    now: Now
+    hears: Sequence[Callable[[Now], None]] = field(default=())
+
+    def event(self, event: RunEvent) -> None:
+        """Take an event, as a Listener does."""
+        self._becomes(after(self.now, event))
+
+    def batch(self, batch: Batch) -> None:
+        """The batch has changed."""
+        self._becomes(of_batch(self.now, batch))
+
+    def _becomes(self, now: Now) -> None:
+        if now != self.now:
+            self.now = now
+            for hear in self.hears:
+                hear(now)
+
+
 def of_batch(now: Now, batch: Batch) -> Now:
     """What is told once something of the batch has changed."""
     in_hand = batch.in_hand
@@ -87,12 +113,3 @@ def after(now: Now, event: RunEvent) -> Now:
         case Interrupted(text):
             changed = {"state": "stopped", "doing": text}
     return now if changed is None else replace(now, **{"left_s": None, **changed})
-
-
-def read(told: str) -> dict[str, Any]:
-    """What a station told, as a page is handed it; nothing of what is no such text."""
-    try:
-        said = json.loads(told)
-    except ValueError:
-        return {}
-    return said if isinstance(said, dict) else {}
