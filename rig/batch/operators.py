@@ -9,6 +9,7 @@ from rig.batch.batch import Doubt, Part
 from rig.batch.series import following
 from rig.errors import Refused, RigError
 from rig.errors.quoting import printable_lines
+from rig.station.events import Prompt
 from rig.station.plain_text import for_file, say
 
 YES = ("yes", "y", "go")
@@ -83,8 +84,10 @@ class Asked:
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Whether the operator says go; what nobody is asked was agreed to before."""
-        return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
+        """Whether the operator says go, or yes to something else; what nobody is asked was agreed to before."""
+        if to_do == Prompt(()).to_do:
+            return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
+        return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
 
     def hears(self, part: Part) -> None:
         """Told on stdout, a line for each part."""

@@ -80,7 +80,7 @@ class Run:
         if phase.procedure.reads_corrected:
             return False
         plan = phase.plan()
-        planned = {each.index for each in (*plan.sweeps, *plan.dwells)}
+        planned = {sweep.index for sweep in plan.sweeps} | {dwell.index for dwell in plan.dwells}
         return bool(planned - self._resumed(phase).done)
 
     def _resumed(self, phase: Phase) -> Resumption:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from selenium.webdriver import Chrome
-from selenium.webdriver.common.by import By
 
 from rig.batch.now import Now
 from rig.floor.feed import looking
@@ -47,8 +46,7 @@ def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections)
     with serving(feed, Control(may_answer=False), None, Address(port=0), Page("floor.html")) as url:
         driver.get(url)
         until(lambda: len(cards(driver)) == len(SAID), "a card for each rig")
-        names = [each.text for each in driver.find_elements(By.CSS_SELECTOR, ".rig h3 span:first-child")]
-        assert names == list(SAID)  # a name is text, whatever is in it
+        assert cards(driver, " h3 span:first-child") == list(SAID)  # a name is text, whatever is in it
         until(lambda: "no sign of life" in cards(driver)[2], "that nothing comes from the third")
         assert "fault" in cards(driver)[1] and "board_link_lost" in cards(driver)[1] and "G-104" in cards(driver)[1]
         until(lambda: "in control" in text(driver, "standards"), "the check standard")
@@ -59,8 +57,8 @@ def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections)
             assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
 
 
-def cards(driver: Chrome) -> list[str]:
-    """What the rigs' cards say; they are made anew every second."""
-    script = "return [...document.querySelectorAll('.rig')].map((each) => each.innerText)"
-    found: list[str] = driver.execute_script(script)
+def cards(driver: Chrome, part: str = "") -> list[str]:
+    """What the rigs' cards say, or a part of each; in one go, for they are made anew every second."""
+    script = "return [...document.querySelectorAll(arguments[0])].map((each) => each.innerText)"
+    found: list[str] = driver.execute_script(script, f".rig{part}")
     return found
