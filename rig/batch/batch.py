@@ -1,10 +1,11 @@
 """The state of a batch, and what may be done next: made of the entries of its journal alone. Pure."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from rig.config.sensor_sections import checked_serial_number
 from rig.config.station_section import StationSection
 
 Outcome = Literal["pass", "fail", "refused", "fault"]
@@ -163,15 +164,19 @@ class Doubt:
     final: bool = False
 
 
-def doubt_of(serial: str, batch: Batch, section: StationSection, before: str | None) -> Doubt | None:
-    """What speaks against running that number now; `before` tells of a run of today that the history knows."""
+def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
+    """What speaks against running that number now; `today` tells of a run of today that the history knows."""
+    try:
+        checked_serial_number(serial)
+    except ValueError as error:
+        return Doubt(f"{serial} is no serial number: {error}", final=True)
     if re.fullmatch(section.serial_pattern, serial, re.ASCII) is None:
         return Doubt(f"{serial} does not match the pattern {section.serial_pattern}", final=True)
     if section.parts and serial not in section.parts:
         return Doubt(f"there is no part {serial} in station.parts")
     if (done := batch.done(serial)) is not None:
         return Doubt(f"{serial} is done: part {done.number} of this batch, {done.state.upper()}")
-    if before is not None:
+    if (before := today(serial)) is not None:
         return Doubt(f"{serial} was calibrated today: {before}")
     return None
 

@@ -115,7 +115,7 @@ class Work:
     def _named(self) -> Part | None:
         """The next part, entered; None where none follows."""
         while (serial := self.operator.next_part(self.journal.batch.parts)) is not None:
-            doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today(serial))
+            doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today)
             right = doubt is None or (not doubt.final and self.operator.goes_on(doubt))
             if right or self.operator.listed:
                 self._enter(PartBegun(serial, self.journal.batch.folder_of(serial), now_utc()))
@@ -144,9 +144,8 @@ class Work:
         if not self.section.own_board:
             return
         other = self.journal.batch.same_chip(chip, part.serial)
-        known = (
-            f"{other.serial}, part {other.number} of this batch" if other else self.bench.known_as(chip, part.serial)
-        )
+        here = f"{other.serial}, part {other.number} of this batch" if other else None
+        known = here or self.bench.known_as(chip, part.serial)
         if known is None:
             return
         doubt = Doubt(f"what is mounted as {part.serial} is {chip}, which was {known}")
@@ -185,5 +184,5 @@ class Work:
 
 
 def now_utc() -> str:
-    """This moment, as a batch writes it."""
+    """The time of this moment, as a batch writes it."""
     return datetime.now(UTC).isoformat(timespec="seconds")

@@ -115,22 +115,23 @@ class RigBench:
         if (folder / RESULT).exists() and (ended := _finished(folder, of_part)) is not None:
             return ended
         new = _prepared(folder, of_part)
-        heard, began_s = Heard(), time.monotonic()
+        heard, began_s, asked = Heard(), time.monotonic(), False
 
         def answer(announcement: Sequence[str], to_do: str) -> bool:
-            nonlocal began_s
-            agreed = desk.agrees(announcement, to_do, heard.chip)
+            nonlocal began_s, asked
+            chip, asked = None if asked else heard.chip, True  # whose it is, is asked once
+            agreed = desk.agrees(announcement, to_do, chip)
             began_s = time.monotonic()
             return agreed
 
         try:
             outcome, repeated = self._outcome(folder, of_part, heard, answer)
-        except Refused:
-            if new and not heard.recorded:
+        except (Refused, Fault) as error:
+            if isinstance(error, Refused) and new and not heard.recorded:
                 discard(folder)
-            raise
-        finally:
             self.ahead.begin()
+            raise
+        self.ahead.begin()
         why = "" if outcome.passed else ", ".join(each.name for each in outcome.checks if not each.passed)
         return PartEnded(
             "pass" if outcome.passed else "fail",

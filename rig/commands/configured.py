@@ -43,7 +43,7 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
 
 
 def changed(found: Configured, overrides: Sequence[str]) -> Configured:
-    """The same with values changed, as `load` takes them, and with its script. Raises Refused as `configured`."""
+    """A configuration with values changed, as `load` takes them, and its script. Raises Refused as `configured`."""
     procedures: Procedures = {**installed(), found.script.procedure.name: found.script.procedure}
     with script_errors(f"the section of {found.script.name} fails"):
         loaded = parse(found.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
