@@ -55,7 +55,9 @@ def run(options: Namespace) -> int:
     from rig.batch.operators import Asked, Terminal, refuse_without_terminal
     from rig.batch.series import numbers_in
     from rig.commands.configured import configured_here
+    from rig.commands.one_arena import keep_to_one_arena
 
+    keep_to_one_arena()
     refuse_without_library()
     numbers = None if options.series is None else numbers_in(options.series)
     page = wish(options)
