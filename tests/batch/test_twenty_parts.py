@@ -120,6 +120,6 @@ def test_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path, thorough: boo
     assert max(motion_s) <= FIRST_MOTION_S
     if os.getloadavg()[0] <= (os.cpu_count() or 1):  # a crowded machine says nothing: processes are started in it
         assert max(next_s) <= NEXT_S
-    # Of a few parts the least: what is connected ahead comes and goes beside what stays.
+    # The most of a few parts: what is connected ahead comes and goes, and a part with repeated sweeps needs more.
     if thorough:
-        assert min(memory[-4:]) <= (1 + GROWTH) * min(memory[1:5])
+        assert max(memory[-4:]) <= (1 + GROWTH) * max(memory[1:5])
