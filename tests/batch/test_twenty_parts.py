@@ -15,7 +15,7 @@ from support.commands import configuration
 from support.scanner import Scanner, station
 
 NEXT_S, FIRST_MOTION_S = 3.0, 2.0
-GROWTH = 0.02
+GROWTH = 0.1  # of twenty parts 0.1 % and 4.4 % were measured: a leak of every run's data would be 15 %
 WRIST_3, TURNING_RAD_S = 5, 0.2
 pytestmark = [pytest.mark.slow, pytest.mark.proof]
 
