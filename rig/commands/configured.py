@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.commands.own_address import own_address
-from rig.config.load import Loaded, load
+from rig.config.load import Loaded, load, parse
 from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections
 from rig.plans.script_errors import script_errors
@@ -40,6 +40,14 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
     if script is None:
         script = installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))
+
+
+def changed(found: Configured, overrides: Sequence[str]) -> Configured:
+    """A configuration with values changed, as `load` takes them, and its script. Raises Refused as `configured`."""
+    procedures: Procedures = {**installed(), found.script.procedure.name: found.script.procedure}
+    with script_errors(f"the section of {found.script.name} fails"):
+        loaded = parse(found.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
+    return Configured(loaded, found.script, first_phase(found.script.procedure, loaded.config, procedures))
 
 
 @contextmanager

@@ -5,7 +5,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -57,14 +57,19 @@ def hands_of(control: str) -> Callable[[int], None]:
 
     `control` is the laboratory's control channel. Raises OSError where it is gone.
     """
+    return lambda stage: _told(control, {"do": "mount", "stage": stage})
+
+
+def part_fitter(control: str) -> Callable[[str], None]:
+    """What lays the part of a serial number in: the simulated operator. `control` and raises as `hands_of`."""
+    return lambda part: _told(control, {"do": "fit", "part": part})
+
+
+def _told(control: str, request: Mapping[str, str | int]) -> None:
     host, _, port = control.rpartition(":")
-
-    def mount(stage: int) -> None:
-        with socket.create_connection((host, int(port)), MOUNT_TIMEOUT_S) as channel:
-            channel.sendall(json.dumps({"do": "mount", "stage": stage}).encode() + b"\n")
-            channel.makefile("rb").readline()
-
-    return mount
+    with socket.create_connection((host, int(port)), MOUNT_TIMEOUT_S) as channel:
+        channel.sendall(json.dumps(request).encode() + b"\n")
+        channel.makefile("rb").readline()
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The beginning of a run: what the history knows of its sensors' serial numbers."""
 
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from rig.commands.remember import ANSWER_S, why
@@ -10,7 +11,7 @@ from rig.runner.mounted import CalibratedBefore, Memory
 
 if TYPE_CHECKING:
     from rig.history.place import Place
-    from rig.history.store import Past
+    from rig.history.store import Past, Selection
 
 
 def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
@@ -31,15 +32,48 @@ def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
     return Memory(found, None, moved)
 
 
+def known_board(
+    config: RigConfig, board: str, parts: Collection[str], own: Collection[str], *, simulated: bool
+) -> str | None:
+    """The serial number, in words, that the history has of one of these `parts` on that board, if it is not of `own`.
+
+    The newest calibration decides. A history that does not answer knows none.
+    """
+    from rig.history.place import chosen_place
+
+    try:
+        where = chosen_place(config.history)
+        found = () if where is None else answer_of(lambda: _on(where, board), ANSWER_S)
+    except Exception:  # whatever it is, a run does not depend on the history, and says that it is silent
+        return None
+    same = [each for each in found if each.part in parts and each.simulated == simulated]
+    if not same or same[0].serial_number in own:
+        return None
+    return f"{same[0].serial_number}, calibrated {same[0].words}"
+
+
+def _on(where: "Place", board: str) -> tuple[CalibratedBefore, ...]:
+    from rig.history.store import Selection
+
+    return _found(where, [Selection(board=board)])
+
+
 def _of(where: "Place", serial_numbers: list[str]) -> tuple[CalibratedBefore, ...]:
+    from rig.history.store import Selection
+
+    return _found(where, [Selection(serial_number=number) for number in serial_numbers])
+
+
+def _found(where: "Place", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
+    """What a history has of that, the newest first; a file that is not there has nothing."""
     from pathlib import Path
 
-    from rig.history.store import Selection, open_history
+    from rig.history.store import open_history
 
     if isinstance(where.where, Path) and not where.where.exists():
         return ()
     with open_history(where) as history:
-        found = [each for number in serial_numbers for each in history.calibrations(Selection(serial_number=number))]
+        found = [each for selection in wanted for each in history.calibrations(selection)]
     newest_first = sorted(found, key=lambda each: (each.started_utc, each.id), reverse=True)
     return tuple(_before(each) for each in newest_first if each.voided is None)
 

@@ -34,6 +34,7 @@ from rig.config.section import (
 )
 from rig.config.sensor_catalogue import MAGNETOMETERS
 from rig.config.sensor_sections import MagnetometerSection, SensorSection, field_name
+from rig.config.station_section import StationSection
 
 HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
 
@@ -229,6 +230,7 @@ class SensorsConfig(Section):
     certificate: CertificateSection = CertificateSection()
     history: HistorySection = HistorySection()
     output: OutputSection = OutputSection()
+    station: StationSection = StationSection()
 
     @field_validator("sensors")
     @classmethod

@@ -35,6 +35,7 @@ JointRanges = tuple[JointRange, JointRange, JointRange, JointRange, JointRange, 
 JointSpeed = Annotated[float, Field(gt=0, le=360)]
 JointSpeeds = tuple[JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed]
 Cycles = Annotated[int, Field(ge=1, le=200)]
+PartNumber = Annotated[str, Field(pattern=r"^[ -~]+$", max_length=40)]
 Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
 
@@ -404,6 +405,20 @@ class SimulatedSensorSection(Section):
     lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
 
 
+class SimulatedPartSection(Section):
+    """A part of a series as it lies on the simulated operator's tray."""
+
+    unique_id: str | None = Field(
+        default=None,
+        pattern=r"^[0-9a-f]{24}$",
+        description="its microcontroller's own number; if left out, one that is made of its serial number",
+        json_schema_extra={"allowed": "24 hexadecimal digits, small letters"},
+    )
+    plugged_in: bool = Field(
+        default=True, description="whether its board is plugged in when it is mounted for the first time"
+    )
+
+
 class WorldSection(Section):
     """The simulated laboratory."""
 
@@ -435,6 +450,9 @@ class WorldSection(Section):
         default=(),
         max_length=12,
         description="how the simulated operator truly mounts the item for each of `procedure.stages`",
+    )
+    tray: dict[PartNumber, SimulatedPartSection] = Field(
+        default={}, max_length=10_000, description="what is special about parts of a series, by their serial numbers"
     )
 
     def misfits(self, turner: TurnerSection) -> Iterator[str]:

@@ -40,7 +40,7 @@ def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: Script
     """
     parent = Path(loaded.config.output.folder)
     with _written(out or parent):
-        folder = out or _of_its_own(parent, loaded.config.procedure.name)
+        folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
         empty_folder(folder, or_else=f", or go on with: {resuming(folder)}")
         _write_all(folder, {SCRIPT: script, SCRIPT_IDENTITY: json.dumps(asdict(identity)) + "\n", CONFIG: loaded.text})
     return folder
@@ -90,10 +90,10 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
         raise
 
 
-def _of_its_own(parent: Path, procedure: str) -> Path:
-    """A folder that was not there, named after time and procedure; several runs may begin in one second."""
+def folder_of_its_own(parent: Path, what: str) -> Path:
+    """A folder that was not there, named after time and `what` it is of; several may begin in one second."""
     parent.mkdir(parents=True, exist_ok=True)
-    name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{procedure}"
+    name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{what}"
     folder, numbers = parent / name, itertools.count(2)
     while True:
         with suppress(FileExistsError):

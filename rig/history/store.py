@@ -29,12 +29,13 @@ _MANY = 500  # keys in one question: SQLite takes no more than some thousands
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which calibrations; None is all. `rig` is its name or its arm's serial number."""
+    """Which calibrations; None is all. `rig` is its name or its arm's serial number, `board` that board's own."""
 
     serial_number: str | None = None
     part: str | None = None
     since: date | None = None
     rig: str | None = None
+    board: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,6 +321,8 @@ def chosen(question: Select[Any], selection: Selection) -> Select[Any]:
         question = question.where(_RUN.started_utc >= selection.since.isoformat())
     if selection.rig is not None:
         question = question.where(or_(_RUN.rig == selection.rig, _RUN.arm_serial_number == selection.rig))
+    if selection.board is not None:
+        question = question.where(_RUN.board_unique_id == selection.board)
     return question
 
 

@@ -1,7 +1,7 @@
 """The page's addresses: files to show it, the stream of what is shown, the certificate, and two that act."""
 
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -24,14 +24,13 @@ LARGEST_CERTIFICATE = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def application(broadcast: Broadcast, control: Control, door: Door, folder: Path, connections: Connections) -> Guard:
-    """The page's application for a run in `folder`, behind its door."""
+def guarded(routes: Sequence[Route], door: Door, connections: Connections) -> Guard:
+    """The addresses behind their door."""
+    return Guard(Starlette(routes=routes), door, connections)
 
-    def acting(handler: Handler) -> Handler:
-        async def allowed(request: Request) -> Response:
-            return await handler(request) if door.may_act(request.headers) else _refused()
 
-        return allowed
+def looking(broadcast: Broadcast, door: Door, home: str) -> list[Route]:
+    """The addresses that whoever looks on needs; `home` is the page that opens first."""
 
     async def stream(request: Request) -> Response:
         if not door.may_look(request.headers):
@@ -43,6 +42,36 @@ def application(broadcast: Broadcast, control: Control, door: Door, folder: Path
         if door.looking_needs_token:
             streaming.set_cookie(COOKIE, door.pass_to_look, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
         return streaming
+
+    async def nothing(request: Request) -> Response:
+        return Response(status_code=204)
+
+    files = [Route("/", _file(home)), Route("/favicon.ico", nothing)]
+    files += [Route(f"/{path.name}", _file(path.name)) for path in STATIC.iterdir() if path.suffix in MEDIA]
+    return [*files, Route("/events", stream)]
+
+
+def acting(door: Door, handler: Handler) -> Handler:
+    """A handler for those alone who have the token."""
+
+    async def allowed(request: Request) -> Response:
+        return await handler(request) if door.may_act(request.headers) else _refused()
+
+    return allowed
+
+
+async def body_of(request: Request) -> bytes:
+    """A request's body; nothing of one that is longer than any that is wanted."""
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LARGEST_BODY:
+            return b""
+    return body
+
+
+def of_a_run(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
+    """The addresses of a run in `folder`: its certificate, and the two that act."""
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):
@@ -72,19 +101,11 @@ def application(broadcast: Broadcast, control: Control, door: Door, folder: Path
             return PlainTextResponse("that is not asked, or not here\n", 409)
         return Response(status_code=202)
 
-    async def nothing(request: Request) -> Response:
-        return Response(status_code=204)
-
-    files = [Route("/", _file("page.html")), Route("/favicon.ico", nothing)]
-    files += [Route(f"/{path.name}", _file(path.name)) for path in STATIC.iterdir() if path.suffix in MEDIA]
-    routes = [
-        *files,
-        Route("/events", stream),
+    return [
         Route(f"/{CERTIFICATE}", certificate),
-        Route("/stop", acting(stop), methods=["POST"]),
-        Route("/answer", acting(answer), methods=["POST"]),
+        Route("/stop", acting(door, stop), methods=["POST"]),
+        Route("/answer", acting(door, answer), methods=["POST"]),
     ]
-    return Guard(Starlette(routes=routes), door, connections)
 
 
 def _file(name: str) -> Handler:
@@ -99,13 +120,8 @@ def _file(name: str) -> Handler:
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
     """The question's number and the answer; None for anything else."""
-    body = b""
-    async for piece in request.stream():
-        body += piece
-        if len(body) > LARGEST_BODY:
-            return None
     try:
-        said = json.loads(body)
+        said = json.loads(await body_of(request))
     except ValueError:
         return None
     if not isinstance(said, dict) or type(said.get("number")) is not int or type(said.get("agreed")) is not bool:

@@ -76,6 +76,11 @@ class Control:
             self._changed.notify_all()
             return True
 
+    @property
+    def gone(self) -> bool:
+        """Whether no browser can ask for anything any more."""
+        return self._gone
+
     def leave(self) -> None:
         """No browser can ask for anything any more."""
         with self._changed:

@@ -10,7 +10,7 @@ import json
 import threading
 import time
 from collections.abc import AsyncGenerator
-from typing import Any
+from typing import Any, Protocol
 
 from rig.page.rows import Look
 from rig.page.shown import Shown
@@ -20,6 +20,17 @@ FRAME_S = 0.1
 SIGN_OF_LIFE_S = 0.8  # without news: a browser that hears nothing for 2 s says so
 CLIENTS = 32  # browsers at a time that have the token
 STRANGERS = 16  # … and that have none
+
+
+class Source(Protocol):
+    """What is shown: all of it, and what has changed since it was last asked for."""
+
+    @property
+    def ended(self) -> bool: ...
+
+    def whole(self) -> bytes: ...
+
+    def news(self) -> bytes | None: ...
 
 
 class Feed:
@@ -57,7 +68,7 @@ class Feed:
         with self._lock:
             age_s = None if self._seen_s is None else round(time.monotonic() - self._seen_s, 1)
             points = self._shown.history.since(0)
-            return _frame("all", {**self._shown.sections, "points": points, "age_s": age_s})
+            return frame_of("all", {**self._shown.sections, "points": points, "age_s": age_s})
 
     def news(self) -> bytes | None:
         """What has changed since the last time, None if nothing has."""
@@ -68,7 +79,7 @@ class Feed:
                 return None
             points = shown.history.since(self._sent)
             self._sent = shown.history.end
-        return _frame("some", {**changed, "points": points})
+        return frame_of("some", {**changed, "points": points})
 
 
 class Mailbox:
@@ -92,7 +103,7 @@ class Mailbox:
         self.closed = True
         self._news.set()
 
-    async def take(self, feed: Feed) -> bytes | None:
+    async def take(self, feed: Source) -> bytes | None:
         """The next frame, whole if any was dropped; None when it is closed and empty."""
         if not self.closed:
             await self._news.wait()
@@ -107,7 +118,7 @@ class Mailbox:
 class Broadcast:
     """The server's side, all in its event loop."""
 
-    def __init__(self, feed: Feed) -> None:
+    def __init__(self, feed: Source) -> None:
         self._feed = feed
         self._mailboxes: dict[Mailbox, bool] = {}  # whether its browser is known by the token
         self._closing = False
@@ -175,7 +186,7 @@ def _clock() -> str:
     return time.strftime("%H:%M:%S")
 
 
-def _frame(name: str, document: dict[str, Any]) -> bytes:
+def frame_of(name: str, document: dict[str, Any]) -> bytes:
     """One server-sent event. JSON knows no NaN; what is not a number is told as null."""
     try:
         text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False)

@@ -4,7 +4,7 @@ import asyncio
 import socket
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 from rig.errors import Refused
 from rig.page.connections import Connections, counted
 from rig.page.control import Control
-from rig.page.feed import Broadcast, Feed
+from rig.page.feed import Broadcast, Source
 from rig.page.guard import Door, new_token
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     import uvicorn
+    from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
 LAST_NEWS_S = 2.0  # for browsers to take what was shown last
@@ -48,10 +49,22 @@ class Address:
             return self.host == "localhost"
 
 
-@contextmanager
-def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Iterator[str]:
-    """Show `feed` to browsers for the length of the block; yields the page's address, with the token.
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Which page opens first, its `home`, and the addresses that it has beyond those to look on."""
 
+    home: str = "page.html"
+    routes: "Callable[[Door], Sequence[Route]]" = lambda door: ()
+
+
+RUN = Page()
+
+
+@contextmanager
+def serving(feed: Source, control: Control, folder: Path | None, address: Address, shown: Page = RUN) -> Iterator[str]:
+    """Show `feed` to browsers on a page for the length of the block; yields its address, with the token.
+
+    Without a `folder` there is no run behind it, which could be stopped, and no certificate.
     A page that fails says so on stderr and is gone: what it shows goes on. Raises Refused `page_address`.
     """
     check(address)
@@ -62,7 +75,7 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
     token = address.token or new_token()
     door = Door(frozenset(f"{name}:{port}".lower() for name in names), token, not address.loopback)
     broadcast = Broadcast(feed)
-    server = _server(broadcast, control, door, folder)
+    server = _server(broadcast, control, door, folder, shown)
     loop, over = asyncio.new_event_loop(), asyncio.Event()
 
     async def serve() -> None:
@@ -105,14 +118,17 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
         thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
 
 
-def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> "uvicorn.Server":
+def _server(broadcast: Broadcast, control: Control, door: Door, folder: Path | None, shown: Page) -> "uvicorn.Server":
     import uvicorn
 
-    from rig.page.application import application
+    from rig.page.application import guarded, looking, of_a_run
 
     connections = Connections()
+    served = [*looking(broadcast, door, shown.home), *shown.routes(door)]
+    if folder is not None:
+        served = [*served, *of_a_run(broadcast, control, door, folder)]
     config = uvicorn.Config(
-        application(broadcast, control, door, folder, connections),
+        guarded(served, door, connections),
         http=counted(connections),
         h11_max_incomplete_event_size=LARGEST_HEADERS,
         backlog=AT_ONCE,

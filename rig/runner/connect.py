@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from rig.observation.hand_runs import told_of
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
+from rig.runner.ahead import Connecting
 from rig.runner.by_hand import HandSession
 from rig.runner.ending_early import EndingEarly
 from rig.runner.host_correction import HostCorrected, correcting
@@ -47,7 +49,8 @@ from rig.turners.turner import Turner
 class Connector:
     """Opens one phase of a run: what is to be done, by which configuration and script, recorded where, told to whom.
 
-    `found` are the calibrations of the phase before, by sensor name; `memory` is what is known of earlier runs.
+    `found` are the calibrations of the phase before, by sensor name; `memory` is what is known of earlier runs. The
+    turner is connected by `connecting` where that is given.
     """
 
     phase: Phase
@@ -59,6 +62,7 @@ class Connector:
     resumed: Resumption
     found: Mapping[str, Solved] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
+    connecting: Connecting | None = None
 
     def _left_out(self, whole_plan: Plan) -> frozenset[int]:
         """The sweeps of the plan that are not made now: those that are done, and those of other stages."""
@@ -160,7 +164,8 @@ class Connector:
         log = self.path.with_name(ARM_LOG)
         refuse_links(log)
         let_go = stack.enter_context(ExitStack())  # closed after the turner
-        turner = stack.enter_context(kind.connect(section, acquisition.on_state, log))
+        connecting = self.connecting or partial(kind.connect, section)
+        turner = stack.enter_context(connecting(acquisition.on_state, log))
         let_go.callback(self._last_seen, turner)
         report = turner.report()
         self.station.event(ArmConnected(report, kind.words.short))

@@ -24,6 +24,7 @@ from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
+from rig.runner.ahead import Connecting
 from rig.runner.announcement import mounting
 from rig.runner.connect import Connector
 from rig.runner.mounted import Memory
@@ -50,7 +51,7 @@ from rig.turners.registry import kind_of
 class Run:
     """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase.
 
-    `memory` is what is known of its sensors from before.
+    `memory` is what is known of its sensors from before; the turner is connected by `connecting` where that is given.
     """
 
     folder: Path
@@ -58,6 +59,7 @@ class Run:
     script: ScriptFile
     station: Station
     memory: Memory = field(default_factory=Memory)
+    connecting: Connecting | None = None
 
     def carry_out(self, phase: Phase) -> Outcome:
         """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
@@ -72,6 +74,14 @@ class Run:
                 self.station.event(PhaseSkipped(phase.procedure.name))
             outcome = self._judged(phase, runs, outcome)
         return self._written(outcome)
+
+    def refused_sweeps(self, phase: Phase) -> bool:
+        """Whether sweeps or dwells of a phase that was carried out do not count: to carry it out again repeats them."""
+        if phase.procedure.reads_corrected:
+            return False
+        plan = phase.plan()
+        planned = {sweep.index for sweep in plan.sweeps} | {dwell.index for dwell in plan.dwells}
+        return bool(planned - self._resumed(phase).done)
 
     def _resumed(self, phase: Phase) -> Resumption:
         """What counts of the phase's recordings before. Corrected readings are compared as one movement: none do."""
@@ -131,7 +141,7 @@ class Run:
         own = phase.procedure is self.script.procedure
         script = self.script if own else installed_script(phase.procedure.name)
         settings = replace(self._settings(phase), stage=stage)
-        told = self.station, resumed, found or {}, self.memory
+        told = self.station, resumed, found or {}, self.memory, self.connecting
         connector = Connector(phase, self.loaded, settings, script, path, *told)
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))

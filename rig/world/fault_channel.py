@@ -20,6 +20,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     printer_fault sensor bit_error_rate lose stuck silent host_baud   of a device that prints lines, as above
     printer_power sensor on
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
+    fit part                                    the board of another part of a series, by its serial number
     instruct say face turns again               what the operator reads, where a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
     servo_fault held_fast dumb voltage_v temperature_c lose spoil   what is given holds; `lose`, `spoil`: replies
@@ -77,6 +78,7 @@ class World(Protocol):
     def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None: ...
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
+    def fit_part(self, part: str) -> None: ...
 
 
 class ControlSession:
@@ -97,6 +99,7 @@ class ControlSession:
             "printer_fault": self._printer_fault,
             "printer_power": self._printer_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
+            "fit": lambda part: world.fit_part(str(part)),
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,

@@ -1,6 +1,7 @@
 """The simulated laboratory without its sockets: what turns, board and sensors on one clock, deterministic."""
 
 from collections.abc import Sequence
+from hashlib import sha256
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import ArmSection, RigConfig
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import mount_matrix
-from rig.config.world_models import WorldSection
+from rig.config.world_models import SimulatedPartSection, WorldSection
 from rig.world.autopilot.mounting import autopilot_mounts
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -44,6 +45,7 @@ class Laboratory:
         self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self._mount = np.eye(3)  # from the flange's frame to the item's
+        self._laid_in: set[str] = set()  # parts of a series
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
         self.kvhs = mounts(config, world)
         self.autopilots = autopilot_mounts(config, world)
@@ -119,6 +121,20 @@ class Laboratory:
     def unplug(self) -> None:
         """Take the board's power away; its flash keeps what it holds."""
         self.board = None
+
+    def fit(self, part: str) -> bool:
+        """Lay the board of another part in, without power yet: a chip of its own, with nothing stored.
+
+        Returns whether the operator plugs it in: one that was forgotten is not forgotten twice.
+        """
+        said = self._world.tray.get(part, SimulatedPartSection())
+        unique_id = said.unique_id or sha256(part.encode()).hexdigest()[:24]
+        board = self._world.board.model_copy(update={"unique_id": unique_id})
+        self._world = self._world.model_copy(update={"board": board})
+        self._flash = flash_of(None)
+        forgotten = not said.plugged_in and part not in self._laid_in
+        self._laid_in.add(part)
+        return not forgotten
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
         """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.

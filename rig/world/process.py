@@ -194,6 +194,12 @@ class World:
         if self.board_listener is not None:
             self.board_listener.open()
 
+    def fit_part(self, part: str) -> None:
+        """Exchange the board for that of another part, as the simulated operator does."""
+        self.unplug_board()
+        if self.laboratory.fit(part):
+            self.plug_in_board()
+
     # -- the loop ----------------------------------------------------------------------------------------------------
     def end(self) -> None:
         self._ended = True

@@ -116,7 +116,7 @@ print(*sys.modules, file=sys.stderr)
 def test_help_comes_at_once_whatever_the_command() -> None:
     listed = re.findall(r"^ {4}(\w+)", shell(f"{sys.executable} -m rig --help").stdout, re.MULTILINE)
     asked = subprocess.run([sys.executable, "-c", ASKED, *listed], capture_output=True, text=True, check=True)
-    assert all(f"usage: rig {command} " in asked.stdout for command in listed) and len(listed) == 21
+    assert all(f"usage: rig {command} " in asked.stdout for command in listed) and len(listed) == 23
     assert not HEAVY & {*asked.stderr.split()}
 
 

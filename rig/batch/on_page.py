@@ -1,0 +1,85 @@
+"""The operator of a station on its page: the question of the moment, and what a browser types as its answer."""
+
+import json
+import threading
+from dataclasses import asdict
+
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+
+from rig.batch.now import Now
+from rig.batch.operators import Question
+from rig.page.application import acting, body_of
+from rig.page.control import Control
+from rig.page.guard import Door
+from rig.page.sections import Sections
+
+LONGEST = 200  # characters of an answer
+LOOK_S = 0.5  # between two looks whether the page is still there
+
+
+class OnPage:
+    """A voice whose questions a page shows, and which is answered there; it shows what the station does as well."""
+
+    def __init__(self, sections: Sections, control: Control) -> None:
+        self._sections, self._control = sections, control
+        self._changed = threading.Condition()
+        self._number = 0
+        self._open = False
+        self._said = ""
+        sections.put(asked=None)
+
+    def hear(self, now: Now) -> None:
+        """What the station does has changed."""
+        self._sections.put(now=asdict(now))
+
+    def answer(self, question: Question) -> str:
+        """What a browser types; empty where the page has ended."""
+        with self._changed:
+            self._number, self._open, self._said = self._number + 1, True, ""
+            self._sections.put(asked={"number": self._number, **asdict(question)})
+            while self._open and not self._control.gone:
+                self._changed.wait(LOOK_S)
+            self._open = False
+            self._sections.put(asked=None)
+            return self._said
+
+    def takes(self, number: int, text: str) -> bool:
+        """Take the answer to the question of that number; False where that is not asked any more."""
+        with self._changed:
+            if not self._open or number != self._number:
+                return False
+            self._said, self._open = text.strip(), False
+            self._changed.notify_all()
+            return True
+
+    def routes(self, door: Door) -> list[Route]:
+        """The addresses that act: an answer, and the stop."""
+
+        async def say(request: Request) -> Response:
+            said = await body_of(request)
+            try:
+                number, text = json.loads(said)["number"], json.loads(said)["text"]
+            except (ValueError, TypeError, KeyError):
+                number, text = None, None
+            if type(number) is not int or not isinstance(text, str) or len(text) > LONGEST or not _typed(text):
+                return PlainTextResponse('wanted: {"number": 1, "text": "what was typed"}\n', 400)
+            if not self.takes(number, text):
+                return PlainTextResponse("that is not asked any more\n", 409)
+            return Response(status_code=202)
+
+        async def stop(request: Request) -> Response:
+            if not self._control.stop():
+                return PlainTextResponse("nothing to stop\n", 409)
+            return Response(status_code=202)
+
+        return [
+            Route("/say", acting(door, say), methods=["POST"]),
+            Route("/stop", acting(door, stop), methods=["POST"]),
+        ]
+
+
+def _typed(text: str) -> bool:
+    """Whether a keyboard could have sent it as one line."""
+    return not text or text.isprintable()

@@ -1,0 +1,116 @@
+"""Who names the parts and is asked: an operator at the terminal or elsewhere, or a list that is asked nothing."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from rig.batch.batch import Doubt, Part
+from rig.batch.series import following
+from rig.errors import Refused, RigError
+from rig.errors.quoting import printable_lines
+from rig.station.events import Prompt
+from rig.station.plain_text import for_file, say
+
+YES = ("yes", "y", "go")
+
+
+Kind = Literal["number", "mount", "go", "doubt", "again"]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question of a `kind`: what is told before it in `lines`, and the `text` that asks."""
+
+    kind: Kind
+    text: str
+    lines: tuple[str, ...] = ()
+
+
+class Voice(Protocol):
+    """How an operator is asked; what is typed comes back without blanks around it, empty where nobody is left."""
+
+    def answer(self, question: Question) -> str: ...
+
+
+class Terminal:
+    """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
+
+    def answer(self, question: Question) -> str:
+        """What is typed after the question."""
+        for line in question.lines:
+            print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
+        print(printable_lines(question.text), end=" ", file=sys.stderr, flush=True)
+        return sys.stdin.readline().strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The operator, by a `voice`; an empty number ends the batch. Nobody is asked where there is no voice.
+
+    The numbers of a list are taken one after the other where there is one.
+    """
+
+    voice: Voice | None
+    numbers: Sequence[str] | None = None
+
+    @property
+    def attended(self) -> bool:
+        """Whether somebody is there who can answer."""
+        return self.voice is not None
+
+    @property
+    def listed(self) -> bool:
+        """Whether the numbers come from a list."""
+        return self.numbers is not None
+
+    def next_part(self, done: Sequence[Part]) -> str | None:
+        """The next number of the list, or the one that is typed or scanned."""
+        if self.numbers is not None:
+            return following(self.numbers, [each.serial for each in done])
+        return self._answer("number", f"part {len(done) + 1}, serial number (Enter alone ends):") or None
+
+    def mounted(self, part: Part) -> bool:
+        """Whether it is; "no" puts it aside."""
+        text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
+        return self._answer("mount", text).lower() not in ("no", "n")
+
+    def goes_on(self, doubt: Doubt) -> bool:
+        """Whether the operator says yes."""
+        return self._agrees("doubt", "Go on all the same? yes or no:", f"{doubt.why}.")
+
+    def tries_again(self, part: Part, error: RigError) -> bool:
+        """Whether the operator wants it again."""
+        return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
+
+    def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
+        """Whether the operator says go, or yes to something else; what nobody is asked was agreed to before."""
+        if to_do == Prompt(()).to_do:
+            return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
+        return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
+
+    def hears(self, part: Part) -> None:
+        """Told on stdout, a line for each part."""
+        ended = part.ended
+        if ended is None:
+            return
+        repeated = f"sweeps repeated: {ended.repeated}" if ended.repeated else ""
+        more = ", ".join(filter(None, [ended.certificate, repeated, ended.why]))
+        say(f"{part.number:3d}  {ended.outcome.upper():7s}  {part.serial}  {more}".rstrip())
+        sys.stdout.flush()
+
+    def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
+        return self._answer(kind, text, *lines).lower() in YES
+
+    def _answer(self, kind: Kind, text: str, *lines: str) -> str:
+        return "" if self.voice is None else self.voice.answer(Question(kind, text, lines))
+
+
+def refuse_without_terminal() -> None:
+    """Raise Refused `not_confirmed` where nobody can be asked."""
+    if not sys.stdin.isatty():
+        raise Refused(
+            "not_confirmed",
+            "a station asks before the arm moves, and there is no terminal to answer at",
+            "Start it in a terminal, or give --series PARTS.csv; on hardware --yes as well",
+        )

@@ -1,0 +1,64 @@
+"""The floor's page as its server is handed it: the history is looked at every second, in a thread of its own."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+
+from sqlalchemy import func, select
+
+from rig.errors import Refused
+from rig.floor import shown
+from rig.history import schema, stations
+from rig.history.place import Place
+from rig.history.store import History, open_history
+from rig.page.sections import Sections
+
+LOOK_S = 1.0
+
+
+@contextmanager
+def looking(place: Place) -> Iterator[Sections]:
+    """A feed that is kept up to date for the length of the `with` block; the history is only read."""
+    feed, over = Sections(), threading.Event()
+    feed.put(history={"label": place.label, "silent": None})
+    thread = threading.Thread(target=_look, args=(place, feed, over), name="floor", daemon=True)
+    thread.start()
+    try:
+        yield feed
+    finally:
+        over.set()
+        thread.join(LOOK_S)
+
+
+def _look(place: Place, feed: Sections, over: threading.Event) -> None:
+    while not over.is_set():
+        try:
+            with open_history(place) as history:
+                feed.put(history={"label": place.label, "silent": None})
+                _follow(history, feed, over)
+        except Exception as error:  # the page says it, and goes on trying
+            why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+            feed.put(history={"label": place.label, "silent": why})
+            over.wait(LOOK_S)
+
+
+def _follow(history: History, feed: Sections, over: threading.Event) -> None:
+    before: object = None
+    while not over.is_set():
+        today = datetime.now(UTC).date()
+        feed.put(rigs=shown.rigs(stations.heard(history.engine)))
+        entered = today, _entered(history)
+        if entered != before:  # trends of a long history take longer than a second
+            before, pasts = entered, history.calibrations()
+            recalls = shown.recalls(pasts, today)
+            feed.put(today=shown.todays(pasts, today), standards=shown.standards(pasts), recalls=recalls)
+        over.wait(LOOK_S)
+
+
+def _entered(history: History) -> tuple[int, int]:
+    """What tells whether anything was entered: rows are only added."""
+    counts = (select(func.count()).select_from(table) for table in (schema.calibration, schema.voided))
+    with history.engine.connect() as connection:
+        calibrations, voided = (int(connection.scalar(question) or 0) for question in counts)
+    return calibrations, voided

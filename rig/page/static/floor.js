@@ -1,0 +1,101 @@
+// The floor: several rigs, as a shared history tells of them. It decides nothing.
+
+import { follow } from "./stream.js";
+
+const $ = (id) => document.getElementById(id);
+const STALE_MS = 3000; // the server says something every second
+const shown = {};
+const WORDS = {
+  waiting: "◌ waits for a part", checking: "? checks", asking: "? asks the operator", running: "◉ runs", solving: "Σ solves",
+  refused: "⊘ refused", fault: "⚠ fault", stopped: "■ stopped", ended: "■ ended", dead: "⚠ no sign of life",
+};
+const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
+const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };
+let heard = performance.now();
+let up = false;
+
+const element = (name, text, data = {}) => {
+  const made = document.createElement(name);
+  if (text !== undefined) made.textContent = text;
+  Object.assign(made.dataset, data);
+  return made;
+};
+
+function row(cells) {
+  const made = element("tr");
+  made.append(...cells.map(([text, is]) => element("td", text, is ? { is } : {})));
+  return made;
+}
+
+const rows = (id, list, cells, none) => {
+  const empty = element("tr");
+  empty.append(element("td", none));
+  $(id).replaceChildren(...(list.length ? list.map((each) => row(cells(each))) : [empty]));
+};
+
+function rig(of) {
+  const made = element("article", undefined, { state: of.state });
+  made.className = "rig";
+  const head = element("h3");
+  head.append(element("span", of.rig), element("span", WORDS[of.state] ?? of.state));
+  const part = element("p", of.part || "–");
+  part.className = "part";
+  const left = typeof of.left_s === "number" ? `, ${Math.round(of.left_s)} s left` : "";
+  const doing = element("p", `${of.doing ?? ""}${left}`);
+  doing.className = "doing";
+  const counts = Object.entries(of.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
+  const who = [of.operator, of.work_order && `order ${of.work_order}`, of.computer, of.simulated && "simulated"].filter(Boolean).join(" · ");
+  const age = of.state === "dead" ? `last heard ${of.age_s} s ago · ` : "";
+  const tray = element("ul");
+  tray.className = "tray";
+  tray.append(...(of.parts ?? []).map(([serial, state], at) => {
+    const cell = element("li", SIGNS[state] ?? "·", { is: state });
+    cell.title = `${serial}: ${state}`;
+    cell.setAttribute("aria-label", `${at + 1}, ${serial}: ${state}`);
+    return cell;
+  }));
+  made.append(head, part, doing, element("small", `${age}${[counts, who].filter(Boolean).join(" · ")}`), tray);
+  return made;
+}
+
+const SHOW = {
+  history: ({ label }) => { $("history").textContent = label; },
+  rigs(list) {
+    $("rigs").replaceChildren(...(list.length ? list.map(rig) : [element("p", "No station has told this history anything yet.")]));
+  },
+  today: (list) => rows("today", list, (each) => [
+    [each.time], [each.rig], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.verdict.toUpperCase(), each.verdict], [each.number],
+  ], "Nothing was calibrated today."),
+  standards: (list) => rows("standards", list, (each) => [
+    [each.rig], [CONTROL[each.control], each.control], [each.out.join(", ")], [each.standards.join(", ")],
+  ], "No rig has a check standard."),
+  recalls: (list) => rows("recalls", list, (each) => [
+    [each.day + (each.overdue ? " overdue" : ""), each.overdue ? "overdue" : ""], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.parameter],
+  ], "None."),
+};
+
+function tell() {
+  const silent = shown.history?.silent;
+  const lost = (performance.now() - heard > STALE_MS) || (!up && shown.history);
+  $("stale").hidden = !silent && !lost;
+  $("stale-words").textContent = lost ? "No news" : `The history does not answer (${silent})`;
+}
+
+follow(
+  (name, frame) => {
+    for (const [section, content] of Object.entries(frame)) {
+      shown[section] = content;
+      SHOW[section]?.(content);
+    }
+    tell();
+  },
+  (is, why) => {
+    up = is;
+    $("link").dataset.up = is ? "yes" : "no";
+    $("link-words").textContent = is ? "connected" : why ?? "not connected";
+    tell();
+  },
+  () => { heard = performance.now(); tell(); },
+  () => false,
+);
+setInterval(tell, 500);

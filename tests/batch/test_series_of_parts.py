@@ -1,0 +1,138 @@
+"""What a batch's entries amount to, what is doubted, and what it leaves: without a rig."""
+
+import csv
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBegun, PartEnded, doubt_of, state_of
+from rig.batch.journal import JOURNAL, opened, resumed
+from rig.batch.label import Label, files_of, zpl
+from rig.batch.series import following, numbers_in
+from rig.batch.table import csv_of, page_of, summary
+from rig.config.station_section import StationSection
+from rig.errors import Refused
+
+AT = "2026-11-25T08:00:00+00:00"
+BEGUN = Begun("A. Person", "W-17", AT)
+CHIP = Chip("0123456789abcdef01234567", (0x68,))
+SECTION = StationSection(serial_pattern=r"G-\d{3}", parts=("G-001", "G-002", "G-003"))
+PASSED = PartEnded("pass", AT, certificate="RIG-20261125-0A1B2C3D4E5F", chip=CHIP)
+
+
+def entries(*ended: tuple[str, PartEnded | None]) -> list[Entry]:
+    told: list[Entry] = [BEGUN]
+    for number, (serial, end) in enumerate(ended, 1):
+        told += [PartBegun(serial, f"{number:02d}-{serial}", AT), *([end] if end else [])]
+    return told
+
+
+def batch(*ended: tuple[str, PartEnded | None]) -> Batch:
+    return state_of(entries(*ended))
+
+
+def test_a_part_that_has_not_ended_is_in_hand() -> None:
+    after_a_kill = batch(("G-001", PASSED), ("G-002", None))
+    assert after_a_kill.in_hand == Part(2, "G-002", "02-G-002", AT)
+    assert batch(("G-001", PASSED)).in_hand is None
+
+
+@pytest.mark.parametrize(
+    ("serial", "before", "why", "final"),
+    [
+        ("G-1", None, "does not match", True),
+        ("G-00é", None, "no serial number", True),
+        ("G-001\nG-002", None, "no serial number", True),
+        ("G-009", None, "no part G-009", False),
+        ("G-001", None, "is done: part 1", False),
+        ("G-002", "2026-11-25, PASS (calibration 7)", "today: 2026-11-25", False),
+    ],
+)
+def test_a_number_that_may_be_wrong_is_doubted(serial: str, before: str | None, why: str, final: bool) -> None:
+    doubt = doubt_of(serial, batch(("G-001", PASSED)), SECTION, lambda _: before)
+    assert doubt is not None and why in doubt.why and doubt.final is final
+
+
+def test_a_part_that_was_only_refused_is_not_done() -> None:
+    refused = PartEnded("refused", AT, "no_port: …")
+    assert doubt_of("G-001", batch(("G-001", refused)), SECTION, lambda _: None) is None
+
+
+def test_the_same_chip_is_another_numbers_alone() -> None:
+    of = batch(("G-001", PASSED))
+    other = of.same_chip(CHIP, "G-002")
+    assert other is not None and other.serial == "G-001"
+    assert of.same_chip(CHIP, "G-001") is None
+    assert of.same_chip(replace(CHIP, who_am_i=(0x71,)), "G-002") is None
+
+
+def test_a_batch_passes_when_every_number_has_passed_in_the_end() -> None:
+    failed, refused = PartEnded("fail", AT, "gyro.residuals"), PartEnded("refused", AT, "G-001 is done")
+    assert batch(("G-001", failed), ("G-001", PASSED), ("G-001", refused)).passed
+    assert not batch(("G-001", PASSED), ("G-002", failed)).passed
+    assert not batch(("G-001", PASSED), ("G-002", refused)).passed
+
+
+def test_the_journal_gives_the_batch_back_after_a_kill_in_the_middle_of_a_line(tmp_path: Path) -> None:
+    folder = tmp_path / "batch"
+    journal = opened(folder, tmp_path, BEGUN)
+    for entry in entries(("G-001", PASSED), ("G-002", None))[1:]:
+        journal.enter(entry)
+    with (folder / JOURNAL).open("a", encoding="utf-8") as file:
+        file.write('{"entry": "part_ended", "outc')
+    again = opened(folder, tmp_path, Begun("", "", AT))
+    assert again.batch == journal.batch
+    again.enter(PASSED)
+    again.enter(BatchEnded(AT))
+    assert resumed(folder).batch == again.batch and again.batch.passed
+
+
+def test_a_journal_that_tells_of_no_batch_is_refused(tmp_path: Path) -> None:
+    (tmp_path / JOURNAL).write_text('{"entry": "part_ended", "outcome": "pass", "at_utc": ""}\n', encoding="utf-8")
+    with pytest.raises(Refused, match="no_batch"):
+        resumed(tmp_path)
+
+
+def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
+    of = batch(("G-001", replace(PASSED, repeated=1)), ("G-002", PartEnded("fail", AT, "=gyro")), ("G-003", None))
+    rows = list(csv.DictReader(StringIO(csv_of(of))))
+    assert [(row["serial_number"], row["verdict"], row["sweeps_repeated"]) for row in rows] == [
+        ("G-001", "pass", "1"),
+        ("G-002", "fail", "0"),
+        ("G-003", "open", ""),
+    ]
+    assert rows[1]["why"] == "'=gyro"  # a spreadsheet would compute it
+    assert summary(of) == "3 parts: 1 passed, 1 failed, 1 open, sweeps repeated in 1"
+    page = page_of(replace(of, begun=replace(BEGUN, operator="<b>A</b>")), simulated=True)
+    assert "<b>A</b>" not in page and PASSED.certificate in page and "simulated laboratory" in page
+
+
+def test_a_label_has_number_day_certificate_and_its_qr_code() -> None:
+    label = Label("G^001", "2026-11-25", PASSED.certificate, "SIMULATED")
+    files = files_of(label)
+    assert set(files) == {".txt", ".zpl", ".svg"}
+    text = files[".txt"].decode()
+    assert "G^001\nPASS 2026-11-25\nRIG-20261125-0A1B2C3D4E5F\nSIMULATED\n" in text
+    assert b"<svg" in files[".svg"]
+    assert "^FDG_5E001^FS" in zpl(label)  # what a serial number holds is no command to the printer
+    assert f"^FDMA,{PASSED.certificate}^FS" in zpl(label)
+
+
+def test_a_list_of_parts_is_a_column_or_a_line_each(tmp_path: Path) -> None:
+    path = tmp_path / "parts.csv"
+    path.write_text("\ufeffpart,serial_number\nx,G-001\ny,G-002\n\n", encoding="utf-8")
+    assert numbers_in(path) == ("G-001", "G-002")
+    path.write_text("G-001\nG-002\n", encoding="utf-8")
+    assert numbers_in(path) == ("G-001", "G-002")
+    path.write_text("part,serial_number\nx\n", encoding="utf-8")
+    with pytest.raises(Refused, match="parts_file"):
+        numbers_in(path)
+
+
+def test_another_list_than_the_batch_was_begun_with_is_refused() -> None:
+    assert following(["a", "b"], ["a"]) == "b"
+    assert following(["a", "b"], ["a", "b"]) is None
+    with pytest.raises(Refused, match="another_series"):
+        following(["a", "b"], ["b"])

@@ -1,0 +1,177 @@
+"""What the floor shows of stations and of a history, and who may ask for it."""
+
+import http.client
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
+from rig.batch.now import Now, after, of_batch
+from rig.errors import Fault, Refused
+from rig.floor import shown
+from rig.floor.feed import looking
+from rig.history import stations
+from rig.history.place import place
+from rig.history.stations import Told
+from rig.history.store import open_history
+from rig.page.control import Control
+from rig.page.sections import Sections
+from rig.page.serving import Address, Page, serving
+from rig.station.events import Failed, Prompt, SamplingStarted
+from support.past_runs import FIRST, finished
+from support.postgres import postgresql
+
+AT = "2026-11-25T08:00:00+00:00"
+LATEST_S = 5.0  # within which the floor shows what has become of a rig
+
+
+def told(now: Now, age_s: float = 0.4) -> Told:
+    return Told("bench 1", "lab-1", now.json(), age_s)
+
+
+def state(now: Now, age_s: float = 0.4) -> str:
+    return str(shown.rigs([told(now, age_s)])[0]["state"])
+
+
+def test_a_station_tells_its_batch_and_its_run() -> None:
+    passed = PartEnded("pass", AT)
+    batch = state_of([Begun("A. Person", "W-17", AT), PartBegun("G-1", "01", AT), passed, PartBegun("G-2", "02", AT)])
+    now = of_batch(Now(), batch)
+    assert (now.state, now.part, now.operator) == ("checking", "G-2", "A. Person")
+    assert now.counts == {"pass": 1, "open": 1} and now.parts == (("G-1", "pass"), ("G-2", "open"))
+    assert after(now, Prompt(())).state == "asking"
+    assert after(now, SamplingStarted()).state == "running"
+    fault = after(now, Failed(Fault("board_link_lost", "the board is gone", "Plug it in")))
+    assert (fault.state, fault.doing) == ("fault", "board_link_lost: the board is gone")
+    assert after(now, Failed(Refused("no_port", "it is not there", "Plug it in"))).state == "refused"
+
+
+def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> None:
+    running, ended = Now(state="running"), Now(state="running", over=True)
+    fault = Now(state="fault", doing="board_link_lost: …", over=True)
+    assert [state(running), state(running, 60), state(ended, 60), state(fault, 60)] == [
+        "running", "dead", "ended", "fault",
+    ]  # fmt: skip
+    assert shown.rigs([Told("bench 1", "lab-1", "no JSON", 60)])[0]["state"] == "dead"
+
+
+def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: Path) -> None:
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        for day in range(12):
+            drifting = tuple(np.array((1.01, 0.99, 1.0)) + 0.002 * day)
+            history.enter(finished(10 * day, drifting, serial_number="G-9"))
+            history.enter(finished(10 * day + 0.1, rig="bench B", serial_number="CHECK", check_standard=True))
+        for day in range(12, 20):
+            jumped = (1.02, 1.0, 1.01)
+            history.enter(finished(10 * day + 0.1, jumped, rig="bench B", serial_number="CHECK", check_standard=True))
+        pasts = history.calibrations()
+    last = (FIRST + timedelta(days=110)).date()
+    assert [(row["serial"], row["rig"]) for row in shown.todays(pasts, last)] == [
+        ("CHECK", "bench B"), ("G-9", "bench A"),
+    ]  # fmt: skip
+    (standard,) = shown.standards(pasts)
+    assert (standard["rig"], standard["control"]) == ("bench B", "out") and "kx" in standard["out"]
+    due = shown.recalls(pasts, date(2030, 1, 1))
+    assert "G-9" in {row["serial"] for row in due} and all(row["overdue"] for row in due)
+    assert shown.recalls(pasts, date(2020, 1, 1)) == []
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    if request.param == "sqlite":
+        yield str(tmp_path / "history.sqlite")
+        return
+    with postgresql() as found:
+        yield found
+
+
+@pytest.mark.slow
+def test_five_rigs_on_one_history_one_killed_one_unplugged(url: str) -> None:
+    with open_history(url), ExitStack() as stack:
+        stations_there = {name: stack.enter_context(beating(url, name)) for name in map(str, range(1, 6))}
+        feed = stack.enter_context(looking(place(url)))
+        until(feed, lambda states: states == dict.fromkeys(stations_there, "running"), within_s=30.0)
+        stations_there["2"].kill()
+        pulled = stations_there["4"].stdin
+        assert pulled is not None
+        pulled.write("board_link_lost\n")
+        pulled.flush()
+        wanted = {"1": "running", "2": "dead", "3": "running", "4": "fault", "5": "running"}
+        until(feed, lambda states: states == wanted, within_s=LATEST_S)
+        of_4 = next(each for each in sections(feed)["rigs"] if each["rig"] == "4")
+        assert of_4["doing"].startswith("board_link_lost") and of_4["part"] == "4-001"
+        ended = stations_there["1"].stdin
+        assert ended is not None
+        ended.close()  # it ends as a station does, and says so
+        until(feed, lambda states: states == {**wanted, "1": "ended"}, within_s=LATEST_S)
+
+
+@pytest.mark.slow
+def test_the_database_alone_tells_ages(tmp_path: Path) -> None:
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        assert stations.heard(history.engine) == []
+        stations.make_table(history.engine)
+        for text in ("{}", '{"state":"running"}'):
+            stations.tell(history.engine, "bench 1", "lab-1", text)
+        time.sleep(0.3)
+        (only,) = stations.heard(history.engine)
+        assert only.told == '{"state":"running"}' and 0.25 < only.age_s < 60
+        assert list(history.broken()) == []
+
+
+def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tmp_path: Path) -> None:
+    token = "a-token-of-two-and-twenty"
+    feed = Sections()
+    with serving(feed, Control(may_answer=False), None, Address(port=0, token=token), Page("floor.html")) as page:
+        port = urlsplit(page).port or 0
+
+        def asked(method: str, path: str, **headers: str) -> tuple[int, str]:
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+            connection.request(method, path, headers={"Authorization": f"Bearer {token}", **headers})
+            answer = connection.getresponse()
+            text = "" if path == "/events" and answer.status == 200 else answer.read().decode()
+            connection.close()
+            return answer.status, text
+
+        status, text = asked("GET", "/")
+        assert status == 200 and "floor.js" in text
+        assert asked("GET", "/events")[0] == 200
+        assert asked("GET", "/", Host="evil.example")[0] == 400
+        assert asked("GET", "/events", Origin="http://evil.example")[0] == 403
+        for path in ("/stop", "/answer", "/certificate.html"):
+            assert asked("POST", path)[0] == 404
+        assert asked("POST", "/")[0] == 405
+
+
+@contextmanager
+def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
+    command = [sys.executable, "-m", "support.beating_station", url, rig]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def sections(feed: Sections) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(feed.whole().split(b"data: ", 1)[1])
+    return found
+
+
+def until(feed: Sections, so: Callable[[dict[str, str]], bool], within_s: float) -> None:
+    deadline_s = time.monotonic() + within_s
+    states: dict[str, str] = {}
+    while not so(states):
+        assert time.monotonic() < deadline_s, states
+        time.sleep(0.1)
+        states = {each["rig"]: each["state"] for each in sections(feed).get("rigs", ())}
