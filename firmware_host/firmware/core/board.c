@@ -5,6 +5,7 @@
 #include "acquisition.h"
 #include "calibrating.h"
 #include "clock.h"
+#include "heater.h"
 #include "link.h"
 #include "port.h"
 #include "reply.h"
@@ -27,6 +28,7 @@ void board_reset(void)
     calibrating_reset();
     sensors_reset();
     setups_reset();
+    heater_reset();
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
@@ -164,6 +166,7 @@ static const struct {
     {MESSAGE_STOP, 0, on_stop},
     {MESSAGE_STATUS, 0, on_status},
     {MESSAGE_REBOOT, 0, on_reboot},
+    {MESSAGE_HEAT, sizeof(struct heat_payload), heater_on_heat},
     {MESSAGE_KEEP, sizeof(struct keep_payload), calibrating_on_keep},
     {MESSAGE_OBSERVE, sizeof(struct observe_payload), calibrating_on_observe},
     {MESSAGE_RECALL, sizeof(struct recall_payload), calibrating_on_recall},
@@ -203,6 +206,7 @@ void board_run(void)
     while (link_receive(&request))
         answer(&request);
     acquisition_run();
+    heater_run();
     if (stop_to_acknowledge != 0 && acquisition_is_empty() && link_has_room()) {
         reply_done(stop_to_acknowledge);
         stop_to_acknowledge = 0;
