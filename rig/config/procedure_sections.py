@@ -361,7 +361,13 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
     )
     to_c: float = Field(ge=-40, le=85, description="upper end of the range")
-    gap_k: float = Field(default=5.0, gt=0, le=50, description="how far neighbouring sets may be apart")
+    gap_k: float = Field(
+        default=5.0,
+        gt=0,
+        le=50,
+        description="how far neighbouring sets may be apart",
+        json_schema_extra={"unit": "K"},
+    )
     most_rate_k_per_min: float = Field(
         default=2.0,
         gt=0,

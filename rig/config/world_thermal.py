@@ -63,8 +63,7 @@ class SimulatedThermalSection(Section):
         default=2.0,
         gt=0,
         le=100,
-        description="how far a part must cool after it was warmed until all of its hysteresis has turned round: half "
-        "of that",
+        description="how far a part must cool after it was warmed until all of its hysteresis has turned round",
         json_schema_extra={"unit": "K"},
     )
 

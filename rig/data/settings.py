@@ -182,17 +182,6 @@ class ByHand:
 
 
 @dataclass(frozen=True, slots=True)
-class OverTemperature:
-    """The range of a calibration over temperature, with gaps of at most `gap_k`, stated at `reference_c`."""
-
-    from_c: Finite
-    to_c: Finite
-    gap_k: Positive
-    reference_c: Finite
-    both_ways: bool = True
-
-
-@dataclass(frozen=True, slots=True)
 class PlannedSweep:
     """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed, how far it turns."""
 
@@ -230,6 +219,8 @@ class RunSettings:
 
     `mounts` are the nominal rotations from the flange's frame to the item's in the stages of the procedure, of which
     this recording is of number `stage`, from 0; none where the item stays mounted as it is.
+
+    `reference_c` is the temperature at which a calibration over temperature is stated; None of any other.
     """
 
     procedure: str
@@ -252,7 +243,7 @@ class RunSettings:
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
     by_hand: ByHand | None = None
-    over_temperature: OverTemperature | None = None
+    reference_c: float | None = None
 
     @property
     def mount(self) -> Mounting:
@@ -341,8 +332,8 @@ class RunSettings:
             del document["elsewhere"]
         if self.by_hand is None:
             del document["by_hand"]
-        if self.over_temperature is None:
-            del document["over_temperature"]
+        if self.reference_c is None:
+            del document["reference_c"]
         if not self.mounts:
             del document["mounts"], document["stage"]
         return document
@@ -401,7 +392,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         reckoning=RECKONING,
         mounts=tuple(stage.mount for stage in plan.stages),
         by_hand=_by_hand(config.procedure),
-        over_temperature=_over_temperature(config.procedure),
+        reference_c=getattr(config.procedure, "reference_c", None),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
         raise _angle_std_not_stated()
@@ -421,14 +412,6 @@ def _by_hand(section: "ProcedureSection") -> ByHand | None:
         closure_rad=float(np.radians(section.closure_deg)),
         wanted_scale_u=section.wanted_scale_u,
     )
-
-
-def _over_temperature(section: "ProcedureSection") -> OverTemperature | None:
-    from rig.config.procedure_sections import ThermalSection
-
-    if not isinstance(section, ThermalSection):
-        return None
-    return OverTemperature(section.from_c, section.to_c, section.gap_k, section.reference_c, section.both_ways)
 
 
 def _angle_std_not_stated() -> Refused:

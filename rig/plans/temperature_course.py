@@ -6,7 +6,7 @@ the mean of its temperatures. Neighbours may be a gap apart, the outermost a qua
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 from rig.data.thermal_events import SetMeasured
 
@@ -50,8 +50,10 @@ class Course:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Whether the sensors, so warm now, have moved on far enough for the next set."""
+        """Whether the sensors, so warm now, have moved on far enough for the next set, or are at the end of the way."""
         if not self.sets:
+            return True
+        if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
             return True
         last = self.sets[-1].temperatures_c
         moved = (abs(now_c[name] - last[name]) for name in now_c)
@@ -63,7 +65,7 @@ class Course:
             return now_c
         last = self.sets[-1].temperatures_c.values()
         step_k = NEXT_AFTER * self.gap_k
-        return max(last) + step_k if self.warming else min(last) - step_k
+        return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
         """What of the range no set has covered yet, in words; None where all of it is covered."""
@@ -72,13 +74,22 @@ class Course:
 
     def _missing(self, ways: Iterable[tuple[bool | None, str]]) -> Iterator[str]:
         for way, words in ways:
-            sets = [each for each in self.sets if way is None or each.warming is way]
+            sets = self._of(way)
             if not sets:
                 yield f"no set of sweeps was made {words}".strip()
             for name in sets[0].temperatures_c if sets else ():
                 gap = self._gap(sorted(each.temperatures_c[name] for each in sets))
                 if gap is not None:
                     yield f"{name} was never between {gap[0]:.1f} and {gap[1]:.1f} °C {words}".strip()
+
+    def _of(self, way: bool | None) -> list[SetMeasured]:
+        """The sets of a way, or all; one after which it turned round is the end of one way and that of another."""
+        followed = zip_longest(self.sets, self.sets[1:])
+        return [
+            each
+            for each, after in followed
+            if way is None or each.warming is way or (after is not None and after.warming is way)
+        ]
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
         """The first part of the range that has no set, from the cold end on."""

@@ -35,7 +35,7 @@ class Warming:
     """What a calibration over temperature watches and does beside its motions.
 
     `names` are the sensors whose thermometers count. `heater` is the board that has it; None where the operator changes
-    the temperature. `set_s` is how long a set takes.
+    the temperature. `set_s` is how long a set takes, as planned or longer.
     """
 
     section: ThermalSection
@@ -47,6 +47,7 @@ class Warming:
     course: Course
     _seen: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
     _of_set: list[dict[str, float]] | None = None  # temperatures, since a set began
+    _began_s: float = 0.0  # the set
     _ramp: Ramp | None = None
     _looked_s: float = -np.inf
 
@@ -66,9 +67,13 @@ class Warming:
                 f"{self.heater.identity.firmware} of the board knows no heater",
                 "Flash the image that comes with this program: `rig board flash`; or set procedure.heater_power to 0",
             ) from error
-        gap_k, allowed_k_s = self.section.gap_k, self.section.most_rate_k_per_min / 60
-        rate_k_s = min(RAMP_SHARE * allowed_k_s, SET_SHARE * gap_k / max(self.set_s, 1.0))
-        self._ramp = Ramp(rate_k_s, self.section.heater_power)
+        self._ramp = Ramp(self._rate_k_s, self.section.heater_power)
+
+    @property
+    def _rate_k_s(self) -> float:
+        """How fast a ramp may be: within the limit, and so that a set is made within a part of a gap."""
+        allowed_k_s = RAMP_SHARE * self.section.most_rate_k_per_min / 60
+        return min(allowed_k_s, SET_SHARE * self.section.gap_k / max(self.set_s, 1.0))
 
     def check(self, time_s: float) -> None:
         """Look at the thermometers at that time of the controller's, and speak to the heater.
@@ -116,7 +121,7 @@ class Warming:
 
     def begin_set(self) -> None:
         """What is read from now on is the temperature of the set that follows."""
-        self._of_set = []
+        self._of_set, self._began_s = [], self._looked_s
 
     def end_set(self, first: int, end: int) -> None:
         """The sweeps and dwells from `first` up to `end` are made."""
@@ -125,7 +130,10 @@ class Warming:
             measured = SetMeasured(first, end, bool(self.course.warming), means)
             self.note(measured)
             self.course.measured(measured)
+            self.set_s = max(self.set_s, self._looked_s - self._began_s)
         self._of_set = None
+        if self._ramp is not None:
+            self._ramp.rate_k_s = self._rate_k_s
 
     def stop_heating(self) -> None:
         """The heater off, and nothing more said to it."""

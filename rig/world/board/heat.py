@@ -24,7 +24,7 @@ class HeatedPart:
         self._thermometer_c += (body_c - self._thermometer_c) * _gone(dt_s, section.thermometer_lag_s)
         self._element_c += (self._thermometer_c - self._element_c) * _gone(dt_s, section.element_lag_s)
         self._offset_k += (section.gradient_k_w * heater_w - self._offset_k) * _gone(dt_s, section.element_lag_s)
-        half_k, felt_c = section.hysteresis_k / 4, self._element_c + self._offset_k
+        half_k, felt_c = section.hysteresis_k / 2, self._element_c + self._offset_k
         self._behind_c = min(max(self._behind_c, felt_c - half_k), felt_c + half_k)
 
     def thermometer_c(self, _time_s: float) -> float:
@@ -37,7 +37,7 @@ class HeatedPart:
 
     def branch(self, time_s: float) -> float:
         """On which branch of its hysteresis it is, from -1 to 1."""
-        return (self.temperature_c(time_s) - self._behind_c) / (self._section.hysteresis_k / 4)
+        return (self.temperature_c(time_s) - self._behind_c) / (self._section.hysteresis_k / 2)
 
 
 class HeatedBody:
