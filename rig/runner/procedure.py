@@ -323,7 +323,9 @@ class Rig:
         with self._step(rest):
             warming.begin_waiting()
             at_most_s = 60 * warming.section.patience_min
-            if not self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest)):
+            with self.devices.acquisition.standing():
+                due = self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest))
+            if not due:
                 raise range_not_reached(
                     missing, f"in {warming.section.patience_min:g} minutes the sensors did not become as warm as wanted"
                 )
