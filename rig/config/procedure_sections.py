@@ -430,7 +430,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """That of the attitudes where a set has them."""
+        """Order of the accelerometer's model where a set has attitudes; else 0."""
         return (2 if self.second_order else 1) if self.with_attitudes else 0
 
     def problems(self, config: RigConfig) -> Iterator[str]:

@@ -10,7 +10,7 @@
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
 #define BAUD_RATE 921600u
-#define HEATER_WORD_US 2000000u /* without the host's word for so long the heater goes off */
+#define HEATER_WORD_US 2000000u /* without a word for so long the heater goes off */
 #define HEATER_LIMIT_C 70.0f /* and when a part is that hot */
 #define BATCH_AGE_US 80000u /* a sample waits no longer than this for company */
 #define CALIBRATED_PER_RAD_S 1000000.0f /* counts of calibrated readings */

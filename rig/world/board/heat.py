@@ -36,7 +36,7 @@ class HeatedPart:
         return self._element_c + self._offset_k
 
     def branch(self, time_s: float) -> float:
-        """On which branch of its hysteresis it is, from -1 to 1."""
+        """Branch of its hysteresis on which it is, from -1 to 1."""
         return (self.temperature_c(time_s) - self._behind_c) / (self._section.hysteresis_k / 2)
 
 
