@@ -94,7 +94,8 @@ def test_what_is_not_as_it_should_be_ends_by_name(
 
 def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> None:
     procedure = {"order": None, "directions": None, **PROCEDURE, "heater_power": 0}
-    laboratory = world(merge(LABORATORY, {"procedure": procedure}))
+    slow = {"world": {"thermal": {"capacity_j_k": 15}}}  # a set takes a part of a gap
+    laboratory = world(merge(merge(LABORATORY, slow), {"procedure": procedure}))
     config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
