@@ -74,3 +74,5 @@ def test_no_fault_leaves_the_heater_on(name: str, tmp_path: Path) -> None:
         assert here.ended(END_S), "it hangs"
         here.pace(REAL)
         assert off_after_s(here) <= OFF_WITHIN_S
+        for second in here.companions:
+            second.communicate(timeout=END_S)
