@@ -124,6 +124,25 @@ class BoardIdentity:
 
 
 @dataclass(frozen=True, slots=True)
+class Heating:
+    """What the heater does: its `power`, 0 to 1, the `cause` of `protocol.HEATER_CAUSES` why it is off.
+
+    `temperature_c` is how warm the hottest part was when the board last looked.
+    """
+
+    power: float
+    cause: str
+    temperature_c: float
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """A `heating` frame."""
+        values = frame.values
+        cause = protocol.HEATER_CAUSES[values["cause"]]
+        return cls(values["power"] / protocol.HEATER_POWERS, cause, values["temperature_c"])
+
+
+@dataclass(frozen=True, slots=True)
 class SensorSetup:
     """What the part really does: rate = counts · sensitivity_rad_s, temperature = counts · scale + offset.
 

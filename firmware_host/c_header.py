@@ -30,6 +30,8 @@ def c_header() -> str:
         f"#define FRAME_OVERHEAD {protocol.OVERHEAD}u /* type, sequence, CRC */",
         f"#define COBS_BYTES {protocol.COBS_BYTES}u /* code byte and delimiter */",
         f"#define BAUD_RATE {protocol.BAUD_RATE}u",
+        f"#define HEATER_WORD_US {protocol.HEATER_WORD_US}u /* without a word for so long the heater goes off */",
+        f"#define HEATER_LIMIT_C {protocol.HEATER_LIMIT_C}f /* and when a part is that hot */",
         f"#define BATCH_AGE_US {protocol.BATCH_AGE_US}u /* a sample waits no longer than this for company */",
         f"#define CALIBRATED_PER_RAD_S {1 / protocol.CALIBRATED_RAD_S:.1f}f /* counts of calibrated readings */",
         f"#define MAX_SCALE {protocol.MAX_SCALE}f /* no sensor's scale factor is that far off, either way */",

@@ -12,6 +12,7 @@ from firmware_host.answers import (
     BoardSolution,
     BoardStatus,
     Calibration,
+    Heating,
     SampleBatch,
     SensorCounts,
     SensorInfo,
@@ -32,6 +33,7 @@ __all__ = [
     "BoardSolution",
     "BoardStatus",
     "Calibration",
+    "Heating",
     "SampleBatch",
     "SensorCounts",
     "SensorInfo",
@@ -59,6 +61,7 @@ class Board:
         self._streaming = False
         self._heard = (-1, 0.0)  # frames seen at the last check, and another's clock when there was a new one
         self._parts: tuple[str, ...] = ()
+        self.heating: Heating | None = None  # what the heater did when the board last said it
         self._link = BoardLink(port, baud, self._take, self._take_samples)
         try:
             self.identity = self._hello()
@@ -161,6 +164,14 @@ class Board:
         """Lets the board forget a sensor's calibration; having none is no error."""
         self._ask("erase_calibration", {"sensor": sensor}, _FLASH_TIMEOUT_S)
 
+    def heat(self, power: float) -> Heating:
+        """Lets the heater be on for this part of the time, 0 to 1; it goes off within two seconds unless told again."""
+        return Heating.of(self._ask("heat", {"power": _of_powers(power)}))
+
+    def keep_heating(self, power: float) -> None:
+        """Says the same without waiting for the answer, which becomes `heating`."""
+        self._link.tell("heat", {"power": _of_powers(power)})
+
     def reboot(self) -> None:
         """Starts the board afresh and waits until it answers again."""
         self._ask("reboot")
@@ -262,6 +273,8 @@ class Board:
             self._streaming = request == "start"
             if request == "reboot":
                 self._link.expect_restart()
+        elif frame.name == "heating":
+            self.heating = Heating.of(frame)
         elif frame.name == "error" and frame.values["reply_to"] == 0:
             self._link.fail(self._refusal(frame))
         elif frame.name == "identity" and request is None and self._streaming:
@@ -287,6 +300,11 @@ class Board:
         part = self._parts[sensor] if sensor < len(self._parts) else f"sensor {sensor}"
         about = "" if problem.name in _ABOUT_THE_BOARD else f", of its {part}"
         return BoardError.of(problem._replace(what=f"the board on {self._link.port} says{about}: {problem.what}"))
+
+
+def _of_powers(power: float) -> int:
+    """A power from 0 to 1 as the board counts it."""
+    return round(protocol.HEATER_POWERS * min(max(power, 0.0), 1.0))
 
 
 def _mask(sensors: Collection[int]) -> int:

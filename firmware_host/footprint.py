@@ -2,7 +2,7 @@
 
 Flash and RAM are the linker's. The stack is what the board itself reports after a session on the emulator that asks
 for everything it can do: all gyroscopes streaming with accelerations, and a magnetometer, observations kept and
-averaged, both solutions, a move by hand solved, a calibration written, read, streamed by and erased.
+averaged, both solutions, a move by hand solved, the heater on, a calibration written, read, streamed by and erased.
 """
 
 import io
@@ -118,6 +118,7 @@ def stack_used(image: bytes, elf: bytes) -> int:
         session.ask("configure", sensor=sensor, rate_hz=80.0, **ranges)
     session.ask("start", sensors=0)
     session.run(0.5)
+    session.ask("heat", power=255)
     for index in range(len(DIRECTIONS)):
         session.sweep(index)
     solutions = [session.ask("solve", sensor=s, method=m) for s in SENSORS for m in range(len(METHODS))]

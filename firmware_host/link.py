@@ -116,9 +116,9 @@ class BoardLink:
             "Check the board's supply and cable",
         )
 
-    def tell(self, name: str) -> None:
+    def tell(self, name: str, values: dict[str, Any] | None = None) -> None:
         """Sends a request without waiting for its answer. Raises BoardError `board_link_lost`."""
-        self._send(name, 0, {})
+        self._send(name, 0, values or {})
 
     def fail(self, error: Exception) -> None:
         """Makes `error` the fault, unless there is one already."""

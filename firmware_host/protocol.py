@@ -27,6 +27,9 @@ PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
 BAUD_RATE = 921600  # what the shipped image uses
+HEATER_WORD_US = 2_000_000  # the heater goes off when the host has said nothing of it for so long
+HEATER_LIMIT_C = 70.0  # and when any thermometer of a part reads this
+HEATER_POWERS = 255  # of its pin, all of the time
 BATCH_AGE_US = 80_000  # a sample waits no longer than this for company; a full frame goes at once
 FULL_SCALE_COUNTS = 32767  # of raw readings: every part the firmware drives reports 16 bits, two's complement
 CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings: they come in microradians per second
@@ -48,6 +51,7 @@ SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_conver
 HAND_STATES = ("idle", "starting", "moving", "resting", "done", "failed")
 HAND_OUTCOMES = ("nothing", "taken", "clipped", "lost", "no_face", "contradicts")
 HAND_FACES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the sensor's axis that points upwards
+HEATER_CAUSES = ("on", "not_wanted", "no_word", "too_hot", "no_thermometer")  # why it is off
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
     "reset_cause": ("RESET", RESET_CAUSES),
     "sample_mode": ("MODE", MODES),
@@ -57,6 +61,7 @@ ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 
     "solution_status": ("SOLUTION", SOLUTION_STATUSES),
     "hand_state": ("HAND", HAND_STATES),
     "hand_outcome": ("MOVE", HAND_OUTCOMES),
+    "heater_cause": ("HEATER", HEATER_CAUSES),
 }
 
 # kind → (struct code, C type, C array suffix)
@@ -391,6 +396,25 @@ MESSAGES = (
         (DELTA, Field("field", "vector_i16", "magnetic flux density: x, y, z as the part reports them, right-handed")),
     ),
     Message(
+        0x1A,
+        "heat",
+        "host",
+        "switch the heater on, or off; to be said again within two seconds, or it goes off; answered by heating",
+        (Field("power", "u8", "of 255: which part of the time the heater's pin is up; 0 = off"),),
+    ),
+    Message(
+        0x1B,
+        "heating",
+        "board",
+        "what the heater does now",
+        (
+            REPLY_TO,
+            Field("power", "u8", "of 255, 0 = off"),
+            Field("cause", "u8", "enum heater_cause: why it is off; too_hot holds until the host says off itself"),
+            Field("temperature_c", "f32", "of the hottest part when the board last looked, degrees Celsius"),
+        ),
+    ),
+    Message(
         0x30,
         "by_hand",
         "host",
@@ -478,6 +502,7 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
 # A request is answered by `error` or by: these, every other one by `ack`.
 ANSWERS = {
     "hello": "identity",
+    "heat": "heating",
     "configure": "setup",
     "status": "report",
     "observe": "observed",

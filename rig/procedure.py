@@ -19,6 +19,7 @@ from rig.config.procedure_sections import (
     SixObservationSection,
     SixSweepsSection,
     StaticAttitudesSection,
+    ThermalSection,
     VerifySection,
 )
 from rig.config.servo_procedure import ServoSixObservationSection
@@ -33,13 +34,15 @@ from rig.plans.registry import Procedure
 from rig.plans.servo_sweeps import plan_servo_six_observation
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import plan_static_attitudes
+from rig.plans.thermal import plan_thermal
 from rig.plans.verbs import Verbs
 
 __all__ = [
     "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Dwell", "HandSection", "ImuSection",
     "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
     "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
-    "StaticAttitudesSection", "Step", "Sweep", "Transfer", "TurnerSection", "Verbs", "VerifySection", "calibrated",
-    "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu", "plan_servo_six_observation", "plan_six_observation",
-    "plan_static_attitudes", "run_script", "trapezoid_duration", "travel", "verified", "verified_alone",
+    "StaticAttitudesSection", "Step", "Sweep", "ThermalSection", "Transfer", "TurnerSection", "Verbs", "VerifySection",
+    "calibrated", "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu", "plan_servo_six_observation",
+    "plan_six_observation", "plan_static_attitudes", "plan_thermal", "run_script", "trapezoid_duration", "travel",
+    "verified", "verified_alone",
 ]  # fmt: skip

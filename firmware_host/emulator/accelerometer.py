@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.triad import Seed, Temperature, Triad, TriadErrors, spawned
+from firmware_host.emulator.triad import Die, Seed, Temperature, Triad, TriadErrors, spawned
 
 STANDARD_GRAVITY_M_S2 = 9.80665  # what a data sheet's g is
 _AT_REST_G = (0.0, 0.0, 1.0)  # with z up
@@ -17,9 +17,9 @@ _SEED_KEY = 2  # of its randomness beside the gyroscope's and its drift's
 class AccelerometerTruth:
     """What the simulated accelerometer really does: s = K (m + b) as for the gyroscope, m the reading, in m/s².
 
-    `scale`, `non_orthogonality_rad`, `scale_per_k`, `holds_at_c`, `bandwidth_hz`, `delay_s`, and the bias' drift: as in
-    `GyroTruth`. `second_order_s2_m`: φ, by which each component of the specific force feels as s + φ s² before anything
-    else becomes of it (TRIAX, a_m = F (s + φ s²) + b, where b is the negative of this one).
+    `scale`, `non_orthogonality_rad`, `holds_at_c`, `bandwidth_hz`, `delay_s`, all of temperature, and the bias' drift:
+    as in `GyroTruth`. `second_order_s2_m`: φ, by which each component of the specific force feels as s + φ s² before
+    anything else becomes of it (TRIAX, a_m = F (s + φ s²) + b, where b is the negative of this one).
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -35,6 +35,10 @@ class AccelerometerTruth:
     instability_m_s2: float = 0.0
     instability_time_s: float = 100.0
     random_walk_m_s2_per_sqrt_s: float = 0.0
+    scale_per_k2: Sequence[float] = (0.0, 0.0, 0.0)
+    bias_m_s2_per_k2: Sequence[float] = (0.0, 0.0, 0.0)
+    hysteresis_m_s2: Sequence[float] = (0.0, 0.0, 0.0)
+    die: Die | None = None
 
 
 class Accelerometer:
@@ -101,5 +105,9 @@ def _triad(truth: AccelerometerTruth, seed: Seed, temperature_c: float | Tempera
         instability=truth.instability_m_s2,
         instability_time_s=truth.instability_time_s,
         random_walk_per_sqrt_s=truth.random_walk_m_s2_per_sqrt_s,
+        scale_per_k2=truth.scale_per_k2,
+        bias_per_k2=truth.bias_m_s2_per_k2,
+        hysteresis=truth.hysteresis_m_s2,
+        die=truth.die,
     )
     return Triad(errors, spawned(seed, _SEED_KEY), temperature_c)

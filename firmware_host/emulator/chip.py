@@ -15,7 +15,7 @@ from firmware_host.emulator.spi import Spi1
 from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
 from firmware_host.emulator.system_control import SystemControl, SysTick
 from firmware_host.emulator.timeline import Timeline
-from firmware_host.emulator.timers import Tim2, Watchdog
+from firmware_host.emulator.timers import Tim2, Tim16, Watchdog
 from firmware_host.emulator.usart import TDR_ADDRESS, Usart2
 
 _PERIPHERALS, _PERIPHERALS_SIZE = 0x4000_0000, 0x2_3000
@@ -23,6 +23,7 @@ _PORTS, _PORTS_SIZE = 0x4800_0000, 0x1000
 _STORE, _STORE_SIZE = 0x0800_0000 + STORE_OFFSET, FLASH_BYTES - STORE_OFFSET
 _CORE, _CORE_SIZE = 0xE000_E000, 0x1000
 _SERIAL_FUNCTIONS = {"PA2": 7, "PA15": 3}
+_HEATER_FUNCTIONS = {"PA6": 14}
 _SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
 
 
@@ -60,6 +61,8 @@ class Chip:
         self._spi = Spi1(timeline, clocks)
         sensor_bus = SpiBus(timeline, self._spi, self._on_pins(_SENSOR_BUS_FUNCTIONS))
         self._timer = Tim2(timeline, clocks)
+        self._pwm = Tim16()
+        self._heater_connected = self._on_pins(_HEATER_FUNCTIONS)
         self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
         self.flash = flash = Flash(timeline, memory, nvic)
         power = rcc.Power()
@@ -83,7 +86,7 @@ class Chip:
         self._blocks: list[Peripheral] = []
         self._attach(core, SysTick(timeline, clocks, nvic), nvic, self.control)
         self._attach(peripherals, exti, watchdog)
-        self._attach_gated(peripherals, dma, flash, self._timer, self.usart, power, syscfg, self._spi)
+        self._attach_gated(peripherals, dma, flash, self._timer, self._pwm, self.usart, power, syscfg, self._spi)
         self._attach_gated(ports, *self._ports.values())
         self._attach(peripherals, self.rcc)  # last: its reset switches the gates of the others
         for device in devices:
@@ -93,6 +96,11 @@ class Chip:
     def peripherals(self) -> Sequence[Peripheral]:
         """Every block of registers that has a model."""
         return tuple(self._blocks)
+
+    @property
+    def heater_duty(self) -> float:
+        """Which part of the time the heater's pin is up, 0 to 1; a pin that nothing drives is held down."""
+        return self._pwm.duty if self._heater_connected() else 0.0
 
     def reset(self) -> None:
         for block in self._blocks:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.triad import Bend, Seed, Temperature, Triad, TriadErrors, saturated
+from firmware_host.emulator.triad import Bend, Die, Seed, Temperature, Triad, TriadErrors, saturated
 
 __all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "saturated"]
 
@@ -24,7 +24,10 @@ class GyroTruth:
     and b grow per degree above `holds_at_c`; `g_sensitivity_rad_s_per_g` (3 rows, or none): what a reading gains per g
     of specific force along x, y, z; `nonlinearity_even_per_rad_s` and `nonlinearity_odd_per_rad_s`: by which fraction
     a reading grows with the rate along its axis, and with the rate's magnitude; a low-pass of first order with
-    `bandwidth_hz` (none: no filter), `delay_s` late, that noise and bias do not pass; the bias' drift, see `Drift`.
+    `bandwidth_hz` (none: no filter), `delay_s` late, that noise and bias do not pass; the bias' drift, see `Drift`;
+    what K and b grow by with the square of these degrees (`…_per_k2`); `hysteresis_rad_s`, by which b is larger after
+    warming and smaller after cooling; the `die`, whose temperature all this follows, where it is not that of the
+    thermometer.
     """
 
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -42,6 +45,10 @@ class GyroTruth:
     instability_rad_s: float = 0.0
     instability_time_s: float = 100.0
     random_walk_rad_s_per_sqrt_s: float = 0.0
+    scale_per_k2: Sequence[float] = (0.0, 0.0, 0.0)
+    bias_rad_s_per_k2: Sequence[float] = (0.0, 0.0, 0.0)
+    hysteresis_rad_s: Sequence[float] = (0.0, 0.0, 0.0)
+    die: Die | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,5 +140,9 @@ def _triad(truth: GyroTruth, seed: Seed, temperature_c: float | Temperature) -> 
         instability=truth.instability_rad_s,
         instability_time_s=truth.instability_time_s,
         random_walk_per_sqrt_s=truth.random_walk_rad_s_per_sqrt_s,
+        scale_per_k2=truth.scale_per_k2,
+        bias_per_k2=truth.bias_rad_s_per_k2,
+        hysteresis=truth.hysteresis_rad_s,
+        die=truth.die,
     )
     return Triad(errors, seed, temperature_c)

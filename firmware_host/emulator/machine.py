@@ -128,6 +128,11 @@ class EmulatedBoard:
         return self._chip.usart.baud_rate
 
     @property
+    def heater_duty(self) -> float:
+        """Which part of the time the heater's pin is up, 0 to 1."""
+        return self._chip.heater_duty if self.powered else 0.0
+
+    @property
     def peripherals(self) -> Sequence[Peripheral]:
         """Every block of registers that has a model."""
         return self._chip.peripherals

@@ -15,7 +15,7 @@ _ENABLE_BITS = {  # register offset → bit → peripheral
     0x48: {0: "DMA1", 8: "FLASH"},
     0x4C: {0: "GPIOA", 1: "GPIOB"},
     0x58: {0: "TIM2", 17: "USART2", 28: "PWR"},
-    0x60: {0: "SYSCFG", 12: "SPI1"},
+    0x60: {0: "SYSCFG", 12: "SPI1", 17: "TIM16"},
 }
 _ENABLE_NAMES = {0x48: "AHB1ENR", 0x4C: "AHB2ENR", 0x58: "APB1ENR1", 0x60: "APB2ENR"}
 # RM0394 table 9: wait states needed at supply range 1, from 16 MHz to 16 MHz

@@ -1,4 +1,4 @@
-"""TIM2 as a free-running counter and the independent watchdog (RM0394, chapters 28 and 31)."""
+"""TIM2 as a free-running counter, TIM16 as the heater's PWM, the independent watchdog (RM0394, chapters 28, 29, 31)."""
 
 from collections.abc import Callable, Sequence
 from math import gcd
@@ -9,6 +9,7 @@ from firmware_host.emulator.hooks import Counter, reader
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _LSI_HZ = 32_000
+_PWM_MODE_1 = 6
 _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 
 
@@ -73,6 +74,53 @@ class Tim2:
         self._divider = self._prescaler.value + 1
         self.counter.counted, self.counter.since = 0, self._timeline.now
         self.retune()
+
+
+class Tim16:
+    """A PWM on channel 1: mode 1, counting up. What it changes acts at once, not at the next update event.
+
+    The registers keep what is written; nothing counts, because nobody but the heater sees this pin.
+    """
+
+    name = "TIM16"
+    base = 0x4001_4400
+
+    def __init__(self) -> None:
+        self._control = Stored("TIM16 CR1", 1)
+        self._mode = Stored("TIM16 CCMR1_Output", 7 << 4 | 1 << 3)
+        self._enable = Stored("TIM16 CCER", 1)
+        self._prescaler = Stored("TIM16 PSC", 0xFFFF)
+        self._reload = Stored("TIM16 ARR", 0xFFFF)
+        self._compare = Stored("TIM16 CCR1", 0xFFFF)
+        self._output = Stored("TIM16 BDTR", 1 << 15)
+
+    def reset(self) -> None:
+        for register in self._stored.values():
+            register.reset()
+
+    def registers(self) -> Sequence[Register]:
+        generate = Register(0x14, "EGR", None, lambda value: check_bits("TIM16 EGR", value, 1))
+        return (generate, *(register.at(offset) for offset, register in self._stored.items()))
+
+    @property
+    def _stored(self) -> dict[int, Stored]:
+        return {
+            0x00: self._control,
+            0x18: self._mode,
+            0x20: self._enable,
+            0x28: self._prescaler,
+            0x2C: self._reload,
+            0x34: self._compare,
+            0x44: self._output,
+        }
+
+    @property
+    def duty(self) -> float:
+        """Which part of the time the channel's output is up, 0 to 1."""
+        runs = self._control.value & self._enable.value and self._output.value and self._reload.value
+        if not runs or self._mode.value >> 4 & 7 != _PWM_MODE_1:
+            return 0.0
+        return min(1.0, self._compare.value / (self._reload.value + 1))
 
 
 class Watchdog:

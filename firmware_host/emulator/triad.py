@@ -5,7 +5,7 @@ through their errors and their noise, to a reading.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,6 +16,19 @@ _NOISE_BLOCK = 3 * 256
 Seed = int | np.random.SeedSequence
 Temperature = Callable[[float], float]
 Bend = Callable[[Any], Any]
+
+
+class Die(Protocol):
+    """What moves in a part, where it is not as warm as the part's thermometer says.
+
+    `branch` is where it is on its hysteresis: 1 after warming, -1 after cooling.
+    """
+
+    def temperature_c(self, time_s: float, /) -> float: ...
+    def branch(self, time_s: float, /) -> float: ...
+
+
+_NONE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +49,10 @@ class TriadErrors:
     instability: float
     instability_time_s: float
     random_walk_per_sqrt_s: float
+    scale_per_k2: Sequence[float] = _NONE
+    bias_per_k2: Sequence[float] = _NONE
+    hysteresis: Sequence[float] = _NONE
+    die: Die | None = None
 
 
 class Triad:
@@ -53,10 +70,12 @@ class Triad:
         )
         self._errors = errors
         self._elements = [
-            (*axis, 1 / k, per_k) for axis, k, per_k in zip(axes, errors.scale, errors.scale_per_k, strict=True)
+            (*axis, 1 / k, per_k, per_k2)
+            for axis, k, per_k, per_k2 in zip(axes, errors.scale, errors.scale_per_k, errors.scale_per_k2, strict=True)
         ]
         self._bias = list(errors.bias)
-        self._warms = callable(temperature_c)
+        self._warms = callable(temperature_c) or errors.die is not None
+        self._bias_moves = any((*errors.bias_per_k, *errors.bias_per_k2, *errors.hysteresis))
         self.temperature_c: Temperature = temperature_c if callable(temperature_c) else lambda _time_s: temperature_c
         self._low_pass = LowPass(errors.bandwidth_hz) if errors.bandwidth_hz is not None else None
         self._drift = _drift(errors, seed)
@@ -70,17 +89,23 @@ class Triad:
         """
         x, y, z = true
         felt = []
-        for a, b, c, inverse_scale, per_k in self._elements:
+        for a, b, c, inverse_scale, per_k, per_k2 in self._elements:
             along = a * x + b * y + c * z
             if bend is not None:
                 along = bend(along)
             value = along * inverse_scale
-            felt.append(value / (1.0 + per_k * warmer_k) if per_k else value)
+            if per_k or per_k2:
+                value = value / (1.0 + per_k * warmer_k + per_k2 * warmer_k**2)
+            felt.append(value)
         return felt
 
     def warmer_k(self, time_s: float) -> float:
         """How much warmer the part is than where its errors hold."""
-        return self.temperature_c(time_s) - self._errors.holds_at_c if self._warms else 0.0
+        if not self._warms:
+            return 0.0
+        die = self._errors.die
+        felt_c = self.temperature_c(time_s) if die is None else die.temperature_c(time_s)
+        return felt_c - self._errors.holds_at_c
 
     def read(self, time_s: float, felt: list[float], warmer_k: float) -> list[float]:
         """The next reading, (3,), at `time_s`, of what the elements felt then."""
@@ -89,12 +114,21 @@ class Triad:
         if self._low_pass is not None:
             felt = self._low_pass.step(time_s, felt)
         bias = self._bias
-        if warmer_k:
-            bias = [b + per_k * warmer_k for b, per_k in zip(bias, self._errors.bias_per_k, strict=True)]
+        if self._bias_moves:
+            bias = self._moved(warmer_k, self._branch(time_s))
         if self._drift is not None:
             bias = [b + drift for b, drift in zip(bias, self._drift.at(time_s), strict=True)]
         scale, draw = self._errors.noise, self._noise.pop
         return [value - b + scale * draw() for value, b in zip(felt, bias, strict=True)]
+
+    def _branch(self, time_s: float) -> float:
+        return 0.0 if self._errors.die is None else self._errors.die.branch(time_s)
+
+    def _moved(self, warmer_k: Any, branch: Any) -> list[Any]:
+        """The bias where the part is so much warmer, on that branch of its hysteresis: three floats or arrays."""
+        errors = self._errors
+        rows = zip(self._bias, errors.bias_per_k, errors.bias_per_k2, errors.hysteresis, strict=True)
+        return [b + per_k * warmer_k + per_k2 * warmer_k**2 + size * branch for b, per_k, per_k2, size in rows]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
         """How much warmer the part is than where its errors hold, (n,) or one number for all times."""
@@ -106,7 +140,8 @@ class Triad:
         if self._low_pass is not None:
             rows = zip(time_s.tolist(), columns.tolist(), strict=True)
             columns = np.array([self._low_pass.step(t, row) for t, row in rows])
-        bias = np.array(self._bias) + np.multiply.outer(warmer_k, np.array(self._errors.bias_per_k))
+        branch = np.array([self._branch(t) for t in time_s.tolist()]) if self._errors.die is not None else 0.0
+        bias = np.column_stack(self._moved(np.broadcast_to(warmer_k, time_s.shape), branch))
         if self._drift is not None:
             bias = bias + self._drift.at_times(time_s)
         noise = self._random.standard_normal(columns.shape)

@@ -26,12 +26,14 @@ __all__ = [
     "SixObservationSection",
     "SixSweepsSection",
     "StaticAttitudesSection",
+    "ThermalSection",
     "VerifySection",
 ]
 
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # once round at the slowest speed
+HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
@@ -366,6 +368,107 @@ class ImuSection(SixSweepsSection, AttitudesSection):
     )
 
 
+class ThermalSection(SixSweepsSection, AttitudesSection):
+    """Sweeps, and attitudes if accelerometers are calibrated too, in sets that are repeated while the sensors warm and
+    cool."""
+
+    name: Literal["thermal"] = Field(default="thermal", description="this procedure")
+    from_c: float = Field(
+        ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
+    )
+    to_c: float = Field(ge=-40, le=85, description="upper end of the range")
+    gap_k: float = Field(
+        default=5.0,
+        gt=0,
+        le=50,
+        description="how far neighbouring sets may be apart",
+        json_schema_extra={"unit": "K"},
+    )
+    most_rate_k_per_min: float = Field(
+        default=2.0,
+        gt=0,
+        le=100,
+        description="how fast the temperature may change; if it changes faster, the run ends (`too_fast`)",
+        json_schema_extra={"unit": "K/min"},
+    )
+    reference_c: float = Field(
+        default=25.0, ge=-40, le=85, description="temperature at which scale factors and biases are stated"
+    )
+    heater_power: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="most power of the heater on the board's pin, as a part of all it has; `0`: the operator, or "
+        "the board's own warm-up, changes the temperature",
+        json_schema_extra=RATIO,
+    )
+    both_ways: bool = Field(
+        default=True,
+        description="whether the range must be covered while the sensors warm and again while they cool, which shows "
+        "their hysteresis",
+    )
+    with_attitudes: bool = Field(
+        default=False, description="whether each set has the attitudes too, which calibrate accelerometers"
+    )
+    hottest_c: float = Field(
+        default=70.0,
+        ge=0,
+        le=105,
+        description="temperature above which the run ends (`overheated`); the board switches its heater off at 70 "
+        "in any case",
+    )
+    patience_min: float = Field(
+        default=20.0,
+        gt=0,
+        le=1000,
+        description="longest wait for the next temperature; after it the run ends (`range_not_reached`)",
+        json_schema_extra={"unit": "min"},
+    )
+    repeats: int = Field(
+        default=40,
+        ge=2,
+        le=100,
+        description="how many sets are made at most; if the range is not covered then, the run ends "
+        "(`range_not_reached`)",
+        json_schema_extra=RATIO,
+    )
+
+    @model_validator(mode="after")
+    def a_range_with_several_temperatures(self) -> Self:
+        """Two temperatures make a line through two points, which nothing contradicts."""
+        if self.to_c - self.from_c < 2 * self.gap_k:
+            raise ValueError("from_c and to_c must be two gaps apart at least: a line through two points shows nothing")
+        if not self.from_c <= self.reference_c <= self.to_c:
+            raise ValueError("reference_c must lie between from_c and to_c")
+        if self.hottest_c <= self.to_c:
+            raise ValueError("hottest_c must lie above to_c")
+        return self
+
+    @property
+    def accelerometer_order(self) -> AccelerometerOrder:
+        """Order of the accelerometer's model where a set has attitudes; else 0."""
+        return (2 if self.second_order else 1) if self.with_attitudes else 0
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """The problems of the sweeps and of the attitudes, a heater that cannot be, and sensors without a board."""
+        yield from SixSweepsSection.problems(self, config)
+        if self.with_attitudes:
+            yield from AttitudesSection.problems(self, config)
+        if self.arc_deg != 360:
+            yield f"procedure.arc_deg {self.arc_deg:g} is not for thermal: leave it at 360"
+        if self.finds_earth_rate:
+            yield "procedure.earth_rate: find is not for thermal: the biases move; give site.heading_deg"
+        if config.magnetometers:
+            yield f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated over temperature; leave it out"
+        if self.heater_power > 0 and not config.on_board:
+            yield "procedure.heater_power: the heater hangs on the board, and no sensor is on one"
+        if self.heater_power > 0 and self.to_c > HOTTEST_HEATED_C:
+            yield (
+                f"procedure.to_c {self.to_c:g} is too hot for the heater, which the board switches off at 70: at most "
+                f"{HOTTEST_HEATED_C:g}"
+            )
+
+
 STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
     {
         "six_observation": SixObservationSection,
@@ -375,6 +478,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
         "bias_drift": BiasDriftSection,
         "by_hand": ByHandSection,
         "servo_six_observation": ServoSixObservationSection,
+        "thermal": ThermalSection,
     }
 )
 

@@ -16,6 +16,7 @@ from rig.config.world_hand import SimulatedHandSection
 from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 from rig.config.world_servo import SimulatedServoSection
+from rig.config.world_thermal import SimulatedThermalSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
 Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]
@@ -265,6 +266,15 @@ ScalePerK = Annotated[
 ]
 
 
+ScalePerK2 = Annotated[
+    Vector3,
+    Field(
+        description="the same with the square of the temperature",
+        json_schema_extra={"unit": "1/K²"},
+    ),
+]
+
+
 class SimulatedAccelerometerSection(Section):
     """The truth of one accelerometer: a = F (s + φ s²) + b, with the specific force s; as warm as its gyroscope."""
 
@@ -287,6 +297,15 @@ class SimulatedAccelerometerSection(Section):
         json_schema_extra={"unit": "m/s²/K"},
     )
     scale_per_k: ScalePerK = NO_ROW
+    bias_m_s2_per_k2: Vector3 = Field(
+        default=NO_ROW,
+        description="by how much b of each axis grows with the square of the temperature",
+        json_schema_extra={"unit": "m/s²/K²"},
+    )
+    scale_per_k2: ScalePerK2 = NO_ROW
+    bias_hysteresis_m_s2: Vector3 = Field(
+        default=NO_ROW, description="how much larger b of each axis is after warming, and smaller after cooling"
+    )
     bias_instability_m_s2: float = Field(
         default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
     )
@@ -345,6 +364,16 @@ class SimulatedSensorSection(Section):
         default=NO_ROW, description="by how much b of each axis grows with temperature", json_schema_extra=RATE_PER_K
     )
     scale_per_k: ScalePerK = NO_ROW
+    bias_rad_s_per_k2: Vector3 = Field(
+        default=NO_ROW,
+        description="by how much b of each axis grows with the square of the temperature",
+        json_schema_extra={"unit": "rad/s/K²"},
+    )
+    scale_per_k2: ScalePerK2 = NO_ROW
+    bias_hysteresis_rad_s: Vector3 = Field(
+        default=NO_ROW,
+        description="how much larger b of each axis is after warming, and smaller after cooling, in `world.thermal`",
+    )
     bias_instability_rad_s: float = Field(
         default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
     )
@@ -444,6 +473,10 @@ class WorldSection(Section):
     )
     servo: SimulatedServoSection = SimulatedServoSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
+    thermal: SimulatedThermalSection | None = Field(
+        default=None,
+        description="how warm board and parts are; without it, each sensor of the board warms up by itself",
+    )
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})
     mounts: tuple[StageMountSection, ...] = Field(

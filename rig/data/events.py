@@ -20,6 +20,7 @@ from rig.data.hand_events import (
     HandRestRefused,
     OfTheHand,
 )
+from rig.data.thermal_events import OfTheTemperature, SetMeasured, TemperatureWanted
 from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
@@ -101,7 +102,7 @@ class BoardSolved:
 
 OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
 OfTheArm = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished
-Event = OfTheArm | OfTheBoard | OfTheHand
+Event = OfTheArm | OfTheBoard | OfTheHand | OfTheTemperature
 
 _KINDS: dict[str, type[Event]] = {
     "sweep_started": SweepStarted,
@@ -120,6 +121,8 @@ _KINDS: dict[str, type[Event]] = {
     "hand_move_refused": HandMoveRefused,
     "hand_rest_refused": HandRestRefused,
     "hand_begun_anew": HandBegunAnew,
+    "temperature_wanted": TemperatureWanted,
+    "set_measured": SetMeasured,
 }
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 

@@ -90,10 +90,14 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The arm stands still, in the controller's time."""
+    """The arm stands still, in the controller's time.
+
+    One `for_temperature` lasts until the sensors are as warm as is wanted next; its duration is a guess.
+    """
 
     name: str
     duration_s: float
+    for_temperature: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +165,11 @@ class Plan:
     @property
     def dwells(self) -> tuple[Dwell, ...]:
         return tuple(step for step in self.steps if isinstance(step, Dwell))
+
+    @property
+    def waits(self) -> tuple[Rest, ...]:
+        """The rests until a temperature is there."""
+        return tuple(step for step in self.steps if isinstance(step, Rest) and step.for_temperature)
 
     @property
     def motions(self) -> tuple[Sweep | Transfer, ...]:

@@ -81,6 +81,24 @@ def plan_six_observation(
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
+def sets_of_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> Iterator[list[Step]]:
+    """The steps of each repeat: its sweeps with the ways between them and the rests, from home and back there.
+
+    Raises Refused `axes_do_not_span`.
+    """
+    home = home_of(arm)
+    _check_span(flange_axes(home)[:, [WRIST_1, WRIST_2, WRIST_3]])
+    swept = _ordered_sweeps(arm, procedure)
+    in_each = len(swept) // procedure.repeats
+    for first in range(0, len(swept), in_each):
+        yield list(_connected(swept[first : first + in_each], home, home, arm, procedure))
+
+
+def approach_home(arm: ArmSection, procedure: SixSweepsSection, start: Joints) -> Iterable[Step]:
+    """The way home from where the arm stands, slowly."""
+    return _connected((), start, home_of(arm), arm, procedure)
+
+
 def _check_span(axes: Array) -> None:
     """Six parameters can be told only from turns about three independent axes (3, n)."""
     if axes.shape[1] < 3 or np.linalg.svd(axes, compute_uv=False)[2] < AXES_SPAN:

@@ -38,6 +38,17 @@ class Verbs(Protocol):
         """Stand still in an attitude and measure there, once the sensors have settled."""
         ...
 
+    def next_temperature(self, rest: Rest) -> bool:
+        """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
+
+        What comes after it, up to the next call, is one set.
+        """
+        ...
+
+    def end_of_range(self) -> None:
+        """Switch the heater off. Whatever part of the range no set has covered ends the run."""
+        ...
+
     def turn_by_hand(self) -> None:
         """Let the operator lay the item on its faces and turn it, until the list is done or U is small enough."""
         ...

@@ -176,6 +176,8 @@ def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Tab
 
 
 def _name(step: Transfer | Rest) -> str:
+    if isinstance(step, Rest) and step.for_temperature:
+        return "wait"
     return "trial" if isinstance(step, Transfer) and step.tries else type(step).__name__.lower()
 
 

@@ -50,6 +50,11 @@ def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None
         lines.append(f"Then {len(plan.sweeps)} sweeps turn {words.turned} by more than {_farthest(plan)} each.")
     if plan.dwells:
         lines.append(f"Then it stands still in {len(plan.dwells)} attitudes; settling may add {plan.settling_s:.0f} s.")
+    if plan.waits:
+        lines.append(
+            f"That is {len(plan.waits)} sets at most: before each it stands still until the temperature is right. That "
+            "may take much longer, and then it moves without another question."
+        )
     if repeated is not None:
         lines.append(
             "If the calibration passes, the board stores it in the place of what it had, and without another "

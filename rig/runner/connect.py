@@ -13,19 +13,21 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
-from rig.config.procedure_sections import SixObservationSection
+from rig.config.procedure_sections import SixObservationSection, ThermalSection
 from rig.data.provenance import Provenance, calls_itself_simulated, provenance_of
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunRecorder
 from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.data.settings import RunSettings
+from rig.data.thermal_events import SetMeasured
 from rig.errors import Refused
 from rig.motion.state import Made, Report
 from rig.motion.steps import Plan
 from rig.observation.hand_runs import told_of
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
+from rig.plans.temperature_course import Course
 from rig.runner.acquisition import Acquisition
 from rig.runner.ahead import Connecting
 from rig.runner.by_hand import HandSession
@@ -36,6 +38,7 @@ from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.sensors import BoardSource, board_source
+from rig.runner.warming import Warming
 from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
@@ -111,6 +114,7 @@ class Connector:
                 last=not any(each.indices - self.resumed.done for each in whole_plan.stages[self.settings.stage + 1 :]),
                 up=self.loaded.config.site.up,
                 early=self._ending_early(plan, len(whole_plan.sweeps)),
+                warming=self._warming(board, acquisition, recording, whole_plan),
             )
 
     def _ending_early(self, plan: Plan, sweeps: int) -> EndingEarly | None:
@@ -229,6 +233,31 @@ class Connector:
             sensor=described[name],
             told=told_of(self.settings, made_with, described[name]),
             earlier=self.resumed.earlier,
+        )
+
+    def _warming(
+        self, board: BoardSource | None, acquisition: Acquisition, recording: Recording, whole_plan: Plan
+    ) -> Warming | None:
+        """What watches the temperature; None where the procedure does not change it."""
+        section = self.loaded.config.procedure
+        if not isinstance(section, ThermalSection):
+            return None
+        events = [each.event for run in self.resumed.earlier for each in run.events]
+        measured = [each for each in events if isinstance(each, SetMeasured)]
+        return Warming(
+            section=section,
+            acquisition=acquisition,
+            note=recording.note,
+            names=tuple(self.loaded.config.to_calibrate),
+            heater=board.board if board is not None and section.heater_power > 0 else None,
+            set_s=(whole_plan.duration_s - sum(each.duration_s for each in whole_plan.waits)) / section.repeats,
+            course=Course(
+                section.from_c,
+                section.to_c,
+                section.gap_k,
+                section.both_ways,
+                sets=[each for each in measured if self.resumed.done.issuperset(range(each.first, each.end))],
+            ),
         )
 
     def _calibrating_along(

@@ -46,6 +46,7 @@ from rig.runner.mounting import (
     refuse_unsteady,
 )
 from rig.runner.onboard import BoardCalibration
+from rig.runner.warming import Warming, range_not_reached
 from rig.sensors.source import SampleSource
 from rig.station.confirm import NOT_AGREED
 from rig.station.events import (
@@ -121,8 +122,9 @@ class Rig:
 
     `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
     one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
-    `hand` where an operator's turns the item, and `up` is that direction in the frame of the arm's base. Where there is
-    an `early` end, the steps between it and the last way home are passed over.
+    `hand` where an operator's turns the item, `warming` where its temperature is to change, and `up` is that direction
+    in the frame of the arm's base. Where there is an `early` end, the steps between it and the last way home are passed
+    over.
     """
 
     devices: Devices
@@ -136,6 +138,8 @@ class Rig:
     last: bool = True
     up: Vector3 = (0.0, 0.0, 1.0)
     early: EndingEarly | None = None
+    warming: Warming | None = None
+    _made: set[int] = field(default_factory=set)  # sweeps and dwells since the latest wait for a temperature
     _resting_rad_s: dict[str, Array] = field(default_factory=dict)  # of each gyroscope, before anything moved
     _motions: Iterator[Motion] | None = None  # the plan's, those to come; None before pre-flight
     _number: int = 0  # of the step that goes on, or the last one
@@ -150,6 +154,8 @@ class Rig:
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
+        if self.warming is not None:
+            self.warming.prepare()
         self.recording.station.event(PreflightPassed(self.plan, report, kind.words.short))
         if self.hand is not None:
             self._motions = iter(())
@@ -267,6 +273,7 @@ class Rig:
             self.recording.note(SweepFinished(sweep))
         if self.early is not None:
             self.early.swept(sweep)
+        self._made.add(sweep.index)
 
     def _refuse_unplanned(self, motion: Motion) -> None:
         """Pre-flight has judged the plan's motions, one from the end of the other: nobody has looked at other ways."""
@@ -319,6 +326,7 @@ class Rig:
             with self.devices.acquisition.standing():
                 self.devices.turner.rest(dwell.duration_s, lambda: self._watch(dwell))
             self.recording.note(DwellFinished(dwell))
+        self._made.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
         """Stand still until something is so; False when it was not within so much of the controller's time."""
@@ -329,6 +337,52 @@ class Rig:
                 return False
             turner.rest(SETTLING_LOOK_S, watch)
         return True
+
+    def next_temperature(self, rest: Rest) -> bool:
+        """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
+
+        Raises Refused `other_turner` where the procedure has no temperatures, Fault `range_not_reached`.
+        """
+        warming = self._temperatures()
+        self._end_set()
+        missing = warming.wanted()
+        if missing is None:
+            return False
+        with self._step(rest):
+            warming.begin_waiting()
+            at_most_s = 60 * warming.section.patience_min
+            with self.devices.acquisition.standing():
+                due = self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest))
+            if not due:
+                raise range_not_reached(
+                    missing, f"in {warming.section.patience_min:g} minutes the sensors did not become as warm as wanted"
+                )
+        warming.begin_set()
+        return True
+
+    def end_of_range(self) -> None:
+        """Switch the heater off. Raises Fault `range_not_reached` where no set has covered a part of the range."""
+        warming = self._temperatures()
+        self._end_set()
+        warming.stop_heating()
+        missing = warming.wanted()
+        if missing is not None:
+            raise range_not_reached(missing, f"{warming.section.repeats} sets are made (procedure.repeats)")
+
+    def _temperatures(self) -> Warming:
+        if self.warming is None:
+            raise Refused(
+                "other_procedure",
+                "the script waits for temperatures, and the procedure has none",
+                "Use the section of the procedure thermal",
+            )
+        return self.warming
+
+    def _end_set(self) -> None:
+        """Count what was made since the latest wait."""
+        if self.warming is not None and self._made:
+            self.warming.end_set(min(self._made), max(self._made) + 1)
+        self._made.clear()
 
     def turn_by_hand(self) -> None:
         """Let the operator lay the item down and turn it. Raises Refused `other_turner` where an arm is configured."""
@@ -380,6 +434,8 @@ class Rig:
         for source in self.devices.sources:
             source.check(self.devices.turner.latest.time_s)
         self.recording.check()
+        if self.warming is not None:
+            self.warming.check(self.devices.turner.latest.time_s)
 
     def _watch(self, step: Step) -> None:
         """Look, many times a second while the arm is busy, after board and recording, tell the operator."""

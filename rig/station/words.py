@@ -6,6 +6,7 @@ from traceback import format_exception
 
 from firmware_host.installation import install_command
 from rig.data.run_folder import resuming
+from rig.data.thermal_events import SetMeasured, TemperatureWanted
 from rig.motion.doubts import doubts
 from rig.station.by_hand_words import by_hand_line
 from rig.station.events import (
@@ -68,8 +69,22 @@ def line(event: RunEvent) -> str | None:
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
             text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
         case _:
-            text = by_hand_line(event) or _of_the_outcome(event)
+            text = by_hand_line(event) or _of_the_temperature(event) or _of_the_outcome(event)
     return text
+
+
+def _of_the_temperature(event: RunEvent) -> str | None:
+    """An event of a calibration over temperature in words."""
+    match event:
+        case TemperatureWanted(warming, now_c, next_c, heated):
+            until = f"until it is at {next_c:.1f} °C; it is at {now_c:.1f} °C"
+            if heated:
+                return f"the heater {'warms the board' if warming else 'lets the board cool'} {until}"
+            return f"to do: {'warm' if warming else 'cool'} the board {until}"
+        case SetMeasured(temperatures_c=temperatures):
+            return "set made: " + ", ".join(f"{name} at {value:.1f} °C" for name, value in temperatures.items())
+        case _:
+            return None
 
 
 def _of_the_outcome(event: RunEvent) -> str | None:

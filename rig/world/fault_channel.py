@@ -19,6 +19,8 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     autopilot_power port on
     printer_fault sensor bit_error_rate lose stuck silent host_baud   of a device that prints lines, as above
     printer_power sensor on
+    air temperature_c                           the air around the board, from now on, of a laboratory with `thermal`
+    heater                                      which part of the time its pin is up, and how warm the board is
     mount stage                                 the item, as `world.mounts` says of that stage, from 0
     fit part                                    the board of another part of a series, by its serial number
     instruct say face turns again               what the operator reads, where a hand turns the sensors
@@ -35,6 +37,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from rig.world.autopilot.mounting import AutopilotMount
+from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
@@ -100,6 +103,8 @@ class ControlSession:
             "printer_power": self._printer_power,
             "mount": lambda stage: world.laboratory.mount(int(stage)),
             "fit": lambda part: world.fit_part(str(part)),
+            "air": self._air,
+            "heater": self._heater,
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,
@@ -254,6 +259,18 @@ class ControlSession:
 
     def _silence_arm(self, duration_s: float) -> None:
         self._world.silence_arm(float(duration_s))
+
+    # -- heat ----------------------------------------------------------------------------------------------------
+    def _body(self) -> HeatedBody:
+        if self._world.laboratory.body is None:
+            raise ValueError("nothing is heated here: the world has no section thermal")
+        return self._world.laboratory.body
+
+    def _air(self, temperature_c: float) -> None:
+        self._body().air_c = float(temperature_c)
+
+    def _heater(self) -> Reply:
+        return {"duty": self._world.laboratory.heater_duty, "body_c": self._body().temperature_c}
 
     # -- board -------------------------------------------------------------------------------------------------
     def _reset_board(self) -> None:

@@ -13,6 +13,7 @@ from rig.config.stage_section import mount_matrix
 from rig.config.world_models import SimulatedPartSection, WorldSection
 from rig.world.autopilot.mounting import autopilot_mounts
 from rig.world.board.flash_file import flash_of
+from rig.world.board.heat import HeatedBody
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
@@ -38,6 +39,7 @@ class Laboratory:
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         self._config, self._world = config, world
         self.turning = _turning(config, world)
+        self.body = None if world.thermal is None else HeatedBody(world.thermal)
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
@@ -111,7 +113,7 @@ class Laboratory:
             time_s = self._time_s
             self._elements = {}
             self._sensors = {
-                **mount_sensors(self._config, self._world, self._element_of, time_s),
+                **mount_sensors(self._config, self._world, self._element_of, time_s, self.body),
                 **mount_magnetometers(self._config, self._world, self._field_of),
             }
             for name, fault in self._faults.items():
@@ -177,6 +179,8 @@ class Laboratory:
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
             self.board.advance(self._time_s)
+        if self.body is not None:
+            self.body.advance(self._time_s, self.heater_duty, powered=self.board is not None)
         for mount in self.kvhs.values():
             if mount.kvh is not None:
                 mount.kvh.advance(self._time_s)
@@ -191,6 +195,11 @@ class Laboratory:
     def tick_s(self) -> float:
         """How long a tick lasts, which is 2 ms by an arm's controller."""
         return self.turning.tick_s
+
+    @property
+    def heater_duty(self) -> float:
+        """Which part of the time the pin of the board's heater is up, 0 to 1."""
+        return 0.0 if self.board is None else self.board.heater_duty
 
     def _element_of(self, name: str, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the board feels, which can be broken."""

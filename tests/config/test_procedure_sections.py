@@ -61,7 +61,8 @@ def test_a_name_not_known_is_one_error_beside_those_of_the_nearest_procedure() -
     assert found[0].startswith("limits.condition (--set): -1: ")
     assert found[1] == (
         "procedure.name (--set): 'six_obsrvation' is not allowed, did you mean six_observation?; "
-        "allowed: six_observation, verify, static_attitudes, imu, bias_drift, by_hand, servo_six_observation, nod"
+        "allowed: six_observation, verify, static_attitudes, imu, bias_drift, by_hand, servo_six_observation, "
+        "thermal, nod"
     )
     assert found[2].startswith("procedure.speed_deg (--set): unknown key, did you mean speed_deg_s?")
 
@@ -71,7 +72,8 @@ def test_a_name_that_is_none_is_refused(name: str) -> None:
     (found,) = problems_of(f"procedure.name={name}")
     assert (
         found.startswith("procedure.name (--set): ")
-        and "allowed: six_observation, verify, static_attitudes, imu, bias_drift, by_hand, servo_six_observation, nod"
+        and "allowed: six_observation, verify, static_attitudes, imu, bias_drift, by_hand, servo_six_observation, "
+        "thermal, nod"
         in found
     )
 

@@ -17,11 +17,16 @@ from cobs import cobs
 from firmware_host import protocol
 from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
-from firmware_host.frames import decode, encode
+from firmware_host.frames import FrameReader, decode, encode
 from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from firmware_host.serial_port import SerialPort
 from rig.config.link_budget import Stream
+from rig.config.procedure_sections import ThermalSection
+from rig.errors import Refused
+from rig.plans.temperature_course import Course
+from rig.runner.acquisition import Acquisition
+from rig.runner.warming import Warming
 from support.host_board import HostBoard, configured, convert, settle
 from support.waiting import wait_for
 from support.worlds import fresh_host
@@ -647,3 +652,39 @@ def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:
         with Board(f"socket://{HOST}:{server.getsockname()[1]}", protocol.BAUD_RATE, lambda batch: None) as client:
             assert client.identity.firmware == "1"
         answering.join()
+
+
+# The heater
+
+
+@ON_ONE_WIRE
+def test_the_heater_is_asked_and_told(wire: tuple[BoardOnAWire, str]) -> None:
+    with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
+        assert board.heat(0.5).cause == "no_thermometer", "nothing streams yet"
+        board.configure(0, 238, 245)
+        board.start()
+        wait_for(lambda: board.heat(0.5).cause == "on", "a heater that is on")
+        assert board.heat(0.5).power == pytest.approx(0.5, abs=0.01)
+        assert board.heat(0.5).temperature_c == pytest.approx(22.0)
+        board.keep_heating(0.25)
+        told = pytest.approx(0.25, abs=0.01)
+        wait_for(lambda: board.heating is not None and board.heating.power == told, "another power")
+        assert board.heat(0.0).cause == "not_wanted"
+
+
+@ON_ONE_WIRE
+def test_a_board_that_knows_no_heater_is_refused_by_name(wire: tuple[BoardOnAWire, str]) -> None:
+    def older(data: bytes) -> bytes:
+        frames = FrameReader().feed(data)
+        if not [frame for frame in frames if frame.name == "heating"]:
+            return data
+        (heating,) = [frame for frame in frames if frame.name == "heating"]
+        return encode("error", 0, {"reply_to": heating.values["reply_to"], "code": 1, "sensor": 0})
+
+    wire[0].on_send = older
+    section = ThermalSection(from_c=20, to_c=40, heater_power=1)
+    with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
+        warming = Warming(section, Acquisition(), print, ("gyro",), board, 40.0, Course(20, 40, 5, True))
+        with pytest.raises(Refused, match="of the board knows no heater") as refused:
+            warming.prepare()
+    assert refused.value.name == "no_heater"

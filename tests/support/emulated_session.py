@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.flash_memory import FlashMemory
-from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.gyroscope import GyroTruth, Temperature
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.magnetometer import MagnetometerTruth
 from firmware_host.emulator.spi_device import SpiDevice
@@ -71,12 +71,13 @@ class Session:
         seed: int = 1,
         tick_s: float = 0.002,
         boot_time_s: float = 0.137,
+        temperature_c: float | Temperature = 22.0,
     ) -> None:
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
         self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {
             part: (PARTS | BESIDE)[part](
-                self._counted(part, rate_at), truth, acceleration=ACCELERATION, temperature_c=22.0, seed=seed
+                self._counted(part, rate_at), truth, acceleration=ACCELERATION, temperature_c=temperature_c, seed=seed
             )
             for part in parts
         }

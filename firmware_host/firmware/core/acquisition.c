@@ -30,6 +30,8 @@ struct stream {
     bool overtaken;     /* the next edge came while a reading was under way */
     bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
+    uint64_t good_us; /* latest good reading, 0: none since the start */
+    int16_t temperature_counts; /* of it */
     struct sample *ring;
     uint32_t ring_size, written, read;
     const struct batch_layout *layout;
@@ -127,6 +129,7 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         stream->overtaken = false;
         stream->silence_reported = stream->bad_reads_reported = false;
         stream->last_us = stream->watched_us = clock_now();
+        stream->good_us = 0;
         if (is_named(configured, i))
             rearm(i);
     }
@@ -232,6 +235,10 @@ static void acquire(unsigned sensor)
     stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - began_us) <= driver->latched_within_us;
     if (driver->holds_line)
         lower_line(sensor);
+    if (result == READ_FRESH) {
+        stream->good_us = time_us;
+        stream->temperature_counts = reading.temperature_counts;
+    }
     if (!again && result != READ_TORN)
         watch_reads(sensor, result);
     if (stream->settling != 0) {
@@ -318,4 +325,12 @@ void acquisition_report(unsigned sensor, struct report_item *item)
 uint32_t acquisition_bus_errors(void)
 {
     return bus_errors;
+}
+
+bool acquisition_temperature(unsigned sensor, int16_t *counts, uint64_t *read_us)
+{
+    const struct stream *stream = &streams[sensor];
+    *counts = stream->temperature_counts;
+    *read_us = stream->good_us;
+    return running && stream->good_us != 0;
 }

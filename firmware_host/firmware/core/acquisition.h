@@ -31,4 +31,8 @@ void acquisition_run(void);
 void acquisition_report(unsigned sensor, struct report_item *item);
 uint32_t acquisition_bus_errors(void);
 
+/* What a sensor's thermometer told with its newest good reading, and when; false when that was before the latest start, or
+   nothing streams. */
+bool acquisition_temperature(unsigned sensor, int16_t *counts, uint64_t *read_us);
+
 #endif

@@ -7,6 +7,7 @@
 #include "calibrating.h"
 #include "clock.h"
 #include "hand.h"
+#include "heater.h"
 #include "link.h"
 #include "port.h"
 #include "reply.h"
@@ -31,6 +32,7 @@ void board_reset(void)
     sensors_reset();
     setups_reset();
     alone_reset();
+    heater_reset();
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
@@ -169,6 +171,7 @@ static const struct {
     {MESSAGE_STOP, 0, on_stop},
     {MESSAGE_STATUS, 0, on_status},
     {MESSAGE_REBOOT, 0, on_reboot},
+    {MESSAGE_HEAT, sizeof(struct heat_payload), heater_on_heat},
     {MESSAGE_KEEP, sizeof(struct keep_payload), calibrating_on_keep},
     {MESSAGE_OBSERVE, sizeof(struct observe_payload), calibrating_on_observe},
     {MESSAGE_RECALL, sizeof(struct recall_payload), calibrating_on_recall},
@@ -212,6 +215,7 @@ void board_run(void)
         answer(&request);
     acquisition_run();
     alone_run();
+    heater_run();
     if (stop_to_acknowledge != 0 && acquisition_is_empty() && link_has_room()) {
         reply_done(stop_to_acknowledge);
         stop_to_acknowledge = 0;

@@ -32,6 +32,9 @@ void port_transmit(const uint8_t *bytes, size_t size);
 /* Starts the board afresh once the last byte has left. */
 void port_restart(void);
 
+/* Drives the heater's pin so many 255ths of the time; 0 is what it does after every reset of the chip. */
+void port_heat(uint8_t power);
+
 /* Pages of flash for what must survive a power loss. What an erase leaves reads as 0xFF. A doubleword can be programmed once
    after an erase. Each returns false when the flash refuses; a read also when a doubleword is torn, cut off in its writing. */
 #define FLASH_PAGES 16u /* two for each of the most sensors that messages can name */

@@ -10,6 +10,8 @@
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
 #define BAUD_RATE 921600u
+#define HEATER_WORD_US 2000000u /* without a word for so long the heater goes off */
+#define HEATER_LIMIT_C 70.0f /* and when a part is that hot */
 #define BATCH_AGE_US 80000u /* a sample waits no longer than this for company */
 #define CALIBRATED_PER_RAD_S 1000000.0f /* counts of calibrated readings */
 #define MAX_SCALE 4.0f /* no sensor's scale factor is that far off, either way */
@@ -40,6 +42,8 @@ enum message_type {
     MESSAGE_RECALL = 23,
     MESSAGE_IMU_SAMPLES = 24,
     MESSAGE_FIELD_SAMPLES = 25,
+    MESSAGE_HEAT = 26,
+    MESSAGE_HEATING = 27,
     MESSAGE_BY_HAND = 48,
     MESSAGE_HAND_STATUS = 49,
     MESSAGE_HAND_REPORT = 50,
@@ -123,6 +127,14 @@ enum hand_outcome {
     MOVE_LOST = 3,
     MOVE_NO_FACE = 4,
     MOVE_CONTRADICTS = 5,
+};
+
+enum heater_cause {
+    HEATER_ON = 0,
+    HEATER_NOT_WANTED = 1,
+    HEATER_NO_WORD = 2,
+    HEATER_TOO_HOT = 3,
+    HEATER_NO_THERMOMETER = 4,
 };
 
 /* hello, from the host: who is there? answered by identity */
@@ -385,6 +397,21 @@ struct field_samples_item {
     int16_t field[3]; /* magnetic flux density: x, y, z as the part reports them, right-handed */
 } __attribute__((packed));
 _Static_assert(sizeof(struct field_samples_item) == 10, "field_samples_item");
+
+/* heat, from the host: switch the heater on, or off; to be said again within two seconds, or it goes off; answered by heating */
+struct heat_payload {
+    uint8_t power; /* of 255: which part of the time the heater's pin is up; 0 = off */
+} __attribute__((packed));
+_Static_assert(sizeof(struct heat_payload) == 1, "heat_payload");
+
+/* heating, from the board: what the heater does now */
+struct heating_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t power; /* of 255, 0 = off */
+    uint8_t cause; /* enum heater_cause: why it is off; too_hot holds until the host says off itself */
+    float temperature_c; /* of the hottest part when the board last looked, degrees Celsius */
+} __attribute__((packed));
+_Static_assert(sizeof(struct heating_payload) == 7, "heating_payload");
 
 /* by_hand, from the host: begin to calibrate a sensor by hand, which is set up with accelerations; answered by ack */
 struct by_hand_payload {

@@ -55,6 +55,7 @@ PLAYS = {
     + frame("status")
     + frame("stop"),
     "accelerations": setup(8.0) + frame("start", 0) + convert(RATES, 120, 4000) + frame("status") + frame("stop"),
+    "heated": SETUP + frame("start", 0) + convert(RATES, 60, 4000) + frame("heat", 200) + bytes((WAIT, 255, 4)),
     "kept": SETUP
     + frame("keep", RATES, 0.5)
     + frame("start", 0)

@@ -16,6 +16,7 @@ static restart_function on_restart;
 static line_function on_line;
 static uint32_t time_us;
 static bool button_is_down, lamp_is_lit, clock_is_locked;
+static uint8_t heating;
 static const uint8_t unique_id[12] = {0x01, 0x23, 0x45, 0x67, 0x89, 0xAB, 0xCD, 0xEF, 0x01, 0x23, 0x45, 0x67};
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart);
@@ -24,6 +25,7 @@ void host_set_time_us(uint32_t now_us);
 void host_press(bool down);
 bool host_lamp(void);
 void host_lock_clock(bool locked);
+uint8_t host_heating(void);
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart)
 {
@@ -77,6 +79,17 @@ uint32_t port_time_us(void)
 void port_wait_us(uint32_t duration_us)
 {
     time_us += duration_us;
+}
+
+void port_heat(uint8_t power)
+{
+    heating = power;
+}
+
+/* What the heater's pin does, of 255. */
+uint8_t host_heating(void)
+{
+    return heating;
 }
 
 void port_listen(uint8_t mask)

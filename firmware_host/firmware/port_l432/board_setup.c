@@ -1,4 +1,5 @@
-/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; the sensors' own pins are wiring.c's. */
+/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; heater on PA6; the sensors' own
+   pins are wiring.c's. */
 #include "board_setup.h"
 
 #include "pins.h"
@@ -29,7 +30,7 @@ static void setup_power_to_peripherals(void)
     RCC_AHB1ENR |= RCC_AHB1ENR_DMA1EN;
     RCC_AHB2ENR |= RCC_AHB2ENR_GPIOAEN | RCC_AHB2ENR_GPIOBEN;
     RCC_APB1ENR1 |= RCC_APB1ENR1_TIM2EN | RCC_APB1ENR1_USART2EN | RCC_APB1ENR1_PWREN;
-    RCC_APB2ENR |= RCC_APB2ENR_SYSCFGEN | RCC_APB2ENR_SPI1EN;
+    RCC_APB2ENR |= RCC_APB2ENR_SYSCFGEN | RCC_APB2ENR_SPI1EN | RCC_APB2ENR_TIM16EN;
     (void)RCC_APB2ENR; /* the reading back lets the clocks start before the first access */
 }
 
@@ -77,6 +78,22 @@ static void setup_microseconds(void)
     TIM2_ARR = 0xFFFFFFFFu; /* the maker's own file says it comes up 0, which would hold the counter */
     TIM2_EGR = TIM2_EGR_UG; /* loads the prescaler */
     TIM2_CR1 = TIM2_CR1_CEN;
+}
+
+#define HEATER_PERIODS 255u /* of one cycle, as many as powers: the highest never lets the pin down */
+
+/* After a reset the pin is an input, which the heater's own resistor holds down; from here on the timer does, at power 0. */
+static void setup_heater(void)
+{
+    TIM16_PSC = CLOCK_HZ / (1000u * HEATER_PERIODS) - 1u;
+    TIM16_ARR = HEATER_PERIODS - 1u;
+    TIM16_CCMR1_Output = TIM16_CCMR1_Output_OC1M(6u) | TIM16_CCMR1_Output_OC1PE;
+    TIM16_EGR = TIM16_EGR_UG; /* loads the prescaler and the power, which is 0 */
+    TIM16_CCER = TIM16_CCER_CC1E;
+    TIM16_BDTR = TIM16_BDTR_MOE;
+    TIM16_CR1 = TIM16_CR1_CEN;
+    GPIOA_AFRL |= GPIOA_AFRL_AFRL6(14u);
+    GPIOA_MODER = (GPIOA_MODER & ~PIN_MASK(6u)) | PER_PIN(6u, PIN_ALTERNATE);
 }
 
 /* Mode 3, which all the sensors take; eight bits, which the FIFO takes two at a time. The slowest clock until bus_xfer. */
@@ -127,6 +144,7 @@ void setup_hardware(void)
     start_crystal();
     setup_pins();
     setup_microseconds();
+    setup_heater();
     setup_spi();
     setup_serial();
     setup_interrupts();

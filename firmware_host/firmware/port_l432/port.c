@@ -34,6 +34,12 @@ void port_wait_us(uint32_t duration_us)
         ;
 }
 
+/* PWM at 1 kHz, by the hardware: a program that hangs leaves it as it is until the watchdog bites, within a second. */
+void port_heat(uint8_t power)
+{
+    TIM16_CCR1 = power;
+}
+
 /* An edge pends its line also while that is masked. */
 void port_listen(uint8_t mask)
 {

@@ -14,6 +14,7 @@ from firmware_host.parts import GYROSCOPES, MAGNETOMETERS
 from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import WorldSection
+from rig.world.board.heat import HeatedBody
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensing_element import MotionAt
 from rig.world.board.sensor_truth import SensorTruth
@@ -26,16 +27,20 @@ def firmware(suffix: str) -> bytes:
 
 
 def mount_sensors(
-    config: RigConfig, world: WorldSection, motion_of: Callable[[str, SensorTruth], MotionAt], time_s: float
+    config: RigConfig,
+    world: WorldSection,
+    motion_of: Callable[[str, SensorTruth], MotionAt],
+    time_s: float,
+    body: HeatedBody | None = None,
 ) -> dict[str, SpiDevice]:
     """The board's sensors of the `world:` section, by name, given power at the virtual time `time_s`.
 
-    `motion_of`: what each of them feels at any time, 3 components or 6.
+    `motion_of`: what each of them feels at any time, 3 components or 6. On a `body` they are as warm as that is.
     """
     return {
         name: _sensor(
             config.sensors[name],
-            SensorTruth(config.sensors[name], simulated, time_s),
+            SensorTruth(config.sensors[name], simulated, time_s, None if body is None else body.part(name)),
             partial(motion_of, name),
             np.random.SeedSequence([world.seed, index]),
             time_s + world.board.boot_time_s,

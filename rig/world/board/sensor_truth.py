@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -12,23 +13,36 @@ from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelero
 from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
 from rig.config.sensor_sections import MountingSection, SensorSection, mounting_matrix
 from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
+from rig.world.board.heat import HeatedPart
 from rig.world.ur10e.flange_motion import Components, Felt, moved
 from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:
-    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read; `temperature_c`: the
-    die's, of a part that gets power at the time `powered_s`; `data_rate_ppm`: how much too fast its own oscillator is.
+    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read.
+
+    `temperature_c`: the die's, of a part that gets power at the time `powered_s`, or as warm as the heated `part` is;
+    `data_rate_ppm`: how much too fast its own oscillator is.
     """
 
-    def __init__(self, sensor: SensorSection, simulated: SimulatedSensorSection, powered_s: float = 0.0) -> None:
-        self.gyro = _gyro(simulated)
+    def __init__(
+        self,
+        sensor: SensorSection,
+        simulated: SimulatedSensorSection,
+        powered_s: float = 0.0,
+        part: HeatedPart | None = None,
+    ) -> None:
+        self.gyro = replace(_gyro(simulated), die=part)
         self.accelerometer = (
-            None if sensor.acceleration is None else _accelerometer(simulated.accelerometer, simulated.temperature_c)
+            None
+            if sensor.acceleration is None
+            else replace(_accelerometer(simulated.accelerometer, simulated.temperature_c), die=part)
         )
         self.data_rate_ppm = simulated.data_rate_ppm
         self.temperature_c: float | Temperature = simulated.temperature_c
-        if simulated.start_temperature_c is not None:
+        if part is not None:
+            self.temperature_c = part.thermometer_c
+        elif simulated.start_temperature_c is not None:
             self.temperature_c = Warming(
                 simulated.start_temperature_c, simulated.temperature_c, simulated.warm_up_s, powered_s
             )
@@ -101,6 +115,9 @@ def _gyro(simulated: SimulatedSensorSection) -> GyroTruth:
         instability_rad_s=simulated.bias_instability_rad_s,
         instability_time_s=simulated.bias_instability_time_s,
         random_walk_rad_s_per_sqrt_s=simulated.bias_random_walk_rad_s_per_sqrt_s,
+        scale_per_k2=simulated.scale_per_k2,
+        bias_rad_s_per_k2=simulated.bias_rad_s_per_k2,
+        hysteresis_rad_s=simulated.bias_hysteresis_rad_s,
     )
 
 
@@ -118,4 +135,7 @@ def _accelerometer(simulated: SimulatedAccelerometerSection, holds_at_c: float) 
         bandwidth_hz=simulated.bandwidth_hz,
         delay_s=1e-3 * simulated.delay_ms,
         instability_m_s2=simulated.bias_instability_m_s2,
+        scale_per_k2=simulated.scale_per_k2,
+        bias_m_s2_per_k2=[-bias for bias in simulated.bias_m_s2_per_k2],
+        hysteresis_m_s2=[-bias for bias in simulated.bias_hysteresis_m_s2],
     )

@@ -28,7 +28,7 @@ def described(peripheral: Peripheral) -> dict[int, tuple[str, int]]:
     element = PERIPHERALS[element.get("derivedFrom", element.findtext("name"))]
     return {
         number(r, "addressOffset"): (r.findtext("name", ""), int(r.findtext("resetValue", "0"), 0))
-        for r in element.iter("register")
+        for r in reversed(list(element.iter("register")))  # of one place with two names the first counts
     }
 
 

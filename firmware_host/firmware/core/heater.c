@@ -1,0 +1,90 @@
+#include "heater.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "acquisition.h"
+#include "clock.h"
+#include "link.h"
+#include "port.h"
+#include "sensors.h"
+#include "setups.h"
+
+#define THERMOMETER_SILENT_US 1000000u /* many readings, at any rate a part has */
+
+static uint8_t power;
+static uint8_t cause; /* enum heater_cause: why it is off */
+static uint64_t word_us; /* the host's latest */
+static float hottest_c;
+
+static void switch_off(enum heater_cause why)
+{
+    power = 0;
+    cause = (uint8_t)why;
+    port_heat(0);
+}
+
+void heater_reset(void)
+{
+    word_us = 0;
+    hottest_c = 0.0f;
+    switch_off(HEATER_NOT_WANTED);
+}
+
+/* Looks at every thermometer there is. False where there is none, or one that has told nothing of late: what heats blindly
+   must not heat. */
+static bool feel(uint64_t now_us)
+{
+    bool felt = false;
+    for (unsigned i = 0; i < SENSOR_COUNT; i++) {
+        const struct setup_payload *setup = setups_of(i);
+        int16_t counts;
+        uint64_t read_us;
+        if (setup->rate_hz == 0.0 || setup->temperature_scale_c == 0.0)
+            continue;
+        if (!acquisition_temperature(i, &counts, &read_us) || now_us > read_us + THERMOMETER_SILENT_US)
+            return false;
+        float temperature_c = (float)setup->temperature_scale_c * counts + (float)setup->temperature_offset_c;
+        if (!felt || temperature_c > hottest_c)
+            hottest_c = temperature_c;
+        felt = true;
+    }
+    return felt;
+}
+
+/* What is too hot stays off until the host has said so itself: it would else be switched on again by the next word. */
+static void guard(void)
+{
+    uint64_t now_us = clock_now();
+    if (!feel(now_us))
+        switch_off(HEATER_NO_THERMOMETER);
+    else if (hottest_c >= HEATER_LIMIT_C)
+        switch_off(HEATER_TOO_HOT);
+    else if (now_us - word_us >= HEATER_WORD_US)
+        switch_off(HEATER_NO_WORD);
+}
+
+void heater_run(void)
+{
+    if (power != 0)
+        guard();
+}
+
+void heater_on_heat(const struct frame *request)
+{
+    struct heat_payload wanted;
+    memcpy(&wanted, request->payload, sizeof wanted);
+    word_us = clock_now();
+    if (wanted.power == 0) {
+        switch_off(HEATER_NOT_WANTED);
+    } else if (cause != HEATER_TOO_HOT) {
+        power = wanted.power;
+        cause = HEATER_ON;
+        guard();
+    }
+    if (power != 0)
+        port_heat(power);
+    struct heating_payload heating = {
+        .reply_to = request->sequence, .power = power, .cause = cause, .temperature_c = hottest_c};
+    link_send(MESSAGE_HEATING, &heating, sizeof heating);
+}

@@ -1,0 +1,192 @@
+"""Watches how warm the sensors are by their own thermometers, and has the board's heater follow a ramp.
+
+Looked at many times a second, whatever the arm does: what is too hot or changes too fast ends the run, which stops the
+arm first. The board's heater hears from here again and again; when nobody speaks to it any more, it goes off.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from firmware_host.client import Board
+from firmware_host.protocol import HEATER_LIMIT_C
+from rig.board.identify import refusing
+from rig.config.procedure_sections import ThermalSection
+from rig.data.events import Event
+from rig.data.quantity import TEMPERATURE
+from rig.data.thermal_events import SetMeasured, TemperatureWanted
+from rig.errors import Fault, ProblemError, Refused
+from rig.plans.temperature_course import Course, Ramp
+from rig.runner.acquisition import Acquisition
+
+LOOK_S = 0.25  # between two looks, and two words to the heater
+RATE_SPAN_S = 30.0  # over which the rate of change is judged: a thermometer's counts are coarse
+RATE_LEAST_S = 0.8 * RATE_SPAN_S
+RAMP_SHARE = 0.6  # of the rate that is allowed: the parts do not follow evenly
+SET_SHARE = 0.6  # of a gap, that a set may take
+BEYOND_K = 1.0  # the ends of the range, so that a set's mean comes there
+KEEPS_AWAY_K = 2.0  # from the heater's own limit
+
+
+@dataclass(slots=True)
+class Warming:
+    """What a calibration over temperature watches and does beside its motions.
+
+    `names` are the sensors whose thermometers count. `heater` is the board that has it; None where the operator changes
+    the temperature. `set_s` is how long a set takes, as planned or longer.
+    """
+
+    section: ThermalSection
+    acquisition: Acquisition
+    note: Callable[[Event], None]
+    names: tuple[str, ...]
+    heater: Board | None
+    set_s: float
+    course: Course
+    _seen: dict[str, deque[tuple[float, float]]] = field(default_factory=dict)
+    _of_set: list[dict[str, float]] | None = None  # temperatures, since a set began
+    _began_s: float = 0.0  # the set
+    _ramp: Ramp | None = None
+    _looked_s: float = -np.inf
+
+    def prepare(self) -> None:
+        """Refuse a board without a heater, before anything has moved. Raises Refused `no_heater`."""
+        if self.heater is None:
+            return
+        try:
+            self.heater.heat(0.0)
+        except ProblemError as error:
+            if error.name != "unknown_message":
+                with refusing():
+                    raise
+            raise Refused(
+                "no_heater",
+                f"procedure.heater_power is {self.section.heater_power:g}, and the firmware "
+                f"{self.heater.identity.firmware} of the board knows no heater",
+                "Flash the image that comes with this program: `rig board flash`; or set procedure.heater_power to 0",
+            ) from error
+        self._ramp = Ramp(self._rate_k_s, self.section.heater_power)
+
+    @property
+    def _rate_k_s(self) -> float:
+        """How fast a ramp may be: within the limit, and so that a set is made within a part of a gap."""
+        allowed_k_s = RAMP_SHARE * self.section.most_rate_k_per_min / 60
+        return min(allowed_k_s, SET_SHARE * self.section.gap_k / max(self.set_s, 1.0))
+
+    def check(self, time_s: float) -> None:
+        """Look at the thermometers at that time of the controller's, and speak to the heater.
+
+        Raises Fault `overheated`, `too_fast`.
+        """
+        if time_s - self._looked_s < LOOK_S:
+            return
+        self._looked_s = time_s
+        now_c = self.now_c()
+        if not now_c:
+            return
+        if self._of_set is not None:
+            self._of_set.append(now_c)
+        self._refuse_hot(now_c)
+        for name, temperature_c in now_c.items():
+            self._refuse_fast(name, time_s, temperature_c)
+        self._heat(time_s, now_c)
+
+    def now_c(self) -> dict[str, float]:
+        """What the thermometers of the sensors read now, by name; empty before all have sent something."""
+        latest = {each.sensor: each.latest.get(TEMPERATURE.name) for each in self.acquisition.samples()}
+        found = {name: value[0] for name in self.names if (value := latest.get(name)) is not None}
+        return found if len(found) == len(self.names) else {}
+
+    def wanted(self) -> str | None:
+        """What is still missing of the range; None where it is covered."""
+        return self.course.missing()
+
+    def begin_waiting(self) -> None:
+        """Say what is waited for: the operator sees to it, or the heater does."""
+        now_c = self.now_c()
+        nearest = self._nearest(now_c)
+        if self.course.warming is None:
+            self.course.begin(nearest)
+            nearest = self._nearest(now_c)
+        if not self.course.is_due(now_c):
+            heated = self.heater is not None
+            self.note(TemperatureWanted(bool(self.course.warming), nearest, self.course.next_c(nearest), heated))
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the next set may begin."""
+        return self.course.is_due(self.now_c())
+
+    def begin_set(self) -> None:
+        """What is read from now on is the temperature of the set that follows."""
+        self._of_set, self._began_s = [], self._looked_s
+
+    def end_set(self, first: int, end: int) -> None:
+        """The sweeps and dwells from `first` up to `end` are made."""
+        if self._of_set:
+            means = {name: float(np.mean([each[name] for each in self._of_set])) for name in self.names}
+            measured = SetMeasured(first, end, bool(self.course.warming), means)
+            self.note(measured)
+            self.course.measured(measured)
+            self.set_s = max(self.set_s, self._looked_s - self._began_s)
+        self._of_set = None
+        if self._ramp is not None:
+            self._ramp.rate_k_s = self._rate_k_s
+
+    def stop_heating(self) -> None:
+        """The heater off, and nothing more said to it."""
+        self._ramp = None
+        if self.heater is not None:
+            self.heater.keep_heating(0.0)
+
+    def _nearest(self, now_c: Mapping[str, float]) -> float:
+        """The temperature of the sensor that is last on the way."""
+        return max(now_c.values()) if self.course.warming is False else min(now_c.values())
+
+    def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
+        hottest = max(now_c, key=lambda name: now_c[name])
+        too_hot = self.heater is not None and self.heater.heating is not None and self.heater.heating.cause == "too_hot"
+        if now_c[hottest] > self.section.hottest_c or too_hot:
+            limit_c = HEATER_LIMIT_C if too_hot else self.section.hottest_c
+            raise Fault(
+                "overheated",
+                f"{hottest} is at {now_c[hottest]:.1f} °C, and the limit is {limit_c:g} °C",
+                "Let it cool; heat with less power (procedure.heater_power) or from farther away, then resume",
+            )
+
+    def _refuse_fast(self, name: str, time_s: float, temperature_c: float) -> None:
+        seen = self._seen.setdefault(name, deque())
+        seen.append((time_s, temperature_c))
+        while seen[-1][0] - seen[0][0] > RATE_SPAN_S:
+            seen.popleft()
+        if seen[-1][0] - seen[0][0] < RATE_LEAST_S:
+            return
+        times_s, temperatures_c = np.array(seen).T
+        k_per_min = 60 * float(np.polynomial.polynomial.polyfit(times_s - times_s[0], temperatures_c, 1)[1])
+        if abs(k_per_min) > self.section.most_rate_k_per_min:
+            raise Fault(
+                "too_fast",
+                f"the temperature of {name} changes by {k_per_min:+.1f} K/min, and at most "
+                f"{self.section.most_rate_k_per_min:g} K/min are allowed: what its thermometer says is then another "
+                "temperature than that of what moves in it",
+                "Heat or cool more slowly, or allow more (procedure.most_rate_k_per_min), then resume",
+            )
+
+    def _heat(self, time_s: float, now_c: Mapping[str, float]) -> None:
+        """One word to the heater."""
+        if self._ramp is None or self.heater is None or self.course.warming is None:
+            return
+        ends_c = self.section.from_c - BEYOND_K, self.section.to_c + BEYOND_K
+        goal_c = min(ends_c[self.course.warming], HEATER_LIMIT_C - KEEPS_AWAY_K)
+        self.heater.keep_heating(self._ramp.power(time_s, max(now_c.values()), goal_c))
+
+
+def range_not_reached(missing: str, why: str) -> Fault:
+    """The range is not covered, and the run goes no further."""
+    return Fault(
+        "range_not_reached",
+        f"{missing}; {why}",
+        "Warm or cool the sensors further, then resume; or name the range that they reach, and start a new run",
+    )

@@ -1,0 +1,170 @@
+"""Calibrations over temperature, whole: a heater or an operator warms, and what is not as it should be ends by name."""
+
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.data.run_file import RunData, read_run
+from rig.data.thermal_events import SetMeasured, TemperatureWanted
+from rig.observation.windows import finished_sweeps
+from support.commands import configuration, rig, wait_for_log
+from support.worlds import World, hardware, merge, world
+
+__all__ = ["world"]
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+PROCEDURE: dict[str, Any] = {
+    "name": "thermal",
+    "from_c": 25,
+    "to_c": 35,
+    "gap_k": 5,
+    "most_rate_k_per_min": 30,
+    "reference_c": 30,
+    "both_ways": False,
+    "heater_power": 1,
+    "speed_deg_s": 150,
+    "acceleration_deg_s2": 400,
+    "rest_s": 0.5,
+}
+BODY: dict[str, Any] = {"start_c": 23, "capacity_j_k": 3, "loss_w_k": 0.1, "own_w": 0.1, "heater_w": 5}
+LABORATORY: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "sensors": {"gyro": {"rate_hz": 59.5}},
+    "limits": {"bias_rad_s": 1, "bias_std_rad_s": 1, "scale_std": 1},
+    "world": {
+        "time_scale": 8,
+        "thermal": BODY,
+        "sensors": {"gyro": {"noise_rad_s": 0.004, "temperature_c": 30, "bias_rad_s_per_k": [5e-4, -4e-4, 3e-4]}},
+    },
+}
+
+
+def of_events(run: RunData, kind: type) -> list[Any]:
+    return [recorded.event for recorded in run.events if isinstance(recorded.event, kind)]
+
+
+def thermal(folder: Path, procedure: dict[str, Any], body: dict[str, Any]) -> tuple[int, str, Path]:
+    """A run of such a procedure with such a body: its exit status, what it said, its folder."""
+    laboratory = merge(LABORATORY, {"world": {"thermal": body}})
+    config, out = configuration(folder, laboratory, {**PROCEDURE, **procedure}), folder / "run"
+    ended = rig("run", config, "--out", out, "--yes", timeout_s=500)
+    return ended.returncode, ended.stdout + ended.stderr, out
+
+
+def test_a_heater_takes_the_sensors_through_the_range(tmp_path: Path) -> None:
+    status, said, out = thermal(tmp_path, {}, {})
+    assert status in (0, 1), said
+    run = read_run(out / "run.h5")
+    sets = of_events(run, SetMeasured)
+    temperatures = sorted(each.temperatures_c["gyro"] for each in sets)
+    assert temperatures[0] <= 26.25 and temperatures[-1] >= 33.75
+    assert max(b - a for a, b in pairwise(temperatures)) <= 5
+    assert finished_sweeps(run) == set(range(6 * len(sets)))
+    assert [(each.first, each.end) for each in sets] == [(6 * k, 6 * k + 6) for k in range(len(sets))]
+    assert all(each.heated for each in of_events(run, TemperatureWanted))
+    assert run.settings.reference_c == 30
+
+
+@pytest.mark.parametrize(
+    ("procedure", "body", "name"),
+    [
+        ({"heater_power": 0, "most_rate_k_per_min": 1}, {"air_c": [[0, 80]], "capacity_j_k": 60}, "too_fast"),
+        ({"heater_power": 0, "hottest_c": 35.5, "most_rate_k_per_min": 100}, {"air_c": [[0, 80]]}, "overheated"),
+        ({"heater_power": 0, "patience_min": 0.2}, {}, "range_not_reached"),
+        ({"repeats": 2}, {}, "range_not_reached"),
+    ],
+    ids=["too fast", "overheated", "nobody warms", "too few sets"],
+)
+def test_what_is_not_as_it_should_be_ends_by_name(
+    tmp_path: Path, procedure: dict[str, Any], body: dict[str, Any], name: str
+) -> None:
+    status, said, out = thermal(tmp_path, procedure, body)
+    assert status == 3 and f"rig: {name}:" in said, said
+    run = read_run(out / "run.h5")
+    assert len(run.samples["gyro"]) > 0
+    assert max(abs(rate) for rate in run.states["qd_rad_s"][-1]) < 1e-6, "the arm has stopped"
+
+
+def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> None:
+    procedure = {"order": None, "directions": None, **PROCEDURE, "heater_power": 0}
+    slow = {"world": {"thermal": {"capacity_j_k": 15}}}  # a set takes a part of a gap
+    laboratory = world(merge(merge(LABORATORY, slow), {"procedure": procedure}))
+    config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+        wait_for_log(out, "to do: warm the board until it is at", timeout_s=300)
+        laboratory.control({"do": "air", "temperature_c": 37})
+        said = run.communicate(timeout=400)[1]
+    assert run.returncode in (0, 1), said
+    assert not any(each.heated for each in of_events(read_run(out / "run.h5"), TemperatureWanted))
+
+
+def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
+    config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+        wait_for_log(out, "set made", timeout_s=300)
+        wait_for_log(out, "done: sweep", timeout_s=300, times=8)
+        run.send_signal(signal.SIGINT)
+    first = of_events(read_run(out / "run.h5"), SetMeasured)
+    ended = rig("resume", out, "--yes", timeout_s=500)
+    assert ended.returncode in (0, 1), ended.stdout + ended.stderr
+    again = read_run(out / "run-2.h5")
+    assert 0 not in finished_sweeps(again), "a whole set is not made again"
+    assert 6 * len(first) in finished_sweeps(again), "one that was interrupted is, from its beginning"
+
+
+def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tmp_path: Path, world: World) -> None:
+    laboratory = world(merge(LABORATORY, {"procedure": {"order": None, "directions": None, **PROCEDURE}}))
+    config = hardware(laboratory.config_path, tmp_path)
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run"), "--yes"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+        deadline_s = time.monotonic() + 300
+        while laboratory.control({"do": "heater"})["duty"] == 0:
+            assert run.poll() is None and time.monotonic() < deadline_s, run.communicate()[1]
+            time.sleep(0.02)
+        laboratory.control({"do": "hold"})
+        run.kill()
+        laboratory.control({"do": "advance", "duration_s": 2.5})
+    assert laboratory.control({"do": "heater"})["duty"] == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"to_c": 30}, "two gaps apart"),
+        ({"reference_c": 40}, "reference_c must lie between"),
+        ({"hottest_c": 34}, "hottest_c must lie above"),
+        ({"to_c": 68}, "too hot for the heater"),
+        ({"arc_deg": 180}, "leave it at 360"),
+        ({"with_attitudes": True}, "attitudes calibrate accelerometers"),
+    ],
+)
+def test_a_range_that_cannot_be_is_refused(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    config = configuration(tmp_path, LABORATORY, {**PROCEDURE, **changes})
+    ended = rig("plan", config)
+    assert ended.returncode == 2 and words in ended.stderr, ended.stderr
+
+
+def test_the_plan_waits_before_each_set_and_has_attitudes_where_they_are_wanted(tmp_path: Path) -> None:
+    with_force = merge(LABORATORY, {"sensors": {"gyro": {"acceleration": {"range_g": 2}}}})
+    limits = {
+        "acceleration_scale_deviation": 1,
+        "acceleration_scale_std": 1,
+        "acceleration_bias_m_s2": 9,
+        "acceleration_bias_std_m_s2": 1,
+        "acceleration_verification_m_s2": 1,
+    }
+    procedure = {**PROCEDURE, "with_attitudes": True, "attitudes": "faces", "repeats": 3}
+    config = configuration(tmp_path, merge(with_force, {"limits": limits}), procedure)
+    ended = rig("plan", config)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.count(" wait ") == 3
+    assert ended.stdout.count("dwell at") == 3 * 12
