@@ -19,9 +19,20 @@ def add(board: ArgumentParser) -> None:
     info = added(commands, "info", "what the board is, how it fares, which sensors and calibrations it has")
     add_config(info)
     add_json(info)
-    from rig.commands.hand_on_board import add_arguments
-
-    add_arguments(added(commands, "hand", "let the board itself calibrate a gyroscope that is turned by hand"))
+    hand = added(commands, "hand", "let the board itself calibrate a gyroscope that is turned by hand")
+    add_config(hand)
+    add_json(hand)
+    hand.add_argument("--sensor", metavar="NAME", help="this one of the configuration's sensors; default: the first")
+    hand.add_argument("--moves", type=int, default=12, metavar="N", help="so many moves at least, 8 to 200 (12)")
+    hand.add_argument(
+        "--scale-std",
+        type=float,
+        default=1e-3,
+        metavar="STD",
+        help="and until the standard uncertainty of the scale by this session is no larger (0.001)",
+    )
+    hand.add_argument("--write", action="store_true", help="store what was found as the board's calibration")
+    hand.add_argument("--yes", action="store_true", help="do not ask before the board is changed")
     text = "the calibrations in the board's flash"
     stored = commands.add_parser("calibration", help=text, description=text).add_subparsers(
         title="commands", required=True, metavar="COMMAND"

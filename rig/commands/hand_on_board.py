@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack
 from datetime import UTC, datetime
@@ -13,7 +13,6 @@ from firmware_host.client import Calibration
 from rig.board.identify import changing, configured_board
 from rig.board.store import store
 from rig.commands.claims import claimed_board
-from rig.commands.config_arguments import add_config, add_json
 from rig.commands.laboratory import simulated_laboratory
 from rig.commands.own_address import loaded_here
 from rig.commands.simulated_operator import SimulatedOperator
@@ -29,23 +28,6 @@ if TYPE_CHECKING:
     from rig.runner.hand_on_board import CalibratedByBoard
 
 MOVES = range(8, 201)
-
-
-def add_arguments(hand: ArgumentParser) -> None:
-    """The arguments of `rig board hand`."""
-    add_config(hand)
-    add_json(hand)
-    hand.add_argument("--sensor", metavar="NAME", help="this one of the configuration's sensors; default: the first")
-    hand.add_argument("--moves", type=int, default=12, metavar="N", help="so many moves at least, 8 to 200 (12)")
-    hand.add_argument(
-        "--scale-std",
-        type=float,
-        default=1e-3,
-        metavar="STD",
-        help="and until the standard uncertainty of the scale by this session is no larger (0.001)",
-    )
-    hand.add_argument("--write", action="store_true", help="store what was found as the board's calibration")
-    hand.add_argument("--yes", action="store_true", help="do not ask before the board is changed")
 
 
 def hand(options: Namespace) -> int:
@@ -91,7 +73,8 @@ def hand(options: Namespace) -> int:
         if options.json:
             print(json.dumps(_document(name, found, calibration, scale_u), indent=2))
         else:
-            print("\n".join(_lines(name, found, calibration, scale_u)))
+            for line in _lines(name, found, calibration, scale_u):
+                say(line)
         if options.write:
             agreed_or_refused([f"On the board {board.identity.unique_id}: {name}"], "store", options.yes)
             with changing():

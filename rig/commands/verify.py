@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.report.signatures.seen import Looked, Seen
+    from rig.report.signatures.looked import Looked, Seen
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
@@ -107,7 +107,7 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
 
 def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: Any) -> _Found:
     """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
-    from rig.report.signatures.seen import not_as_signed
+    from rig.report.signatures.looked import not_as_signed
 
     look, attached_to = looks[file], None
     problems = list(look.problems)

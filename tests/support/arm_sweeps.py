@@ -48,7 +48,9 @@ class Truth:
 @cache
 def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
     """The sweeps of the procedure about three or six axes."""
-    text = CONFIG.format(speed_deg_s=speed_deg_s, rest_s=0.0, repeats=1, procedure=f", axes: {axes}", uncertainty="")
+    text = CONFIG.format(
+        speed_deg_s=speed_deg_s, rest_s=0.0, repeats=1, part="lsm9ds1", procedure=f", axes: {axes}", uncertainty=""
+    )
     config = parse(text).config
     assert isinstance(config.procedure, SixSweepsSection)
     plan = plan_six_observation(config.arm, config.procedure)

@@ -12,8 +12,8 @@ from signxml.exceptions import SignXMLException
 from signxml.util import add_pem_header, namespaces
 from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 
+from rig.report.signatures.looked import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.seen import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
 
 NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
 ITSELF, ITS_PROPERTIES, ITS_CERTIFICATES = range(3)  # what is signed, in this order
