@@ -10,6 +10,9 @@ from rig.errors import Fault
 from support.at_the_table import LIST, TRUE_SCALE, Table
 
 
+SHORT = replace(LIST, flips=8, turns=2)
+
+
 def held(table: Table) -> None:
     """The scale factors are right, by what the session itself tells of its uncertainty (k = 3)."""
     solution = table.solution
@@ -42,7 +45,7 @@ def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     ids=lambda each: next(iter(each)),
 )
 def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, float], names: set[str]) -> None:
-    table = Table(seed=5, mistakes=dict(mistakes))
+    table = Table(seed=5, mistakes=dict(mistakes), settings=SHORT)
     table.sit()
     assert table.operator.state["mistakes"]
     assert names <= set(table.again)
@@ -50,21 +53,21 @@ def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, 
 
 
 def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
-    table = Table(seed=6, mistakes={"held": 0.2})
+    table = Table(seed=6, mistakes={"held": 0.2}, settings=SHORT)
     table.sit()
     assert {"held_not_laid_down", "not_flat"} & set(table.reminded)
     held(table)
 
 
 def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> None:
-    table = Table(seed=5, mistakes={"crumb": 0.2})
+    table = Table(seed=5, mistakes={"crumb": 0.2}, settings=SHORT)
     table.sit()
     assert "crumb" in table.operator.state["mistakes"]
     held(table)
 
 
 def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
-    table = Table(seed=7, mistakes={"wrong_face": 0.2})
+    table = Table(seed=7, mistakes={"wrong_face": 0.2}, settings=SHORT)
     table.sit()
     assert "wrong_face" in table.operator.state["mistakes"]
     held(table)
