@@ -9,10 +9,12 @@ from rig.batch.batch import Doubt, Part
 from rig.batch.series import following
 from rig.errors import Refused, RigError
 from rig.errors.quoting import printable_lines
+from rig.station.confirm import forget_what_was_typed
 from rig.station.events import Prompt
 from rig.station.plain_text import for_file, say
 
 YES = ("yes", "y", "go")
+NO = ("no", "n")
 
 
 Kind = Literal["number", "mount", "go", "doubt", "again"]
@@ -37,7 +39,8 @@ class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
     def answer(self, question: Question) -> str:
-        """What is typed after the question."""
+        """What is typed after the question: what was typed before is no answer to what nobody had read."""
+        forget_what_was_typed()
         for line in question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
         print(printable_lines(question.text), end=" ", file=sys.stderr, flush=True)
@@ -73,7 +76,9 @@ class Asked:
     def mounted(self, part: Part) -> bool:
         """Whether it is; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
-        return self._answer("mount", text).lower() not in ("no", "n")
+        while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
+            pass  # a number that is scanned twice says nothing of what is mounted
+        return said not in NO
 
     def goes_on(self, doubt: Doubt) -> bool:
         """Whether the operator says yes."""
