@@ -44,7 +44,8 @@ def summary(batch: Batch) -> str:
     found = [f"{count} {words}" for words, state in counts.items() if (count := batch.count(state))]
     repeated = sum(part.ended is not None and part.ended.repeated > 0 for part in batch.parts)
     more = [f"sweeps repeated in {repeated}"] if repeated else []
-    return f"{len(batch.parts)} parts: {', '.join([*found, *more])}" if batch.parts else "no parts"
+    parts = "1 part" if len(batch.parts) == 1 else f"{len(batch.parts)} parts"
+    return f"{parts}: {', '.join([*found, *more])}" if batch.parts else "no parts"
 
 
 def csv_of(batch: Batch) -> str:

@@ -81,7 +81,7 @@ def _carried_out(options: Namespace, found: "Configured", operator: "Asked", pre
     from rig.commands.bench import Station, bench
 
     config = found.loaded.config
-    begun = Begun(options.operator, options.work_order, now_utc())
+    begun = Begun(options.operator, options.work_order, now_utc(), simulated=found.loaded.simulated)
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
