@@ -67,11 +67,12 @@ class Asked:
         """Whether the numbers come from a list."""
         return self.numbers is not None
 
-    def next_part(self, done: Sequence[Part]) -> str | None:
-        """The next number of the list, or the one that is typed or scanned."""
+    def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
+        """The next number of the list, or the one that is typed or scanned after `why` the last one was not taken."""
         if self.numbers is not None:
             return following(self.numbers, [each.serial for each in done])
-        return self._answer("number", f"part {len(done) + 1}, serial number (Enter alone ends):") or None
+        text = f"part {len(done) + 1}, serial number (Enter alone ends):"
+        return self._answer("number", text, *([f"{why}."] if why else [])) or None
 
     def mounted(self, part: Part) -> bool:
         """Whether it is; "no" puts it aside."""

@@ -7,15 +7,17 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBegun, PartEnded, doubt_of, state_of
 from rig.batch.journal import JOURNAL, opened, resumed
 from rig.batch.label import Label, files_of, zpl
-from rig.batch.operators import Asked, Terminal
+from rig.batch.operators import Asked, Question, Terminal
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
+from rig.batch.work import Bench, Work
 from rig.config.station_section import StationSection
 from rig.errors import Refused
 from rig.station.events import Prompt
@@ -154,6 +156,21 @@ def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_no
         monkeypatch.undo()
         keyboard.close()
         os.close(terminal)
+
+
+def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path: Path) -> None:
+    questions = list[Question]()
+
+    class Operator:
+        def answer(self, question: Question) -> str:
+            questions.append(question)
+            return "G-1" if len(questions) == 1 else ""
+
+    bench = cast(Bench, SimpleNamespace(simulated=True, today=lambda serial: None))
+    Work(opened(tmp_path / "batch", tmp_path, BEGUN), SECTION, Asked(Operator()), bench).all_parts()
+    first, second = questions
+    assert not first.lines
+    assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
 
 
 def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
