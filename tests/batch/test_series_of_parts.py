@@ -3,6 +3,8 @@
 import csv
 import os
 import pty
+import shlex
+from argparse import ArgumentParser
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -18,6 +20,7 @@ from rig.batch.operators import Asked, Question, Terminal
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
 from rig.batch.work import Bench, Work
+from rig.commands import station
 from rig.config.station_section import StationSection
 from rig.errors import Refused
 from rig.station.events import Prompt
@@ -171,6 +174,16 @@ def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path:
     first, second = questions
     assert not first.lines
     assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
+
+
+def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Path) -> None:
+    parser = ArgumentParser()
+    station.add(parser)
+    page = ["--page", "--page-address", "192.0.2.10:8137"]
+    begun = ["a b.yaml", "--set", "station.repeats=1", "--series", "parts.csv", *page]
+    said = shlex.split(station.going_on(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
+    assert said[:2] == ["rig", "station"] and "secret" not in said
+    assert parser.parse_args(said[2:]) == parser.parse_args([*begun, "--out", str(tmp_path)])
 
 
 def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
