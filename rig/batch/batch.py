@@ -3,21 +3,25 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from rig.config.sensor_sections import checked_serial_number
 from rig.config.station_section import StationSection
 
 Outcome = Literal["pass", "fail", "refused", "fault"]
+Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a name, which leads nowhere else
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A batch was begun: by whom and for which work order (empty: nobody said)."""
+    """A batch was begun: by whom and for which work order (empty: nobody said), in a simulated laboratory or not."""
 
     operator: str
     work_order: str
     at_utc: str
+    simulated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +29,7 @@ class PartBegun:
     """The part of that `serial` number is to be run, in `folder` beside the journal."""
 
     serial: str
-    folder: str
+    folder: Folder
     at_utc: str
 
 

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, PartBegun, PartEnded, after, state_of
+from rig.batch.batch import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.config.written_file import opened_to_append
-from rig.data.run_folder import empty_folder, folder_of_its_own
+from rig.data.checked import checked
+from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
 from rig.errors import Refused
 
 JOURNAL = "batch.jsonl"
@@ -46,17 +47,24 @@ class Journal:
 def opened(out: Path | None, parent: Path, entry: Begun) -> Journal:
     """The batch in the folder `out`, gone on with or begun there; without `out` a new one in a folder below `parent`.
 
-    Raises Refused `run_folder` and as `resumed`.
+    Raises Refused `run_folder` and as `resumed`; `no_batch` where one was measured and the other is simulated.
     """
     if out is not None and (out / JOURNAL).exists():
-        return resumed(out)
+        journal = resumed(out)
+        if journal.batch.begun.simulated != entry.simulated:
+            begun = "in a simulated laboratory" if journal.batch.begun.simulated else "on a real rig"
+            raise _not_gone_on_with(out, f"it was begun {begun}")
+        return journal
     folder = empty_folder(out) if out is not None else folder_of_its_own(parent, "batch")
     _append(folder / JOURNAL, entry)
     return Journal(folder, state_of([entry]))
 
 
 def resumed(folder: Path) -> Journal:
-    """The journal that lies in `folder`; half a line at its end is cut off. Raises Refused `no_batch`."""
+    """The journal that lies in `folder`; half a line at its end is cut off.
+
+    Raises Refused `no_batch`, and as `refuse_links`.
+    """
     path = folder / JOURNAL
     try:
         text = read_regular_file(path, LARGEST_BYTES, follow_links=False)
@@ -64,22 +72,26 @@ def resumed(folder: Path) -> Journal:
         batch = state_of(_entries(whole))
         if len(whole) < len(text):
             os.truncate(path, len(whole))
-    except (OSError, UnfitFile, ValueError, TypeError, KeyError) as error:
-        raise Refused(
-            "no_batch",
-            f"{path} cannot be gone on with: {error}",
-            "Begin a new batch in another folder: rig station CONFIG --out DIR",
-        ) from error
+    except (OSError, UnfitFile, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise _not_gone_on_with(folder, str(error)) from error
+    part = folder if batch.in_hand is None else folder / batch.in_hand.folder
+    refuse_links(*folder.iterdir(), *(part.iterdir() if part.is_dir() else ()))
     return Journal(folder, batch)
+
+
+def _not_gone_on_with(folder: Path, why: str) -> Refused:
+    return Refused(
+        "no_batch",
+        f"{folder / JOURNAL} cannot be gone on with: {why}",
+        "Begin a new batch in another folder: rig station CONFIG --out DIR",
+    )
 
 
 def _entries(text: bytes) -> Iterator[Entry]:
     for line in text.splitlines():
         said = json.loads(line)
         kind = _KINDS[said.pop("entry")]
-        if said.get("chip") is not None:
-            said["chip"] = Chip(said["chip"]["board"], tuple(said["chip"]["who_am_i"]))
-        yield kind(**said)
+        yield checked(kind, said, "entry")
 
 
 def _append(path: Path, entry: Entry) -> None:

@@ -35,15 +35,17 @@ class OnPage:
         self._sections.put(now=asdict(now))
 
     def answer(self, question: Question) -> str:
-        """What a browser types; empty where the page has ended."""
+        """What a browser types; where the page has ended no number, and no to everything else."""
         with self._changed:
             self._number, self._open, self._said = self._number + 1, True, ""
             self._sections.put(asked={"number": self._number, **asdict(question)})
-            while self._open and not self._control.gone:
-                self._changed.wait(LOOK_S)
-            self._open = False
-            self._sections.put(asked=None)
-            return self._said
+            try:
+                while self._open and not self._control.gone:
+                    self._changed.wait(LOOK_S)
+                return "no" if self._open and question.kind != "number" else self._said
+            finally:
+                self._open = False
+                self._sections.put(asked=None)
 
     def takes(self, number: int, text: str) -> bool:
         """Take the answer to the question of that number; False where that is not asked any more."""

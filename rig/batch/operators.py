@@ -9,10 +9,12 @@ from rig.batch.batch import Doubt, Part
 from rig.batch.series import following
 from rig.errors import Refused, RigError
 from rig.errors.quoting import printable_lines
+from rig.station.confirm import forget_what_was_typed
 from rig.station.events import Prompt
 from rig.station.plain_text import for_file, say
 
 YES = ("yes", "y", "go")
+NO = ("no", "n")
 
 
 Kind = Literal["number", "mount", "go", "doubt", "again"]
@@ -37,7 +39,8 @@ class Terminal:
     """The keyboard of the terminal. A scanner is a keyboard that ends each number with Enter."""
 
     def answer(self, question: Question) -> str:
-        """What is typed after the question."""
+        """What is typed after the question: what was typed before is no answer to what nobody had read."""
+        forget_what_was_typed()
         for line in question.lines:
             print(for_file(printable_lines(line), sys.stderr), file=sys.stderr)
         print(printable_lines(question.text), end=" ", file=sys.stderr, flush=True)
@@ -64,16 +67,19 @@ class Asked:
         """Whether the numbers come from a list."""
         return self.numbers is not None
 
-    def next_part(self, done: Sequence[Part]) -> str | None:
-        """The next number of the list, or the one that is typed or scanned."""
+    def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
+        """The next number of the list, or the one that is typed or scanned after `why` the last one was not taken."""
         if self.numbers is not None:
             return following(self.numbers, [each.serial for each in done])
-        return self._answer("number", f"part {len(done) + 1}, serial number (Enter alone ends):") or None
+        text = f"part {len(done) + 1}, serial number (Enter alone ends):"
+        return self._answer("number", text, *([f"{why}."] if why else [])) or None
 
     def mounted(self, part: Part) -> bool:
         """Whether it is; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
-        return self._answer("mount", text).lower() not in ("no", "n")
+        while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
+            pass  # a number that is scanned twice says nothing of what is mounted
+        return said not in NO
 
     def goes_on(self, doubt: Doubt) -> bool:
         """Whether the operator says yes."""

@@ -15,18 +15,20 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 _PAGE = """\
 <!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{{ title }}</title>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>{{ title }}</title>
 <style>
 body { font: 11pt sans-serif; margin: 2em; } table { border-collapse: collapse; }
 th, td { border: 1px solid #999; padding: 0.3em 0.6em; text-align: left; vertical-align: top; }
 td.pass { background: #d8f0d8; } td.fail, td.fault { background: #f6d0d0; font-weight: bold; }
-td.refused { background: #f6ecc8; }
+td.refused { background: #f6ecc8; } .wide { overflow-x: auto; }
 </style></head><body>
 <h1>{{ title }}</h1>
 <p>{{ summary }}.{% if batch.begun.operator %} Operator: {{ batch.begun.operator }}.{% endif %}
 {% if batch.begun.work_order %} Work order: {{ batch.begun.work_order }}.{% endif %}
 {% if simulated %} <strong>Measured in a simulated laboratory.</strong>{% endif %}</p>
-<table><thead><tr><th>No.</th><th>Serial number</th><th>Verdict</th><th>Repeated</th><th>Why</th><th>Certificate</th>
+<div class="wide"><table>
+<thead><tr><th>No.</th><th>Serial number</th><th>Verdict</th><th>Repeated</th><th>Why</th><th>Certificate</th>
 <th>Board</th><th>Begun (UTC)</th></tr></thead><tbody>
 {% for part in batch.parts %}<tr><td>{{ part.number }}</td><td>{{ part.serial }}</td>
 <td class="{{ part.state }}">{{ part.state | upper }}</td><td>{{ part.ended.repeated or "" if part.ended }}</td>
@@ -34,7 +36,7 @@ td.refused { background: #f6ecc8; }
 <td>{% if part.ended and part.ended.certificate %}<a href="{{ part.folder | urlencode }}/certificate.html">
 {{ part.ended.certificate }}</a>{% endif %}</td>
 <td>{{ part.ended.chip or "" if part.ended }}</td><td>{{ part.begun_utc }}</td></tr>
-{% endfor %}</tbody></table></body></html>
+{% endfor %}</tbody></table></div></body></html>
 """
 
 
@@ -44,7 +46,8 @@ def summary(batch: Batch) -> str:
     found = [f"{count} {words}" for words, state in counts.items() if (count := batch.count(state))]
     repeated = sum(part.ended is not None and part.ended.repeated > 0 for part in batch.parts)
     more = [f"sweeps repeated in {repeated}"] if repeated else []
-    return f"{len(batch.parts)} parts: {', '.join([*found, *more])}" if batch.parts else "no parts"
+    parts = "1 part" if len(batch.parts) == 1 else f"{len(batch.parts)} parts"
+    return f"{parts}: {', '.join([*found, *more])}" if batch.parts else "no parts"
 
 
 def csv_of(batch: Batch) -> str:

@@ -28,8 +28,8 @@ class Operator(Protocol):
     @property
     def listed(self) -> bool: ...
 
-    def next_part(self, done: Sequence[Part]) -> str | None:
-        """The next serial number; None where no part follows."""
+    def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
+        """The next serial number; None where no part follows. `why` the number before was not taken, is told."""
         ...
 
     def mounted(self, part: Part) -> bool:
@@ -114,8 +114,10 @@ class Work:
 
     def _named(self) -> Part | None:
         """The next part, entered; None where none follows."""
-        while (serial := self.operator.next_part(self.journal.batch.parts)) is not None:
+        why = ""
+        while (serial := self.operator.next_part(self.journal.batch.parts, why)) is not None:
             doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today)
+            why = doubt.why if doubt is not None and doubt.final else ""
             right = doubt is None or (not doubt.final and self.operator.goes_on(doubt))
             if right or self.operator.listed:
                 self._enter(PartBegun(serial, self.journal.batch.folder_of(serial), now_utc()))

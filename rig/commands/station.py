@@ -79,18 +79,24 @@ def _carried_out(options: Namespace, found: "Configured", operator: "Asked", pre
     from rig.batch.table import CSV, summary
     from rig.batch.work import Work, now_utc
     from rig.commands.bench import Station, bench
+    from rig.station.events import Interrupted
 
     config = found.loaded.config
-    begun = Begun(options.operator, options.work_order, now_utc())
+    begun = Begun(options.operator, options.work_order, now_utc(), simulated=found.loaded.simulated)
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
     station = Station(operator.attended, said.operator, said.work_order, (present,))
     try:
         with _beating(config, present), bench(found, folder, station) as at:
-            Work(journal, config.station, operator, at, present.batch).all_parts()
+            try:
+                Work(journal, config.station, operator, at, present.batch).all_parts()
+            except KeyboardInterrupt:
+                if present.now.state != "stopped":  # no run was there to say so
+                    present.event(Interrupted("between two parts"))
+                raise
     except (Fault, KeyboardInterrupt):
-        say(f"the batch is kept in {folder}; go on with: {_again(options, folder)}", sys.stderr)
+        say(f"the batch is kept in {folder}; go on with: {going_on(options, folder)}", sys.stderr)
         raise
     batch = journal.batch
     if options.json:
@@ -132,11 +138,13 @@ def _page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
             yield voice
 
 
-def _again(options: Namespace, folder: Path) -> str:
-    """The command that goes on with the batch."""
+def going_on(options: Namespace, folder: Path) -> str:
+    """The command that goes on with the batch in `folder`; a token that was typed into the first one is not shown."""
     series = [] if options.series is None else ["--series", str(options.series)]
     script = [] if options.script is None else ["--script", str(options.script)]
     changes = [word for each in options.overrides for word in ("--set", each)]
-    agreed = [*(["--yes"] if options.yes else []), *(["--page"] if options.page else [])]
-    words = ["rig", "station", str(options.config), *changes, *script, "--out", str(folder), *series, *agreed]
+    said = [f"--{name}" for name in ("yes", "page", "json") if getattr(options, name)]
+    said += [] if options.page_address is None else ["--page-address", options.page_address]
+    said += [] if options.page_token_file is None else ["--page-token-file", str(options.page_token_file)]
+    words = ["rig", "station", str(options.config), *changes, *script, "--out", str(folder), *series, *said]
     return shlex.join(words)

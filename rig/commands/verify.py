@@ -112,12 +112,13 @@ def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: An
     look, attached_to = looks[file], None
     problems = list(look.problems)
     if not look.signatures:
-        holders = {other.name: each.attached[file.name] for other, each in looks.items() if file.name in each.attached}
-        attached_to = next((other for other, held in holders.items() if held == content), None)
+        holders = [(other, each.attached[file.name]) for other, each in looks.items() if file.name in each.attached]
+        attached_to = next((other.name for other, held in holders if held == content), None)
         if attached_to is not None or (known is not None and not known.problems):
             problems = [each for each in problems if each.name != "not_signed"]
         elif holders:
-            problems = [not_as_signed(file.name, f"another is attached to {', '.join(holders)}")]
+            named = ", ".join(dict.fromkeys(other.name for other, _ in holders))
+            problems = [not_as_signed(file.name, f"another is attached to {named}")]
     said = () if known is None else known.said
     return _Found(file, look.signatures, said, attached_to, (*problems, *(() if known is None else known.problems)))
 

@@ -2,9 +2,12 @@
 
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from datetime import date, datetime, timedelta
 from typing import Any
 
+from rig.batch.now import Now
+from rig.data.checked import checked
 from rig.history.series import rig_states, subjects, trends
 from rig.history.stations import Told
 from rig.history.store import Past
@@ -16,11 +19,14 @@ MOST = 200  # rows of a table
 
 
 def rigs(told: Iterable[Told]) -> list[dict[str, Any]]:
-    """Each rig as it is now; one that is silent without a last word is dead, whatever it said before."""
+    """Each rig as it is now; one that is silent without a last word is dead, whatever it said before.
+
+    What a station of another version, or somebody else, wrote there is `unread` if it is nothing a station says here.
+    """
     shown = []
     for each in told:
         said = _read(each.told)
-        state = str(said.get("state", "ended"))
+        state = str(said.get("state", "unread"))
         if said.get("over"):
             state = state if state in ENDINGS else "ended"
         elif each.age_s > DEAD_S:
@@ -73,7 +79,6 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
 def _read(told: str) -> dict[str, Any]:
     """What a station told; nothing of what is no such text."""
     try:
-        said = json.loads(told)
-    except ValueError:
+        return asdict(checked(Now, json.loads(told), "told"))
+    except (ValueError, RecursionError):
         return {}
-    return said if isinstance(said, dict) else {}

@@ -65,7 +65,7 @@ def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]
 def _in_force(connection: Connection) -> Mapping[int, tuple[Issued, ...]]:
     """The certificates to rely on: without a mark, and replaced by none that this history knows."""
     rows = _rows(connection, select(schema.certificate).order_by(schema.certificate.c.id))
-    gone = {row.replaces for row in rows}
+    gone = {row.replaces for row in rows if not row.marks}  # one that is not valid replaces none that is
     return _by_run(
         (row.run_id, Issued(row.number, row.title, row.issued, row.replaces, row.marks))
         for row in rows

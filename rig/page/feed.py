@@ -187,12 +187,12 @@ def _clock() -> str:
 
 
 def frame_of(name: str, document: dict[str, Any]) -> bytes:
-    """One server-sent event. JSON knows no NaN; what is not a number is told as null."""
+    """One server-sent event. JSON knows no NaN; what is not a number is told as null, what is no character as "?"."""
     try:
         text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     except ValueError:
         text = json.dumps(_finite(document), ensure_ascii=False, separators=(",", ":"))
-    return f"event: {name}\ndata: {text}\n\n".encode()
+    return f"event: {name}\ndata: {text}\n\n".encode(errors="replace")
 
 
 def _finite(value: Any) -> Any:

@@ -61,3 +61,12 @@ def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answer
     assert answers.get(timeout=30) == "G-001"
     assert ask("POST", "/say", right) == 409
     assert ask("POST", "/stop") == 409  # nothing runs
+
+
+def test_a_page_that_is_lost_mounts_nothing_and_agrees_to_nothing() -> None:
+    control = Control(may_answer=False)
+    voice = OnPage(Sections(), control)
+    control.leave()
+    assert voice.answer(Question("number", "part 1, serial number:")) == ""
+    assert voice.answer(Question("mount", "G-001: mount it")) == "no"
+    assert voice.answer(Question("go", "Type go to start:")) == "no"

@@ -1,19 +1,29 @@
 """What a batch's entries amount to, what is doubted, and what it leaves: without a rig."""
 
 import csv
+import os
+import pty
+import shlex
+from argparse import ArgumentParser
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBegun, PartEnded, doubt_of, state_of
 from rig.batch.journal import JOURNAL, opened, resumed
 from rig.batch.label import Label, files_of, zpl
+from rig.batch.operators import Asked, Question, Terminal
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
+from rig.batch.work import Bench, Work
+from rig.commands import station
 from rig.config.station_section import StationSection
 from rig.errors import Refused
+from rig.station.events import Prompt
 
 AT = "2026-11-25T08:00:00+00:00"
 BEGUN = Begun("A. Person", "W-17", AT)
@@ -95,6 +105,87 @@ def test_a_journal_that_tells_of_no_batch_is_refused(tmp_path: Path) -> None:
         resumed(tmp_path)
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"entry": "part_begun", "serial": "G-001", "folder": "../elsewhere", "at_utc": ""}',
+        '{"entry": "part_begun", "serial": 1, "folder": "01-1", "at_utc": ""}',
+        "1",
+        "[" * 100_000,
+    ],
+    ids=["a folder elsewhere", "a number", "no entry", "deep"],
+)
+def test_a_journal_of_somebody_elses_leads_nowhere_else(line: str, tmp_path: Path) -> None:
+    opened(tmp_path / "batch", tmp_path, BEGUN)
+    with (tmp_path / "batch" / JOURNAL).open("a", encoding="utf-8") as file:
+        file.write(f"{line}\n")
+    with pytest.raises(Refused, match="no_batch"):
+        resumed(tmp_path / "batch")
+
+
+def test_nothing_is_written_through_a_link_in_a_batch_folder(tmp_path: Path) -> None:
+    folder = opened(tmp_path / "batch", tmp_path, BEGUN).folder
+    (tmp_path / "elsewhere").mkdir()
+    (folder / "labels").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(Refused, match="not_written_through"):
+        resumed(folder)
+
+
+def test_a_simulated_batch_is_not_gone_on_with_on_a_real_rig(tmp_path: Path) -> None:
+    folder = opened(tmp_path / "batch", tmp_path, replace(BEGUN, simulated=True)).folder
+    assert opened(folder, tmp_path, replace(BEGUN, simulated=True)).batch.begun.simulated
+    with pytest.raises(Refused, match="begun in a simulated laboratory"):
+        opened(folder, tmp_path, BEGUN)
+
+
+def test_at_the_terminal_what_is_typed_ahead_is_no_answer_and_a_number_mounts_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Go that was typed before the arm's way was announced, and a number that was scanned twice."""
+    terminal, far_end = pty.openpty()
+    keyboard = os.fdopen(far_end, encoding="utf-8")
+    answers = iter((b"G-001\n", b"no\n", b"no\n"))
+
+    def shown(text: str) -> int:
+        return os.write(terminal, next(answers)) if text == " " else 0  # a question has been read to its end
+
+    monkeypatch.setattr("sys.stdin", keyboard)
+    monkeypatch.setattr("sys.stderr", SimpleNamespace(write=shown, flush=lambda: None, isatty=lambda: False))
+    try:
+        assert not Asked(Terminal()).mounted(Part(1, "G-001", "01-G-001", AT))
+        os.write(terminal, b"go\n")
+        assert not Asked(Terminal()).agrees(("The arm will move.",), Prompt(()).to_do)
+    finally:
+        monkeypatch.undo()
+        keyboard.close()
+        os.close(terminal)
+
+
+def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path: Path) -> None:
+    questions = list[Question]()
+
+    class Operator:
+        def answer(self, question: Question) -> str:
+            questions.append(question)
+            return "G-1" if len(questions) == 1 else ""
+
+    bench = cast(Bench, SimpleNamespace(simulated=True, today=lambda serial: None))
+    Work(opened(tmp_path / "batch", tmp_path, BEGUN), SECTION, Asked(Operator()), bench).all_parts()
+    first, second = questions
+    assert not first.lines
+    assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
+
+
+def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Path) -> None:
+    parser = ArgumentParser()
+    station.add(parser)
+    page = ["--page", "--page-address", "192.0.2.10:8137"]
+    begun = ["a b.yaml", "--set", "station.repeats=1", "--series", "parts.csv", *page]
+    said = shlex.split(station.going_on(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
+    assert said[:2] == ["rig", "station"] and "secret" not in said
+    assert parser.parse_args(said[2:]) == parser.parse_args([*begun, "--out", str(tmp_path)])
+
+
 def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
     of = batch(("G-001", replace(PASSED, repeated=1)), ("G-002", PartEnded("fail", AT, "=gyro")), ("G-003", None))
     rows = list(csv.DictReader(StringIO(csv_of(of))))
@@ -105,6 +196,7 @@ def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
     ]
     assert rows[1]["why"] == "'=gyro"  # a spreadsheet would compute it
     assert summary(of) == "3 parts: 1 passed, 1 failed, 1 open, sweeps repeated in 1"
+    assert summary(batch(("G-001", PASSED))) == "1 part: 1 passed"
     page = page_of(replace(of, begun=replace(BEGUN, operator="<b>A</b>")), simulated=True)
     assert "<b>A</b>" not in page and PASSED.certificate in page and "simulated laboratory" in page
 

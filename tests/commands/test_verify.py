@@ -350,6 +350,14 @@ def test_an_alteration_of_the_result_is_refused_by_name(alter: Callable[[bytes],
     assert names_of(verified(lab, RESULT, history=False)[1]) == ["not_signed"]
 
 
+def test_two_certificates_at_once_are_each_beside_their_own_result(lab: Laboratory) -> None:
+    shutil.copytree(lab.folder, lab.folder / "other")
+    (lab.folder / "other" / RESULT).write_bytes(b"{}")
+    shutil.copy(lab.stranger / PDF, lab.folder / "other" / PDF)
+    status, said = verified(lab, PDF, RESULT, f"other/{PDF}", history=False, trust=False)
+    assert (status, names_of(said)) == (0, []), said
+
+
 @pytest.mark.parametrize(
     ("statements", "name"),
     [

@@ -25,6 +25,7 @@ from rig.history.place import place
 from rig.history.stations import Told
 from rig.history.store import open_history
 from rig.page.control import Control
+from rig.page.feed import frame_of
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
 from rig.station.events import Failed, Prompt, SamplingStarted
@@ -63,6 +64,15 @@ def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> 
         "running", "dead", "ended", "fault",
     ]  # fmt: skip
     assert shown.rigs([Told("bench 1", "lab-1", "no JSON", 60)])[0]["state"] == "dead"
+
+
+@pytest.mark.parametrize("said", ["no JSON", '{"parts": 5}', '{"state": "flies"}', "[" * 20_000])
+def test_what_is_nothing_a_station_says_is_shown_as_that_and_hides_no_other_rig(said: str) -> None:
+    odd, running = shown.rigs([Told("bench 0", "lab-0", said, 0.4), told(Now(state="running"))])
+    assert odd == {"rig": "bench 0", "computer": "lab-0", "state": "unread", "age_s": 0}
+    assert running["state"] == "running"
+    (half_a_character,) = shown.rigs([Told("bench 0", "lab-0", '{"doing": "\\ud800"}', 0.4)])
+    assert b'"doing":"?"' in frame_of("all", {"rigs": [half_a_character]})
 
 
 def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ const shown = {};
 const WORDS = {
   waiting: "◌ waits for a part", checking: "? checks", asking: "? asks the operator", running: "◉ runs", solving: "Σ solves",
   refused: "⊘ refused", fault: "⚠ fault", stopped: "■ stopped", ended: "■ ended", dead: "⚠ no sign of life",
+  unread: "? says what this page cannot read",
 };
 const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rig.report.certificate.content import Certificate
 
-_ANCHOR = re.compile(r"journal entry (\d+), SHA-256 ([0-9a-f]{64})")
+_ANCHOR = re.compile(r"journal entry (\d+), SHA-256 ([0-9a-f]{64})$")
 
 
 @dataclass(frozen=True, slots=True)
