@@ -459,8 +459,8 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     def problems(self, config: RigConfig) -> Iterator[str]:
         """The problems of the sweeps and of the attitudes, a heater that cannot be, and sensors without a board."""
         yield from SixSweepsSection.problems(self, config)
-        if self.with_attitudes:
-            yield from AttitudesSection.problems(self, config)
+        if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
+            yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
         if self.arc_deg != 360:
             yield f"procedure.arc_deg {self.arc_deg:g} is not for thermal: leave it at 360"
         if self.finds_earth_rate:
