@@ -139,7 +139,7 @@ def _calibrated(
 ) -> AccelerometerResult:
     sensor = recordings[0].run.sensors[name]
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
-    used, left_out = _apart(dwells, settings.planned_dwells)
+    used, left_out = _apart(dwells, _wanted(dwells, settings))
     mounting = np.array(sensor.mounting)
     seen, sweeps = _dwells(used, mounting), _sweeps(name, recordings, mounting)
     solve = partial(
@@ -204,6 +204,14 @@ def _calibrated(
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
         temperature_c=temperature_c,
     )
+
+
+def _wanted(dwells: Sequence[DwellReading], settings: RunSettings) -> tuple[PlannedDwell, ...]:
+    """The dwells that were planned; over temperature a run ends once its range is covered, with sets never begun."""
+    if settings.reference_c is None:
+        return settings.planned_dwells
+    last = max((dwell.index for dwell in dwells), default=-1)
+    return tuple(each for each in settings.planned_dwells if each.index <= last) or settings.planned_dwells
 
 
 def _apart(

@@ -1,7 +1,7 @@
 """What the checks of a run will tell, by its plan: the same checks, of readings that nothing is wrong with. Pure."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from rig.data.quantity import ACCELERATION
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 from rig.motion.geometry import DenavitHartenberg
-from rig.motion.steps import Plan
+from rig.motion.steps import Plan, Rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,9 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
     """What the plan will tell of all that is to be calibrated but magnetometers; of accelerometers on an arm alone.
 
     For a `turner` made so, an arm as its model is drawn, and for a sensor as its data sheet has it, which nothing but
-    its noise and its flicker makes wander.
+    its noise and its flicker makes wander. Of a plan over temperature one set is reckoned.
     """
+    plan = _one_set(plan)
     settings = settings_of(config, plan)
     site, known = settings.site, settings.uncertainty
     if site is None or known is None or turner.joints == 0:  # None in settings of before
@@ -61,6 +62,12 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
     }
     found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
+
+
+def _one_set(plan: Plan) -> Plan:
+    """The plan until it waits for the second temperature."""
+    waits = [place for place, step in enumerate(plan.steps) if isinstance(step, Rest) and step.for_temperature]
+    return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 
 
 def _told_from(

@@ -14,6 +14,7 @@ from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
 from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
+from rig.estimation.over_temperature import MIN_RANGE_C
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -435,11 +436,17 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def a_range_with_several_temperatures(self) -> Self:
-        """Two temperatures make a line through two points, which nothing contradicts."""
-        if self.to_c - self.from_c < 2 * self.gap_k:
-            raise ValueError("from_c and to_c must be two gaps apart at least: a line through two points shows nothing")
-        if not self.from_c <= self.reference_c <= self.to_c:
-            raise ValueError("reference_c must lie between from_c and to_c")
+        """What makes sets enough for polynomials, which are found only after the run."""
+        gaps, ways = (2, "") if self.both_ways else (3, " with both_ways: false")
+        if self.to_c - self.from_c < gaps * self.gap_k:
+            raise ValueError(
+                f"from_c and to_c must be {gaps} gaps apart at least{ways}: a line through two points shows nothing"
+            )
+        least_k = MIN_RANGE_C + self.gap_k
+        if self.to_c - self.from_c < least_k:
+            raise ValueError(f"from_c and to_c must be {MIN_RANGE_C:g} K and a gap apart at least: {least_k:g} K")
+        if not self.gap_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.gap_k / 2:
+            raise ValueError("reference_c must lie between from_c and to_c, half a gap from each: sets end before them")
         if self.hottest_c <= self.to_c:
             raise ValueError("hottest_c must lie above to_c")
         return self
@@ -452,8 +459,8 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     def problems(self, config: RigConfig) -> Iterator[str]:
         """The problems of the sweeps and of the attitudes, a heater that cannot be, and sensors without a board."""
         yield from SixSweepsSection.problems(self, config)
-        if self.with_attitudes:
-            yield from AttitudesSection.problems(self, config)
+        if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
+            yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
         if self.arc_deg != 360:
             yield f"procedure.arc_deg {self.arc_deg:g} is not for thermal: leave it at 360"
         if self.finds_earth_rate:

@@ -8,8 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from rig.data.result_file import read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
 from rig.observation.windows import finished_sweeps
@@ -23,8 +25,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 PROCEDURE: dict[str, Any] = {
     "name": "thermal",
     "from_c": 25,
-    "to_c": 35,
-    "gap_k": 5,
+    "to_c": 39,
+    "gap_k": 4,
     "most_rate_k_per_min": 30,
     "reference_c": 30,
     "both_ways": False,
@@ -33,6 +35,8 @@ PROCEDURE: dict[str, Any] = {
     "acceleration_deg_s2": 400,
     "rest_s": 0.5,
 }
+SCALE, SCALE_PER_K = np.array([1.1771, 1.1554, 1.1440]), np.array([3e-4, -2e-4, 3e-4])
+BIAS_RAD_S, BIAS_PER_K = np.array([0.0077, -0.0100, -0.0051]), np.array([5e-4, -4e-4, 3e-4])
 BODY: dict[str, Any] = {"start_c": 23, "capacity_j_k": 3, "loss_w_k": 0.1, "own_w": 0.1, "heater_w": 5}
 LABORATORY: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
@@ -41,7 +45,16 @@ LABORATORY: dict[str, Any] = {
     "world": {
         "time_scale": 8,
         "thermal": BODY,
-        "sensors": {"gyro": {"noise_rad_s": 0.004, "temperature_c": 30, "bias_rad_s_per_k": [5e-4, -4e-4, 3e-4]}},
+        "sensors": {
+            "gyro": {
+                "scale": SCALE.tolist(),
+                "bias_rad_s": BIAS_RAD_S.tolist(),
+                "noise_rad_s": 0.004,
+                "temperature_c": 30,
+                "scale_per_k": SCALE_PER_K.tolist(),
+                "bias_rad_s_per_k": BIAS_PER_K.tolist(),
+            }
+        },
     },
 }
 
@@ -58,25 +71,50 @@ def thermal(folder: Path, procedure: dict[str, Any], body: dict[str, Any]) -> tu
     return ended.returncode, ended.stdout + ended.stderr, out
 
 
-def test_a_heater_takes_the_sensors_through_the_range(tmp_path: Path) -> None:
-    status, said, out = thermal(tmp_path, {}, {})
-    assert status in (0, 1), said
-    run = read_run(out / "run.h5")
+@pytest.fixture(scope="module")
+def heated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that a heater took through the range."""
+    status, said, out = thermal(tmp_path_factory.mktemp("heated"), {}, {})
+    assert status == 0, said
+    return out
+
+
+def test_a_heater_takes_the_sensors_through_the_range(heated: Path) -> None:
+    run = read_run(heated / "run.h5")
     sets = of_events(run, SetMeasured)
     temperatures = sorted(each.temperatures_c["gyro"] for each in sets)
-    assert temperatures[0] <= 26.25 and temperatures[-1] >= 33.75
-    assert max(b - a for a, b in pairwise(temperatures)) <= 5
+    assert temperatures[0] <= 26 and temperatures[-1] >= 38
+    assert max(b - a for a, b in pairwise(temperatures)) <= 4
     assert finished_sweeps(run) == set(range(6 * len(sets)))
     assert [(each.first, each.end) for each in sets] == [(6 * k, 6 * k + 6) for k in range(len(sets))]
     assert all(each.heated for each in of_events(run, TemperatureWanted))
     assert run.settings.reference_c == 30
 
 
+def test_its_result_has_what_the_world_makes_of_the_sensor(heated: Path) -> None:
+    """Twice U is allowed: chance has eighteen values to move, and each slope left out would be ten times as much."""
+    entry = read_result(heated).over_temperature["gyro"]["rate"]
+    for row in (entry.table[4], entry.table[12]):
+        warmer_k = row.temperature_c - 30
+        scale = SCALE * (1 + SCALE_PER_K * warmer_k)
+        bias = BIAS_RAD_S + BIAS_PER_K * warmer_k
+        assert (np.abs(np.array(row.scale) - scale) <= 2 * np.array(row.expanded_scale)).all(), row
+        assert (np.abs(np.array(row.bias) - bias) <= 2 * np.array(row.expanded_bias)).all(), row
+    cold, warm = (np.array(entry.at(entry.table[k].temperature_c)).ravel() for k in (4, 12))
+    apart_k = entry.table[12].temperature_c - entry.table[4].temperature_c
+    true = np.concatenate([SCALE * SCALE_PER_K, BIAS_PER_K]) * apart_k
+    powers = [(entry.table[12].temperature_c - 30) ** n - (entry.table[4].temperature_c - 30) ** n for n in range(4)]
+    rows = np.kron(np.eye(2), np.kron(powers, np.eye(3)))
+    expanded = 2 * np.sqrt(np.diag(rows @ np.array(entry.covariance) @ rows.T))
+    assert (np.abs(warm - cold - true) <= 2 * expanded).all(), (warm - cold - true, expanded)
+    assert (expanded < np.abs(true) / 4).all(), "a sensor without slopes would not be told from this one"
+
+
 @pytest.mark.parametrize(
     ("procedure", "body", "name"),
     [
         ({"heater_power": 0, "most_rate_k_per_min": 1}, {"air_c": [[0, 80]], "capacity_j_k": 60}, "too_fast"),
-        ({"heater_power": 0, "hottest_c": 35.5, "most_rate_k_per_min": 100}, {"air_c": [[0, 80]]}, "overheated"),
+        ({"heater_power": 0, "hottest_c": 39.5, "most_rate_k_per_min": 100}, {"air_c": [[0, 80]]}, "overheated"),
         ({"heater_power": 0, "patience_min": 0.2}, {}, "range_not_reached"),
         ({"repeats": 2}, {}, "range_not_reached"),
     ],
@@ -100,7 +138,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         wait_for_log(out, "to do: warm the board until it is at", timeout_s=300)
-        laboratory.control({"do": "air", "temperature_c": 37})
+        laboratory.control({"do": "air", "temperature_c": 41})
         said = run.communicate(timeout=400)[1]
     assert run.returncode in (0, 1), said
     assert not any(each.heated for each in of_events(read_run(out / "run.h5"), TemperatureWanted))
@@ -139,8 +177,10 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"to_c": 30}, "two gaps apart"),
+        ({"to_c": 36, "reference_c": 30}, "3 gaps apart"),
+        ({"to_c": 36, "both_ways": True}, "10 K and a gap apart at least: 14 K"),
         ({"reference_c": 40}, "reference_c must lie between"),
+        ({"reference_c": 26}, "half a gap from each"),
         ({"hottest_c": 34}, "hottest_c must lie above"),
         ({"to_c": 68}, "too hot for the heater"),
         ({"arc_deg": 180}, "leave it at 360"),
