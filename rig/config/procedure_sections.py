@@ -14,7 +14,6 @@ from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
 from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
-from rig.estimation.over_temperature import MIN_RANGE_C
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -35,6 +34,7 @@ Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # once round at the slowest speed
 HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
+MIN_RANGE_C = 10.0  # what polynomials need: that of rig.estimation.over_temperature
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
