@@ -9,7 +9,6 @@ import pytest
 from rig.errors import Fault
 from support.at_the_table import LIST, TRUE_SCALE, Table
 
-
 SHORT = replace(LIST, flips=8, turns=2)
 
 
