@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import os
 import subprocess
 import sys
 import time
@@ -166,7 +167,8 @@ def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tm
 @contextmanager
 def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
     command = [sys.executable, "-m", "support.beating_station", url, rig]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    found = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, env=found, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
         try:
             yield process
         finally:
