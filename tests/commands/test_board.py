@@ -42,6 +42,19 @@ def rig(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.C
     return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, stdin=stdin)
 
 
+def answered(keyboard: int, terminal: int, answer: bytes, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The command at that terminal, whose question is answered when it is asked: earlier is no answer."""
+    command = [sys.executable, "-m", "rig", "board", *map(str, arguments)]
+    with subprocess.Popen(command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stderr is not None
+        said = b""
+        while b"Type yes to" not in said and (more := os.read(process.stderr.fileno(), 4096)):
+            said += more
+        os.write(keyboard, answer)
+        out, rest = process.communicate(timeout=240)
+    return subprocess.CompletedProcess(command, process.returncode, out.decode(), (said + rest).decode())
+
+
 def result(folder: Path, **changes: Any) -> Path:
     """A result.json in a run folder, as a run leaves it; `changes` go into the entry of the sensor gyro."""
     entries = {
@@ -126,13 +139,10 @@ def test_nothing_is_changed_unless_somebody_agrees(config: Path, tmp_path: Path)
 
     keyboard, terminal = pty.openpty()
     try:
-        os.write(keyboard, b"no\n")
-        assert rig(*write, stdin=terminal).returncode == 2
-        os.write(keyboard, b"yes\n")
-        done = rig(*write, stdin=terminal)
+        assert answered(keyboard, terminal, b"no\n", *write).returncode == 2
+        done = answered(keyboard, terminal, b"yes\n", *write)
         assert done.returncode == 0 and "gyro: scale 1.17710 1.15540 1.14400" in done.stderr, done
-        os.write(keyboard, b"yes\n")
-        done = rig("calibration", "erase", config, stdin=terminal)
+        done = answered(keyboard, terminal, b"yes\n", "calibration", "erase", config)
         assert done.returncode == 0 and "erases record 1" in done.stderr, done
     finally:
         os.close(keyboard)
