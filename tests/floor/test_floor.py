@@ -111,7 +111,7 @@ def test_five_rigs_on_one_history_one_killed_one_unplugged(url: str) -> None:
     with open_history(url), ExitStack() as stack:
         stations_there = {name: stack.enter_context(beating(url, name)) for name in map(str, range(1, 6))}
         feed = stack.enter_context(looking(place(url)))
-        until(feed, lambda states: states == dict.fromkeys(stations_there, "running"), within_s=30.0)
+        until(feed, lambda states: states == dict.fromkeys(stations_there, "running"), within_s=120.0)
         stations_there["2"].kill()
         pulled = stations_there["4"].stdin
         assert pulled is not None
