@@ -2,13 +2,14 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from queue import SimpleQueue
 
 import pytest
 from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver import Chrome, Keys
 from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
 
 from rig.batch.now import Now, Present
 from rig.batch.on_page import OnPage
@@ -55,10 +56,12 @@ def typed(driver: Chrome, words: str) -> None:
     driver.switch_to.active_element.send_keys(words, Keys.ENTER)
 
 
-def go_is_dim(driver: Chrome) -> bool:
-    """Whether "go" cannot be pressed yet; a question that is just being replaced has no button that stays."""
-    with suppress(StaleElementReferenceException):
-        return not driver.find_element(By.CSS_SELECTOR, "#buttons .go").is_enabled()
+def replaced(button: WebElement) -> bool:
+    """Whether the next question has taken the place of the one that the button belongs to."""
+    try:
+        button.is_enabled()
+    except StaleElementReferenceException:
+        return True
     return False
 
 
@@ -80,9 +83,11 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         picture(driver, "station-go")
         with screen(driver, 390, 800):
             assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
+        answered_go = driver.find_element(By.CSS_SELECTOR, "#buttons .go")
         typed(driver, "go")
         assert answers.get(timeout=30) is True
-        until(lambda: go_is_dim(driver), "the next question")
+        until(lambda: replaced(answered_go), "the next question")
+        assert not driver.find_element(By.CSS_SELECTOR, "#buttons .go").is_enabled()
         driver.find_element(By.ID, "clear").click()
         driver.find_element(By.CSS_SELECTOR, "#buttons .go").click()
         assert answers.get(timeout=30) is True
