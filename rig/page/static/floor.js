@@ -1,9 +1,8 @@
 // The floor: several rigs, as a shared history tells of them. It decides nothing.
 
-import { follow } from "./stream.js";
+import { live, silent, up } from "./live.js";
 
 const $ = (id) => document.getElementById(id);
-const STALE_MS = 3000; // the server says something every second
 const shown = {};
 const WORDS = {
   waiting: "◌ waits for a part", checking: "? checks", asking: "? asks the operator", running: "◉ runs", solving: "Σ solves",
@@ -12,8 +11,6 @@ const WORDS = {
 };
 const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };
-let heard = performance.now();
-let up = false;
 
 const element = (name, text, data = {}) => {
   const made = document.createElement(name);
@@ -76,27 +73,13 @@ const SHOW = {
 };
 
 function tell() {
-  const silent = shown.history?.silent;
-  const lost = (performance.now() - heard > STALE_MS) || (!up && shown.history);
-  $("stale").hidden = !silent && !lost;
-  $("stale-words").textContent = lost ? "No news" : `The history does not answer (${silent})`;
+  const mute = shown.history?.silent;
+  const lost = silent() || (!up && shown.history);
+  $("stale").hidden = !mute && !lost;
+  $("stale-words").textContent = lost ? "No news" : `The history does not answer (${mute})`;
 }
 
-follow(
-  (name, frame) => {
-    for (const [section, content] of Object.entries(frame)) {
-      shown[section] = content;
-      SHOW[section]?.(content);
-    }
-    tell();
-  },
-  (is, why) => {
-    up = is;
-    $("link").dataset.up = is ? "yes" : "no";
-    $("link-words").textContent = is ? "connected" : why ?? "not connected";
-    tell();
-  },
-  () => { heard = performance.now(); tell(); },
-  () => false,
-);
-setInterval(tell, 500);
+live((section, content) => {
+  shown[section] = content;
+  SHOW[section]?.(content);
+}, tell, () => false);

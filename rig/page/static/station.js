@@ -1,9 +1,9 @@
 // A station: the part in hand, the tray, and the question of the moment, which a scanner or a keyboard answers.
 
-import { act, follow, token } from "./stream.js";
+import { live, silent, up } from "./live.js";
+import { act, token } from "./stream.js";
 
 const $ = (id) => document.getElementById(id);
-const STALE_MS = 3000; // the server says something every second
 const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 const STATES = {
   waiting: "◌ waits", checking: "◌ checks", asking: "? asks", running: "◉ runs", solving: "Σ solves", refused: "⊘ refused", fault: "⚠ fault",
@@ -17,8 +17,6 @@ const ANSWERS = {
   again: [["yes", "Again"], ["no", "Put it aside"]],
 };
 let asked = null;
-let heard = performance.now();
-let up = false;
 let over = false; // the batch has ended, and with it the page's server
 
 const element = (name, text, set = {}) => Object.assign(document.createElement(name), { textContent: text ?? "" }, set);
@@ -83,7 +81,7 @@ async function say(text) {
 const focus = () => { if (asked) $("said").focus(); };
 
 function tell() {
-  $("stale").hidden = over || (up && performance.now() - heard < STALE_MS);
+  $("stale").hidden = over || (up && !silent());
 }
 
 $("form").addEventListener("submit", (event) => {
@@ -102,18 +100,4 @@ $("halt").addEventListener("click", async () => {
 });
 
 const SHOW = { now, asked: ask };
-follow(
-  (name, frame) => {
-    for (const [section, content] of Object.entries(frame)) SHOW[section]?.(content);
-    tell();
-  },
-  (is, why) => {
-    up = is;
-    $("link").dataset.up = is ? "yes" : "no";
-    $("link-words").textContent = is ? "connected" : why ?? "not connected";
-    tell();
-  },
-  () => { heard = performance.now(); tell(); },
-  () => over,
-);
-setInterval(tell, 500);
+live((section, content) => SHOW[section]?.(content), tell, () => over);
