@@ -55,7 +55,7 @@ whole: $(VENV)/dev.installed
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
 proof: system $(VENV)/dev.installed
-	$(PYTEST) -m proof --proof -rP
+	$(PYTEST) -m "proof or thorough or one_in" --proof -rP
 	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(NUMERIC)
 
 lint: $(VENV)/dev.installed

@@ -4,6 +4,7 @@ import atexit
 import os
 import signal
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -35,13 +36,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """What is marked `thorough` belongs to `make proof` alone."""
+    """What `make test` has no time for is left to `make proof`: what is marked `thorough`, and of what is marked
+    `one_in(n)` all cases but the first of every n."""
     if config.getoption("--proof"):
         return
-    left_out = [item for item in items if item.get_closest_marker("thorough")]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in left_out]
+    cases = Counter[str]()
+
+    def taken(item: pytest.Item) -> bool:
+        if item.get_closest_marker("thorough"):
+            return False
+        if mark := item.get_closest_marker("one_in"):
+            function = item.nodeid.partition("[")[0]
+            cases[function] += 1
+            return (cases[function] - 1) % int(mark.args[0]) == 0
+        return True
+
+    chosen = [item for item in items if taken(item)]
+    config.hook.pytest_deselected(items=[item for item in items if item not in set(chosen)])
+    items[:] = chosen
 
 
 @pytest.fixture

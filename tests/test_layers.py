@@ -89,6 +89,7 @@ def imports_of(source: Path, known: set[str]) -> set[str]:
     return found & known
 
 
+@pytest.mark.slow
 def test_no_imports_go_round_in_a_circle() -> None:
     """Not even those inside functions or for types alone; packages themselves hold only what they say of themselves."""
     sources = {

@@ -48,6 +48,7 @@ def errors(drifts: list[BiasDrift], truth: Array) -> tuple[Array, Array]:
     return held, anew
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_accelerometer_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 6: ten attitudes of six minutes, a jump after the first repeat."""

@@ -143,6 +143,7 @@ def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it
     assert checks["controller_and_computer"].value == pytest.approx(2e4, rel=0.01)
 
 
+@pytest.mark.slow
 def test_every_recording_of_a_run_is_held_against_its_computer_and_the_worst_is_told() -> None:
     whole = recorded(FAST, 1.0, REAL)
     assert named(calibrated([whole]).checks)["controller_and_computer"].passed

@@ -156,6 +156,7 @@ def first_of_its_kind(name: str) -> bool:
     return name == next(each for each, (names, _) in DAMAGES.items() if names == DAMAGES[name][0])
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(
@@ -222,6 +223,7 @@ def test_recordings_of_before_there_was_a_site_are_judged_as_they_were() -> None
     assert judged(old_run)[0] == () and disturbed_sweeps([old_run]) == frozenset()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("rest_s", "repeats", "without"),

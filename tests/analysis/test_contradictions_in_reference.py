@@ -116,18 +116,21 @@ def named(folder: str, sensor: str, damage: Damage, prefix: str) -> set[str]:
     return {*told.refused, *(name.removeprefix(prefix) for name in told.failed if name.startswith(prefix))}
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("name", all_or_first(DAMAGES))
 def test_what_is_damaged_of_an_accelerometer_is_named(name: str) -> None:
     names, damage = DAMAGES[name]
     assert named(IMU, "gyro", damage, "acceleration_") & set(names)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", all_or_first(FIELD_DAMAGES))
 def test_what_is_damaged_of_a_magnetometer_is_named(name: str) -> None:
     names, damage = FIELD_DAMAGES[name]
     assert named(COMPASS, "compass", damage, "field_") & set(names)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("folder", UNDAMAGED)
 def test_a_recording_as_it_was_made_contradicts_nothing(folder: str) -> None:
     assert told_of(recorded(folder)).failed == set()
@@ -161,6 +164,7 @@ def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:
     assert "gyro.acceleration_bias_changed" not in names and "gyro.acceleration_scale_changed" in names
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("folder", "sensor", "axis", "at_m_s2"),
     [(IMU, "gyro", 0, 0.0), (IMU, "gyro", 2, -9.8), (COMPASS, "lsm9ds1", 1, 3.0), (KVH, "kvh", 2, 3.0)],

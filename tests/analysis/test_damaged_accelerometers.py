@@ -70,6 +70,7 @@ def test_what_is_just_not_told_is_within_the_uncertainty(part: str, name: str) -
     assert passed <= most
 
 
+@pytest.mark.one_in(11)
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize(
     ("name", "size"),

@@ -25,6 +25,7 @@ def solved(setup: Setup) -> SensorResult:
     return calibrated([synthetic_run(setup)]).results["gyro"]
 
 
+@pytest.mark.slow
 def test_a_part_that_cannot_find_it_is_calibrated_as_without() -> None:
     result, plain = solved(FIND), solved(SETUP)
     assert isinstance(result.earth, Fault) and plain.earth is None

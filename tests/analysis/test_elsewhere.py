@@ -58,6 +58,7 @@ def kept(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return example, folder
 
 
+@pytest.mark.thorough
 def test_the_folder_holds_a_certificate_with_its_clauses(kept: tuple[Example, Path]) -> None:
     example, folder = kept
     certificate = certificate_of(read_result(folder / "run"), Stated())
@@ -73,6 +74,7 @@ def test_the_folder_holds_a_certificate_with_its_clauses(kept: tuple[Example, Pa
     assert "No metrological traceability is claimed" in " ".join(page.under["7.8.4.1c"].split())
 
 
+@pytest.mark.thorough
 def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Path]) -> None:
     example, folder = kept
     for kind in example.kinds.values():
@@ -110,6 +112,7 @@ def test_the_history_has_an_entry_of_each_sensor(
     assert all(f'"{quantity}"' in said for quantity in example.kinds) and "K-7" in said
 
 
+@pytest.mark.thorough
 def test_the_notebook_and_rig_solve_find_the_same_numbers(
     kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,6 +142,7 @@ def test_it_is_exported_or_refused_by_name(
     assert told or f"rig: {why}: " in capsys.readouterr().err
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("command", "error"),
     [
@@ -227,6 +231,7 @@ DAMAGE: dict[str, Callable[[h5py.File], None]] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("what", DAMAGE)
 def test_a_file_that_is_not_whole_is_refused(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(sweeps("--out", str(tmp_path / "run"))) == 0

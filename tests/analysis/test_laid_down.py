@@ -39,6 +39,7 @@ def off(found: dict[str, Any], laid: Laid) -> Array:
     return np.asarray(2 * (np.concatenate([found["scale"], found["bias_m_s2"]]) - truth) / expanded(found))
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("box", BOXES.values(), ids=BOXES)

@@ -42,6 +42,7 @@ def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
         sys.setprofile(before)
 
 
+@pytest.mark.slow
 def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
     with calls(ArmMotion.__init__, estimate_time_base, observe_sensor, solve_vector_model) as counted:
@@ -57,6 +58,7 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     assert outcome.results is calibration.results
 
 
+@pytest.mark.slow
 def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> None:
     (recording,) = calibrated([recorded("run.h5")]).recordings
     late, none = recording.delay("gyro", behind="reference"), recording.delay("gyro", behind="gyro")
@@ -70,12 +72,14 @@ def test_a_recording_without_sweeps_is_refused_by_name() -> None:
         calibrated([replace(recorded("run.h5"), events=())])
 
 
+@pytest.mark.slow
 def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:
     with calls(observe_sensor) as counted, pytest.raises(Refused, match="unknown_estimator"):
         calibrated([recorded("run.h5")], estimator="newtun")
     assert not counted
 
 
+@pytest.mark.slow
 def test_stored_calibrations_are_verified_alone() -> None:
     repeated = [recorded("verify.h5")]
     outcome = verified_alone(repeated)
@@ -84,6 +88,7 @@ def test_stored_calibrations_are_verified_alone() -> None:
     assert outcome.provenance.verified_utc == (repeated[0].provenance.started_utc,)
 
 
+@pytest.mark.slow
 def test_a_verification_that_was_not_recorded_has_not_passed() -> None:
     outcome = verified(calibrated([recorded("run.h5")]), [])
     assert not outcome.passed and not outcome.verifications

@@ -53,6 +53,7 @@ def bias_off(setup: Setup, reckoning: int = 2) -> tuple[Array, Array]:
     return np.abs(result.bias_rad_s - setup.bias_rad_s), stated(result).expanded[3:]
 
 
+@pytest.mark.thorough
 def test_a_scale_found_about_oblique_axes_is_that_at_the_speed_of_the_sweeps() -> None:
     assert scale_off(ODD).max() < 1
     assert scale_off(ODD, reckoning=1).max() > 1.1
@@ -75,6 +76,7 @@ def test_the_budget_names_what_the_data_sheet_says() -> None:
     }
 
 
+@pytest.mark.thorough
 def test_several_speeds_find_the_nonlinearity_whatever_the_data_sheet_says() -> None:
     several = replace(ODD, procedure=(("speeds_deg_s", "[30, 60, 120]"),))
     assert "nonlinearity" not in {each.name for each in stated(solved(several)).contributors}

@@ -74,6 +74,7 @@ def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_eithe
     assert (more[0] > more[1]).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)

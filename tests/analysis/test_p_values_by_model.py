@@ -62,6 +62,7 @@ def held_to_be_uniform(found: Seen, of: str) -> None:
     assert all(each <= most for each in often.values()), (of, often)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)

@@ -28,6 +28,7 @@ def until(run: RunData, sweeps: int) -> RunData:
     return replace(run, events=run.events[: ends[sweeps - 1] + 1])
 
 
+@pytest.mark.slow
 def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     for sweeps in range(1, 7):
         found = so_far([until(run, sweeps)])["gyro"]

@@ -128,6 +128,7 @@ def test_the_stated_uncertainty_covers_the_truth(
     check([session(seed) for seed in range(seeds)], within, without)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])

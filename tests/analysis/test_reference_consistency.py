@@ -66,6 +66,7 @@ def read_of(movement: Movement, axes: int, axis_rad: float) -> Read:
     return Read(theta, movement, arm_patterns(theta, movement, stood(axes), known), times_s, second_order=False)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("axes", "density_ug"), [(6, 150.0), (6, 23.0), (0, 150.0)])
@@ -145,6 +146,7 @@ def _off(error: int, size_rad: float) -> Poses:
     return poses
 
 
+@pytest.mark.slow
 def test_a_turn_of_one_dwell_is_named_however_far_off_the_arm_is() -> None:
     rng = np.random.default_rng(3)
     movement = moved(drawn(rng), crooked_arm(5e-4, rng), 150.0, rng)

@@ -43,6 +43,7 @@ def outcome(warmed: RunData) -> Outcome:
     return calibrated([warmed])
 
 
+@pytest.mark.slow
 def test_the_calibration_is_that_of_the_reference_temperature(outcome: Outcome) -> None:
     result, budget = outcome.results["gyro"], outcome.results["gyro"].uncertainty
     assert budget is not None

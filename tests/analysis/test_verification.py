@@ -133,6 +133,7 @@ def before(scale: tuple[float, ...], bias_rad_s: tuple[float, ...]) -> Array:
     return found.movement.mse_rad2_s2
 
 
+@pytest.mark.thorough
 def test_the_error_before_is_what_scale_and_bias_make_it() -> None:
     for scale, bias_rad_s in ((SCALE, (0.0077, -0.0100, -0.0051)), MPU9250):
         np.testing.assert_allclose(before(scale, bias_rad_s), by_hand(scale, bias_rad_s), rtol=0.02)

@@ -25,6 +25,7 @@ def shaken(run: RunData, hertz: tuple[float, ...], rms_rad_s: float) -> RunData:
     return replace(run, samples={"gyro": samples})
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("hertz", [(11.87, 23.74), (17.5, 16.7)])
 def test_a_vibration_and_another_of_twice_its_frequency_or_nearly_the_same_fail_nothing(

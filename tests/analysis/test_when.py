@@ -56,6 +56,7 @@ def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_at)
 
 
+@pytest.mark.slow
 def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
     run = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
     result = calibrated([warming(run)])

@@ -44,6 +44,7 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
     assert "A. Person" in (out / "batch.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_after_a_kill_the_same_command_goes_on_with_the_part_in_hand(tmp_path: Path) -> None:
     config, out = configuration(tmp_path), tmp_path / "batch"
     command: list[str | Path] = ["station", config, "--series", series(tmp_path, "G-001", "G-002"), "--out", out]

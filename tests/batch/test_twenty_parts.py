@@ -70,6 +70,7 @@ def without_processor_s(process: int) -> float:
     return int(waited_ns) * 1e-9
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(1800)
 def test_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path, thorough: bool) -> None:
     """One number twice, one board that is not plugged in, one sweep that is disturbed."""

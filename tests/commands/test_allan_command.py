@@ -37,6 +37,7 @@ def write(run: RunData, path: Path) -> None:
     lay_out(path, Contents(SCHEMA, texts, described, run.samples, run.states, events), swmr=False)
 
 
+@pytest.mark.slow
 def test_people_see_random_walk_and_why_there_is_no_bias_instability(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -89,6 +90,7 @@ def still() -> dict[str, np.ndarray]:
     return {"time_s": time_s, **named, **{f"{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}}
 
 
+@pytest.mark.slow
 def test_a_log_made_elsewhere_tells_the_noise_of_its_sensors(
     still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -138,6 +140,7 @@ def test_the_still_part_of_a_recording_by_hand_has_a_curve(tmp_path: Path, capsy
     assert len(json.loads(capsys.readouterr().out)["sensors"]["held"]["rate"]["tau_s"]) > 5
 
 
+@pytest.mark.slow
 def test_what_rig_record_wrote_of_several_sensors_is_taken_as_it_lies(
     still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

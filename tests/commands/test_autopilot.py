@@ -98,6 +98,7 @@ def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
         assert rig_here("autopilot", "restore", config, kept, "--yes").returncode == 0 and fields(wire) == before
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(900)
 def test_killed_at_any_moment_the_set_is_old_or_new_or_said_to_be_a_mixture(thorough: bool, tmp_path: Path) -> None:

@@ -253,6 +253,7 @@ def test_check_names_what_a_verification_lacks(config: Path) -> None:
     ]
 
 
+@pytest.mark.thorough
 def test_a_laboratory_of_its_own_is_started_for_the_command(world: World, tmp_path: Path) -> None:
     handle = world()
     handle.stop()
@@ -277,6 +278,7 @@ def test_other_firmware_than_the_shipped_is_refused_with_the_remedy() -> None:
     assert "0.1.0" in refusal.value.what and FIRMWARE_VERSION in refusal.value.what
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("part", "board_part", "who_am_i", "name", "words"),
     [

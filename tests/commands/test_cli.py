@@ -26,6 +26,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [f"{PLAN} | head -1", f"{PLAN} >&-", f"{PLAN} >&- 2>&- <&-", f"{PLAN} --json | true"]
 )
@@ -34,12 +35,14 @@ def test_a_reader_that_is_not_there_is_no_error(command: str) -> None:
     assert done.returncode == 0 and done.stderr == "", done
 
 
+@pytest.mark.slow
 def test_results_that_cannot_be_written_are_a_named_error() -> None:
     done = shell(f"{PLAN} > /dev/full")
     assert done.returncode == 3
     assert done.stderr.startswith("rig: system: ") and "No space left" in done.stderr and done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
     done = shell(PLAN, PYTHONIOENCODING="ascii")
     assert done.returncode == 0 and "sweep wrist_3 cw" in done.stdout, done.stderr
@@ -66,6 +69,7 @@ def test_on_a_terminal_there_is_a_sign_of_life_at_once() -> None:
     os.close(operator)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_narrow_terminal_gets_every_step() -> None:
     done = shell(PLAN, COLUMNS="60")
@@ -73,6 +77,7 @@ def test_a_narrow_terminal_gets_every_step() -> None:
     assert json.loads(shell(f"{PLAN} --json").stdout) and done.stdout.count("sweep") >= 6
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() -> None:
     imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
@@ -89,6 +94,7 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
     assert told["another reading in one dwell"]["size"] < 0.004
 
 
+@pytest.mark.slow
 def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
     imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
     done = shell(f"{imu} --set 'procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]'")
@@ -162,6 +168,7 @@ def test_a_plan_says_what_its_checks_will_tell() -> None:
     assert all(each["size"] < told[each["what"]]["size"] for each in twice if "half-way" in each["what"])
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
     plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"
@@ -172,6 +179,7 @@ def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
 THREADS = "import os, numpy; numpy.ones((900, 900)) @ numpy.ones((900, 900)); print(len(os.listdir('/proc/self/task')))"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif((os.cpu_count() or 1) < 2 or not Path("/proc/self/task").exists(), reason="needs two cores, Linux")
 def test_the_rigs_linear_algebra_runs_on_one_thread_unless_told_otherwise() -> None:
     # Whoever imported rig.cli into this process has told its children as well.

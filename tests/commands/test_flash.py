@@ -181,6 +181,7 @@ def test_another_drive_is_refused_by_name_before_anybody_is_asked(tmp_path: Path
     assert list((tmp_path / "stick").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_nobody_to_ask_is_a_refusal_and_yes_is_an_answer(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     done = rig_board_flash("--drive", str(nucleo))

@@ -41,6 +41,7 @@ def test_a_small_number_is_a_number() -> None:
     assert any(step.duration_s == 1e-5 for step in rests)
 
 
+@pytest.mark.slow
 def test_a_certificate_and_an_export_are_written_and_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +82,7 @@ except rig.Refused as error:
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_nothing_moves_from_python_when_nobody_agrees(world: World, tmp_path: Path) -> None:
     handle = world()

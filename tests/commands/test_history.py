@@ -47,6 +47,7 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: str | Path, status: int
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     bad = Path(place).parent / "bad"
     bad.mkdir()
@@ -68,6 +69,7 @@ def test_a_recording_without_a_result_is_solved_on_request(place: str, capsys: p
     assert not (folder / "result.json").exists()
 
 
+@pytest.mark.slow
 def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path(place).parent / "run"
     shutil.copytree(FIXTURES / "verified", folder)
@@ -146,6 +148,7 @@ def test_a_configuration_names_the_history(year: str, capsys: pytest.CaptureFixt
     assert "12" in told(capsys, "show", "12", "--history", config)
 
 
+@pytest.mark.slow
 def test_a_certificate_is_remembered_with_who_ran_the_rig(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     """That of the run when it is entered, amended ones when they are made; one of a simulated laboratory says so."""
     folder = Path(place).parent / "run"

@@ -71,6 +71,7 @@ def test_seven_verdicts_change_by_another_limit_and_no_file_does(history: Histor
     assert "0 changed, 0 missing" in rig_here("history", "verify").stdout
 
 
+@pytest.mark.slow
 def test_moved_missing_and_damaged_are_named_counted_and_gone_on_with(history: History, tmp_path: Path) -> None:
     same = keep(history, tmp_path / "same")
     moved = keep(history, tmp_path / "moved", change=shifted)
@@ -111,6 +112,7 @@ def test_workers_of_a_cluster_give_the_same_numbers_as_one_by_one(history: Histo
     assert noted[0] == noted[1] and len(noted[0]) == 4
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_is_named_and_a_second_call_goes_on(history: History, tmp_path: Path) -> None:
     for i in range(5):
@@ -132,6 +134,7 @@ def test_a_scheduler_that_is_killed_is_named_and_a_second_call_goes_on(history: 
     assert f"{solved} of 5 are solved" in done.stderr and "5 results: 5 solved" in done.stdout and done.returncode == 0
 
 
+@pytest.mark.slow
 def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history: History, tmp_path: Path) -> None:
     keep(history, tmp_path / "run")
     done = rig_here("history", "again", "--estimator", "newton", "--of-u", "0.01")

@@ -46,6 +46,7 @@ def folder_that_names(url: str, folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_nothing_connects_to_a_history_that_a_folder_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "mine.sqlite"))
     with heard() as (port, server):
@@ -71,6 +72,7 @@ def test_no_file_that_a_folder_names_becomes_a_history(tmp_path: Path, monkeypat
     assert (tmp_path / "theirs.sqlite").read_bytes() == b"" and not (tmp_path / "share").exists()
 
 
+@pytest.mark.slow
 def test_a_certificate_is_noted_in_the_history_that_the_command_names(tmp_path: Path) -> None:
     mine = str(tmp_path / "mine.sqlite")
     folder = folder_that_names("postgresql://rig@192.0.2.1/theirs", tmp_path / "sent")
@@ -104,6 +106,7 @@ def test_a_run_waits_at_most_five_seconds_for_a_server_that_says_nothing(monkeyp
     assert isinstance(event, NotRemembered) and "has not answered within" in event.why
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_database_that_freezes_in_an_entry_costs_five_seconds_and_no_end_of_a_process(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path

@@ -92,6 +92,7 @@ def test_a_result_that_its_recording_does_not_give_is_known_by_what_differs(
     assert named in "; ".join(not_given(read_result(folder), given))
 
 
+@pytest.mark.slow
 def test_what_the_recording_gives_is_entered_and_a_claim_is_refused(folder: Path) -> None:
     stated = read_result(folder).sensors["gyro"]
     claims(folder, scale)
@@ -110,6 +111,7 @@ def test_a_result_alone_is_a_claim_and_is_refused(folder: Path) -> None:
     assert imported.returncode == 1 and "no_recording" in imported.stderr and runs(folder) == 0
 
 
+@pytest.mark.slow
 def test_a_certificate_with_other_numbers_and_its_number_left_is_not_entered(folder: Path) -> None:
     assert rig_here("report", folder).returncode == 0
     page = folder / "certificate.html"

@@ -62,11 +62,13 @@ def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], pla
     assert loaded("history", *words) == ([], [])
 
 
+@pytest.mark.slow
 def test_a_report_is_written_without_them(place: Path) -> None:
     run = shutil.copytree(FIXTURES / "calibration", place / "run")
     assert loaded("report", run) == ([], [])
 
 
+@pytest.mark.slow
 def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None:
     first, last = loaded("plan", DEMO)
     assert first == [] and set(last) <= {"scipy"}  # for how small a disturbance its checks can notice

@@ -38,6 +38,7 @@ def run_with(links: Sequence[str], tmp_path: Path) -> tuple[int, str, list[Path]
     return process.returncode, errors, targets
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_replaces_what_is_laid_where_it_writes(tmp_path: Path) -> None:
     links = [*WRITTEN, *(f"{name}.part" for name in (*WRITTEN, "run.h5"))]
@@ -47,6 +48,7 @@ def test_a_run_replaces_what_is_laid_where_it_writes(tmp_path: Path) -> None:
     assert not any((tmp_path / "run" / name).is_symlink() for name in WRITTEN)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_does_not_begin_where_its_client_would_write_through_a_link(tmp_path: Path) -> None:
     status, errors, (target,) = run_with(["arm_client.log"], tmp_path)
@@ -76,6 +78,7 @@ def test_a_command_writes_through_no_link(run: Path, name: str, command: Sequenc
     assert done.returncode == 0 or "rig: not_written_through: " in done.stderr, done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_folder_may_be_named_by_a_link_of_one_s_own(run: Path) -> None:
     (run.parent / "latest").symlink_to(run)
     assert rig_here("report", run.parent / "latest").returncode == 0

@@ -44,6 +44,7 @@ def attitudes(states: list[ArmState]) -> str:
     return "\n".join([COLUMNS, *(",".join(f"{value:.9f}" for value in row) for row in rows.tolist())]) + "\n"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,6 +114,7 @@ def test_who_turns_the_sensors_needs_to_know_the_arm(tmp_path: Path) -> None:
     assert simulated.returncode == 2 and "arm: missing" in simulated.stderr, simulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("crystal", [True, False], ids=["crystal", "none"])
 def test_a_boards_times_are_those_of_its_crystal_or_it_says_so(crystal: bool, tmp_path: Path) -> None:
     board = f"world.board={{crystal: {str(crystal).lower()}, crystal_ppm: 0}}"

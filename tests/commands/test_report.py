@@ -132,6 +132,7 @@ def test_the_pdf_holds_every_value_and_its_data(run: Path, tmp_path: Path) -> No
     assert 'pdfaid:part="3" pdfaid:conformance="B"' in metadata
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_pdf_of_a_laboratory_in_no_country_says_what_is_not_attached(run: Path) -> None:
     (run / "config.yaml").unlink()

@@ -30,6 +30,7 @@ def expanded(found: dict[str, Any]) -> Any:
     return 2 * np.sqrt(np.diag(found["covariance_combined"]))[:3]
 
 
+@pytest.mark.slow
 def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recorded = handle(TWELVE, 1)
     samples, folder = write(tmp_path / "samples.csv", recorded), tmp_path / "run"
@@ -49,6 +50,7 @@ def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest
     assert "by hand: 13 rests, 12 flips, 0 turns" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_what_nothing_shows_must_be_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples = write(tmp_path / "samples.csv", handle(TWELVE, 1), level=False)
     assert "clock_unknown" in refused(capsys, samples, "--turns")
@@ -70,6 +72,7 @@ def test_a_real_session_tells_its_own_accuracy(tmp_path: Path, capsys: pytest.Ca
     assert {rest["face"] for rest in by_hand["rests"]} == {"+x", "-x", "+y", "-y", "+z", "-z"}
 
 
+@pytest.mark.slow
 def test_halves_of_a_real_session_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An MPU-9150 laid down in attitudes that nobody knows, and often held in the hand."""
     log = np.loadtxt(unpacked("mikoff", "imu0.log", tmp_path))

@@ -17,6 +17,7 @@ NAMES = (*(f"before {i}" for i in range(3)), DEADLY, *(f"after {i}" for i in ran
 TASKS = [task(name) for name in NAMES]
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_costs_its_recording_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")  # as the command line says it
     with Processes(2) as hands:
@@ -35,6 +36,7 @@ def test_a_defect_at_one_recording_costs_no_other_here() -> None:
     assert all(isinstance(each, Given) for each in answers.values()) and len(answers) == len(NAMES) - 1
 
 
+@pytest.mark.slow
 def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_costs_no_other(tmp_path: Path) -> None:
     with local_cluster(n_workers=2, processes=True) as cluster, client_of(cluster.scheduler_address) as client:
         tasks = [*(task(name) for name in NAMES if name != DEADLY), task(f"{WAITING} 1", tmp_path)]

@@ -98,6 +98,7 @@ def names_of(said: str) -> list[str]:
     return [problem["name"] for each in json.loads(said)["files"] for problem in each["problems"]]
 
 
+@pytest.mark.slow
 def test_what_was_signed_is_whole_and_says_who_when_and_that_it_is_simulated(lab: Laboratory) -> None:
     status, said = verified(lab, PDF, XML, RESULT, PAGE)
     assert (status, names_of(said)) == (0, []), said
@@ -405,6 +406,7 @@ def test_keys_come_from_files_under_a_passphrase_of_the_environment(
     assert verified(lab, XML, history=False, trust=False)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_key_in_a_token_signs_both(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -468,6 +470,7 @@ def test_a_certificate_is_trusted_itself_or_by_its_authority_while_it_is_valid()
     assert untrusted([own, root], [other], now) and untrusted([root], [root], now) == ""
 
 
+@pytest.mark.slow
 def test_a_time_server_that_gives_none_leaves_out_the_pdf_alone(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

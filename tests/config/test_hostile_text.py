@@ -229,6 +229,7 @@ def test_thousands_of_errors_are_counted_and_the_first_are_told() -> None:
     assert "2003 errors" in message and message.endswith("more")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["plan"], ["check"], ["run", "--yes"], ["world"]])
 def test_the_commands_refuse_with_status_2_and_no_traceback(words: list[str]) -> None:
     command = [sys.executable, "-m", "rig", *words, str(DEMO), "--set", "arm.host=[", "--set", f"arm.host={'x' * 64}"]

@@ -45,6 +45,7 @@ def simulated() -> list[tuple[str, str, dict[str, Any]]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_serial_number_has_one_truth_in_all_configurations() -> None:
     first: dict[str, tuple[str, dict[str, Any]]] = {}
     differs = []

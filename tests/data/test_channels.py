@@ -58,6 +58,7 @@ def recorded(run: RunData, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("barometer", [BAROMETER, IN_COUNTS], ids=["in pascals", "in counts"])
 def test_a_scalar_comes_back_as_it_was_recorded_and_is_no_gyroscope(barometer: RecordedSensor, tmp_path: Path) -> None:
     run = beside_a_gyroscope(barometer)

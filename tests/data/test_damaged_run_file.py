@@ -99,6 +99,7 @@ def test_a_recording_whose_reading_does_not_end_is_given_up(recording: Path) -> 
     assert time.monotonic() - begun < 10
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
 def test_a_sound_recording_is_read_however_little_of_a_processor_there_is() -> None:
     before = os.sched_getaffinity(0)
@@ -269,6 +270,7 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_file_of_another_shape_is_refused_with_what_is_wrong(recording: Path, shape: str) -> None:
     change, complaint = SHAPES[shape]

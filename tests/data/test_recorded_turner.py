@@ -54,6 +54,7 @@ def test_states_of_any_number_of_joints_come_back(joints: int, tmp_path: Path) -
         assert run.states.dtype.names == ("time_s", "host_time_s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"])
 def test_what_more_a_state_tells_has_the_type_that_its_turner_says(kind: Any, tmp_path: Path) -> None:
     described = turner(2, (StateField("current_a", kind),))
@@ -102,6 +103,7 @@ def text(value: object) -> Callable[[h5py.File], None]:
 NINE = [f"axis {number}" for number in range(9)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -26,6 +26,7 @@ def test_the_committed_schema_is_that_of_the_model() -> None:
     assert committed == schema_text(), "again: python -m rig.data.result_file > docs/result.schema.json"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_results_satisfy_the_committed_schema(name: str) -> None:
     schema = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))

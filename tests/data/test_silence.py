@@ -86,6 +86,7 @@ def test_ticks_in_which_the_process_waited_for_a_processor_do_not_count_for_ever
         assert silence.lasts_over(10 // SPARED - 1), "however busy the machine, there is an end"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
 def test_a_main_thread_that_hangs_is_silent_though_another_thread_waits_for_a_processor() -> None:
     """Like a driver whose client spins in a thread of its own: that says nothing for the thread that is waited for."""

@@ -12,6 +12,7 @@ from support.paths import ROOT
 WITH_HELP = sorted(path for path in (ROOT / "benchmarks").glob("*.py") if "argparse" in path.read_text("utf-8"))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("benchmark", WITH_HELP, ids=lambda path: path.stem)
 def test_a_benchmark_says_what_it_can(benchmark: Path, tmp_path: Path) -> None:

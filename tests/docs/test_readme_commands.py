@@ -59,6 +59,7 @@ def test_every_command_of_a_block_is_run_somewhere() -> None:
         assert "/" not in place or (ROOT / place).exists(), f"{place} is not there"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [*PLANNED, *ON_A_RUN])
 def test_what_needs_no_arm_works_as_shown(command: str, run_folder: Path, tmp_path: Path) -> None:
     places = {"RUN": str(run_folder), "OUT": str(tmp_path / "out")}
@@ -68,6 +69,7 @@ def test_what_needs_no_arm_works_as_shown(command: str, run_folder: Path, tmp_pa
     assert done.stdout
 
 
+@pytest.mark.slow
 def test_the_notebook_s_lines_work_as_shown(run_folder: Path) -> None:
     (shown,) = blocks("python")
     text = re.sub(r'"runs/[^"]*"', repr(str(run_folder)), shown)

@@ -25,6 +25,7 @@ def raised() -> dict[str, list[Raised]]:
     return found
 
 
+@pytest.mark.slow
 def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
     hidden = [each.place for each in raised_in_source() if each.name is None]
     assert not hidden, f"write the names out, or nobody finds them: {', '.join(hidden)}"

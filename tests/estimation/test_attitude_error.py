@@ -89,6 +89,7 @@ def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOIN
     return Errors(rms[0], rms[1], rms[2], rms[3], np.array(found))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("arm", "std", "better"),
     [

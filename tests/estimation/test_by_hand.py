@@ -79,6 +79,7 @@ def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     assert (found.budget.expanded[:3] > 9e-4).all(), "no hand's recording supports less"
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("session", SESSIONS.values(), ids=SESSIONS)
@@ -103,6 +104,8 @@ def test_uncertainties_are_those_of_many_sessions(
         assert within > (0.93 if thorough else 0.77)
 
 
+@pytest.mark.slow
+@pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", MISTAKES)
@@ -113,6 +116,7 @@ def test_a_mistake_is_named_or_within_the_uncertainty(kind: str, thorough: bool)
     assert {each for each in found if each is not None} <= names, found
 
 
+@pytest.mark.slow
 def test_a_range_that_is_too_small_is_named() -> None:
     small = replace(LSM9DS1, range_rad_s=float(np.radians(120)))
     assert refused(handle(SESSION, 1, small)) == "clipping"
@@ -125,6 +129,7 @@ def test_readings_of_other_axes_and_units_are_named() -> None:
     assert refused(replace(recorded, rates=np.degrees(recorded.rates))) == "wrong_unit"
 
 
+@pytest.mark.slow
 def test_a_face_that_was_not_the_first_is_named() -> None:
     recorded = handle(TWELVE, 2)
     assert refused(recorded, level=False, told=replace(TOLD, first_face="+x")) == "wrong_face"
@@ -137,6 +142,7 @@ def test_too_little_is_named() -> None:
     assert refused(handle(held, 3, rest_s=0.0)) == "held_not_laid_down"
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     recorded = handle(TWELVE, 4)
     usual, slow = (solved(replace(recorded, time_s=recorded.time_s * by)) for by in (1.0, 1 + 50e-6))
@@ -144,6 +150,7 @@ def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     assert slow.chi_square == pytest.approx(usual.chi_square, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = Turn(1, Mistake("short", 5.0))
     recorded = handle((*TWELVE[:9], Turn(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)

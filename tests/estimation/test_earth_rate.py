@@ -162,6 +162,7 @@ def test_with_a_latitude_and_a_sensitivity_it_is_as_good_as_stated() -> None:
     assert 0.75 < rms(each / std) < 1.3
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("part", [MPU9250, LSM9DS1])

@@ -55,6 +55,7 @@ def drawn(axes: Array, matrix: Array, count: int) -> tuple[float, float, float]:
     return rms, float(np.abs(ratios).max()), 1e6 * off_ppm
 
 
+@pytest.mark.slow
 def test_of_a_sensor_along_the_axes_the_square_is_all_there_is() -> None:
     """What the first order says of one whose axes seem square is nothing: errors were eight times their uncertainty."""
     rms, largest, off_ppm = drawn(np.eye(3)[:, None], np.eye(3), 60)
@@ -63,6 +64,7 @@ def test_of_a_sensor_along_the_axes_the_square_is_all_there_is() -> None:
     assert largest < 3
 
 
+@pytest.mark.slow
 def test_of_a_sensor_askew_both_orders_count() -> None:
     askew = np.diag([0.95, 1.0, 1.05]) @ rotation_by(np.radians([3.0, -2.0, 4.0]))
     rms, largest, _ = drawn(np.eye(3)[:, None], askew, 60)

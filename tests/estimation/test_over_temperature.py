@@ -48,12 +48,14 @@ def covered(sensors: int, **planted: float) -> tuple[float, float]:
     return float(np.mean(np.abs(over_expanded) <= 1)), float(np.sqrt(np.mean(over_u**2)))
 
 
+@pytest.mark.slow
 def test_u_covers_the_truth_at_five_temperatures() -> None:
     share, rms = covered(6)
 
     assert share > 0.88 and 0.7 < rms < 1.25
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(600)
 def test_u_covers_the_truth_of_forty_sensors() -> None:
@@ -63,6 +65,7 @@ def test_u_covers_the_truth_of_forty_sensors() -> None:
     assert 0.93 <= share <= 0.975
 
 
+@pytest.mark.slow
 def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
     before, after, u = [], [], []
     for seed in range(4):

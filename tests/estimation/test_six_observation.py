@@ -169,6 +169,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(repeats: int, bias: Arr
     assert np.all(np.abs(errors.mean(axis=0)) < 4 * std / np.sqrt(len(errors)))
 
 
+@pytest.mark.slow
 def test_speeds_known_badly_make_the_scale_uncertain() -> None:
     rng = np.random.default_rng(6)
     means, speeds = sweeps()

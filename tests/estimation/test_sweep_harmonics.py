@@ -103,6 +103,7 @@ def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> N
     assert 0.7 < np.mean(squares) < 1.4
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize(("part", "density_ug"), [("MPU-9250", 300.0), ("ADIS16465", 23.0), ("LSM9DS1", 150.0)])
 def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, density_ug: float) -> None:

@@ -133,6 +133,7 @@ def gravity_seen() -> Array:
     return 9.80665 * directions
 
 
+@pytest.mark.slow
 def test_gravity_gives_the_g_sensitivity_with_its_covariance() -> None:
     gravity = gravity_seen()
     means = readings() + gravity @ SENSITIVITY.T

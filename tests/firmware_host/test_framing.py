@@ -203,6 +203,7 @@ def test_a_flipped_bit_costs_at_most_the_frame_it_is_in_and_never_makes_a_wrong_
     assert reader.damaged == receiver.damaged >= 1
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("faults", [2500, 50_000])
 def test_a_damaged_line_costs_what_it_touched_and_every_loss_is_counted(faults: int) -> None:

@@ -106,6 +106,7 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         yield found
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_five_rigs_on_one_history_one_killed_one_unplugged(url: str) -> None:
     with open_history(url), ExitStack() as stack:

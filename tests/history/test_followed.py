@@ -38,6 +38,7 @@ def entered(tmp_path: Path) -> Path:
     return history
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_sensor_whose_drift_is_followed_is_listed_and_drawn(
     entered: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

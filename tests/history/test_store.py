@@ -323,6 +323,7 @@ def test_a_limit_stands_beside_its_parameter_whatever_its_check_is_called(histor
     assert (found.parameters["kx"].max_deviation, found.parameters["bx"].max_deviation) == (0.005, None)
 
 
+@pytest.mark.slow
 def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(history: History) -> None:
     """Two sensors watch rig A, whose clock jumps by 300 ppm; B calibrates them too, 40 ppm off."""
     scatter = [((7 * i) % 11 - 5) * 8e-6 for i in range(24)]

@@ -96,6 +96,7 @@ def test_root_installs_what_is_missing_and_says_what(checkout: Path) -> None:
     assert updated == "update -qq" and " gcc-arm-none-eabi " in installed
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_newer_python_gets_an_older_one_beside_it_from_a_mirror(checkout: Path) -> None:
     newer_python(checkout)

@@ -49,6 +49,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home
 
 
+@pytest.mark.thorough
 def test_the_demonstration_runs_from_the_wheel_and_finds_the_truth(installed: Path, tmp_path: Path) -> None:
     where = [str(installed / "bin" / "python"), "-P", "-c", "import rig; print(rig.__file__)"]
     assert subprocess.run(where, capture_output=True, text=True, check=True).stdout.startswith(str(installed))

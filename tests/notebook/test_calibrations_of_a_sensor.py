@@ -58,6 +58,7 @@ def test_changes_between_two_results_are_those_of_the_command_line(
     assert "beyond U" in rig.changes(before, now)._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_run_is_solved_to_be_compared() -> None:
     run, result = rig.load(FIXTURES / "verified"), rig.load_result(FIXTURES / "verified")
     same = rig.changes(result, run)

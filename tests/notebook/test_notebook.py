@@ -25,6 +25,7 @@ def result(run: rig.Run) -> rig.Result:
     return rig.solve(run)
 
 
+@pytest.mark.slow
 def test_importing_it_loads_no_arm_driver_and_nothing_heavy() -> None:
     program = (
         "import sys, rig; before = set(sys.modules); rig.solve, rig.load, rig.compare\n"
@@ -35,6 +36,7 @@ def test_importing_it_loads_no_arm_driver_and_nothing_heavy() -> None:
     assert done.stdout.split() == ["[]", "[]"]
 
 
+@pytest.mark.slow
 def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
     time_s, rate_rad_s = run["gyro"].on_arm_clock()
     assert time_s.shape == (len(run["gyro"].samples),)

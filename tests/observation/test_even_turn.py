@@ -20,6 +20,7 @@ def drawn() -> Drawn:
     return drawn_servo(7)
 
 
+@pytest.mark.slow
 def test_the_time_of_a_turn_is_known_to_a_few_hundred_thousandths(drawn: Drawn) -> None:
     for run in drawn.runs:
         motion = motion_of(run)
@@ -29,6 +30,7 @@ def test_the_time_of_a_turn_is_known_to_a_few_hundred_thousandths(drawn: Drawn) 
             assert np.abs(turn.axis_flange @ np.array(run.settings.mount)[:, 2]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
     """The drive turns by 2π where its encoder says so, a servo's time between: T by the truth is what is found."""
     drawn = drawn_servo(8)

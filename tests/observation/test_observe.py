@@ -73,6 +73,7 @@ def clock_errors(setup: Setup, clock: TimeBase) -> tuple[float, float]:
     return clock.offset_s - (setup.boot_s + setup.drift * clock.reference_s), clock.drift - setup.drift
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "setup",
@@ -162,6 +163,7 @@ def test_every_sweep_becomes_one_whole_revolution() -> None:
         assert observation.lost == 0
 
 
+@pytest.mark.slow
 def test_vibration_is_no_noise_and_averages_out() -> None:
     """5 % of ripple is 0.05 rad/s, more than the sensor's noise; neither the variance nor the mean may show it."""
     setup = Setup(noise_rad_s=0.0, mounting_error_rad=(0.0, 0.0, 0.0))
@@ -553,6 +555,7 @@ def part(run: RunData, sweeps: range) -> RunData:
     )
 
 
+@pytest.mark.slow
 def test_a_sensor_without_noise_is_known_to_a_part_of_a_count() -> None:
     """Rounding does not average out when nothing carries the reading across counts, and the uncertainty says so."""
     for vibration in (0.0, 0.05):

@@ -96,6 +96,7 @@ def test_half_requests_end_no_run(start: Start, tmp_path: Path) -> None:
     assert "verdict: PASS" in stdout and "[Errno" not in running.told()
 
 
+@pytest.mark.thorough
 def test_the_stop_button_works_while_half_requests_are_held(
     start: Start, laboratory: WorldHandle, tmp_path: Path
 ) -> None:
@@ -111,6 +112,7 @@ def test_the_stop_button_works_while_half_requests_are_held(
         assert running.process.wait(60) == 130, running.told()
 
 
+@pytest.mark.thorough
 def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
     start: Start, laboratory: WorldHandle, tmp_path: Path
 ) -> None:
@@ -123,6 +125,7 @@ def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
     assert "the controller says that its program has ended" in running.told()
 
 
+@pytest.mark.thorough
 def test_a_run_whose_pages_helper_is_killed_ends_with_its_verdict(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
     wait_for_log(running.out, "sweep")

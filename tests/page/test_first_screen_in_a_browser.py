@@ -161,6 +161,7 @@ def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: 
         assert wide(driver) == []
 
 
+@pytest.mark.thorough
 def test_an_oblique_turn_is_held_against_the_part_of_it_that_an_axis_feels(driver: Chrome, tmp_path: Path) -> None:
     """0.727 rad/s of 1.047 is what an axis reads that lies 46° off; their ratio of 0.69 looked like a fault."""
     seen = look(planned(), 1)

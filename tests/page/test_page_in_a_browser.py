@@ -87,6 +87,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     assert resumed.returncode in (0, 1) and "verdict:" in resumed.stdout, resumed.stderr
 
 
+@pytest.mark.thorough
 def test_a_run_goes_on_to_its_verdict_while_browsers_stall_and_is_replayed(
     driver: Chrome, tmp_path: Path, page: Any
 ) -> None:

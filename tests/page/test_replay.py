@@ -32,6 +32,7 @@ def replayed(run: RunData) -> list[Moment]:
     return list(moments(run))
 
 
+@pytest.mark.slow
 def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert isinstance(replayed[0].event, PhaseStarted)
     assert all(one.at_s <= other.at_s for one, other in pairwise(replayed))

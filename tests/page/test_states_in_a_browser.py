@@ -167,6 +167,7 @@ def test_a_line_that_is_lost_makes_all_of_it_old(driver: Chrome, tmp_path: Path)
     assert all("ERR_CONNECTION_REFUSED" in entry for entry in severe(driver))
 
 
+@pytest.mark.thorough
 def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so(
     driver: Chrome, tmp_path: Path
 ) -> None:

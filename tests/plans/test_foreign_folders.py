@@ -45,6 +45,7 @@ def solved_in_a_notebook(folder: Path) -> None:
     assert public.solve(public.load(folder))["gyro"].scale[0] > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "read",
     [
@@ -66,6 +67,7 @@ def test_nothing_that_reads_a_run_executes_its_script(
     assert not (tmp_path / "trace").exists()
 
 
+@pytest.mark.slow
 def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path) -> None:
     done, before = rig_here("solve", foreign, "--json"), rig_here("solve", FIXTURES / "calibration", "--json")
     assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr and before.stderr == ""
@@ -73,6 +75,7 @@ def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path
     assert numbers["scale"] == expected["scale"]
 
 
+@pytest.mark.slow
 def test_a_script_that_the_user_names_is_executed(foreign: Path, tmp_path: Path) -> None:
     done = rig_here("solve", foreign, "--script", foreign / "script.py")
     assert done.returncode == 0 and done.stderr == "" and (tmp_path / "trace").exists()
@@ -164,6 +167,7 @@ def test_a_name_that_is_no_sensors_names_no_file(foreign: Path, tmp_path: Path, 
     assert refused.returncode == 2 and "rig: not_a_result: " in refused.stderr and {*tmp_path.rglob("*")} == before
 
 
+@pytest.mark.slow
 def test_a_recording_that_unpacks_without_end_is_refused_before_it_does(foreign: Path) -> None:
     with h5py.File(foreign / "run.h5", "r+") as file:
         rows = file["samples/gyro"]
@@ -178,6 +182,7 @@ def test_a_recording_that_unpacks_without_end_is_refused_before_it_does(foreign:
     assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "unpacks" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_recording_of_sensors_that_are_announced_alone_is_refused(foreign: Path) -> None:
     with h5py.File(foreign / "run.h5", "r+") as file:
         rows = file["samples/gyro"]
@@ -188,6 +193,7 @@ def test_a_recording_of_sensors_that_are_announced_alone_is_refused(foreign: Pat
     assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "unpack" in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "SEEK_DATA"), reason="holes are not told apart here")
 def test_a_recording_full_of_holes_is_refused(foreign: Path) -> None:
     with h5py.File(foreign / "run.h5", "r+") as file:

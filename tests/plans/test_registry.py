@@ -91,6 +91,7 @@ def test_the_kept_script_is_the_file_the_procedure_came_from() -> None:
     assert kept.name == "verify.py" and "PROCEDURE = Procedure(" in kept.text and len(kept.sha256) == 64
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: Path) -> None:
     own, config = tmp_path / "own.py", tmp_path / "hardware.yaml"

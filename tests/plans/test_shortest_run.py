@@ -148,6 +148,7 @@ def predicted_of(of: Run) -> Reached:
     return Reached.by(budgets)
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 def test_what_is_predicted_is_reached(thorough: bool) -> None:
@@ -179,6 +180,7 @@ def demo() -> RigConfig:
     return load(CONFIGS / "demo.yaml", (), sections(installed()), turners.sections()).config
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize("wanted", [Wanted(1.3e-4, 6e-5), Wanted(1.15e-4, 3e-5), Wanted(bias_rad_s=2.5e-5)])
@@ -201,6 +203,7 @@ def coarse(each: Candidate) -> bool:
     return each.family[0] == 3 and each.family[1] in (60.0, 120.0) and repeats in (1, 2, 3, 4) and rest_s <= 10
 
 
+@pytest.mark.slow
 def test_more_than_the_rest_is_chosen() -> None:
     """By the scale factors the speed is found, by the biases repeats or rests."""
     config = demo()
@@ -211,6 +214,7 @@ def test_more_than_the_rest_is_chosen() -> None:
     assert quick.best.reached.scale <= 1.3e-4
 
 
+@pytest.mark.slow
 def test_what_no_run_reaches_is_told_from_what_takes_too_long() -> None:
     never = shortest_run(demo(), Wanted(scale=1e-6))
     assert never.best is None and never.cannot_be_had and never.nearest is not None
@@ -250,6 +254,7 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], dict[str, Budget]]:
     return predict
 
 
+@pytest.mark.slow
 def test_arcs_are_tried_where_the_encoders_are_known() -> None:
     known = load(CONFIGS / "demo.yaml", ["uncertainty.angle_std_deg=0.01"], sections(installed()), turners.sections())
     arcs = {each.sizes[0] for each in tried(known.config).candidates()}
@@ -263,6 +268,7 @@ def test_a_procedure_that_is_not_predicted_is_refused() -> None:
         shortest_run(config, Wanted(scale=1e-3))
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_configuration_that_plans_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "short.yaml"
     words = ["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=1.3e-4", "--at-most", "90"]
@@ -275,6 +281,7 @@ def test_the_command_writes_a_configuration_that_plans_so(tmp_path: Path, capsys
     assert "configuration_not_written" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "hand.yaml"
     words = ["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=1.2e-3", "--write", str(written)]

@@ -54,6 +54,7 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
     assert document["verdict"] == "fail"
 
 
+@pytest.mark.slow
 def test_a_reference_has_no_solution_of_the_board() -> None:
     found = calibrated([read_run(FIXTURES / "verified" / "run.h5")])
     sensors = json.loads(document_of(found).text())["sensors"]
@@ -68,6 +69,7 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
         entry(CheckEntry, object(), name="gyro.scale", value=None, limit=None, unit="1")
 
 
+@pytest.mark.slow
 def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
     document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
     assert document.provenance.arm_kinematics is not None

@@ -166,6 +166,7 @@ def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFi
     assert "Choose one of: gyro, reference" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.CaptureFixture[str]) -> None:
     again = ["solve", str(FIXTURES / "verified")]
     assert main(again) == 0

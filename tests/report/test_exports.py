@@ -233,6 +233,7 @@ def test_names_stay_apart_where_blanks_are_not_taken() -> None:
     assert plain_names(["my gyro", "my-gyro", "2nd"]) == {"my gyro": "my_gyro", "my-gyro": "my_gyro_", "2nd": "s_2nd"}
 
 
+@pytest.mark.slow
 def test_csv_solves_to_the_same_calibration(
     recordings: tuple[ObservedRun, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -266,6 +267,7 @@ def test_parquet_and_matlab_hold_the_readings(recordings: tuple[ObservedRun, ...
     np.testing.assert_array_equal(struct["time_s"], stream.time_s)
 
 
+@pytest.mark.slow
 def test_a_ros_2_bag_holds_the_readings(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
@@ -321,6 +323,7 @@ def test_accelerations_are_exported_beside_the_rates(recordings: tuple[ObservedR
     assert message.linear_acceleration_covariance[0] == 0  # nothing stood still in attitudes: not known
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_by_the_command_line(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,6 +83,7 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     assert rows[0]["sensor"] == "imu, inclinometer" and rows[0]["unit"] == "mrad" and len(rows[0]["bias"]) == 2
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed: dict[str, str]) -> None:
     run = str(tmp_path / "run")
@@ -96,6 +97,7 @@ def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed:
     assert done.returncode == 2 and "not_a_run_file" in done.stderr, done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_inclinometer_on_the_arm_is_solved_from_the_dwells(tmp_path: Path, installed: dict[str, str]) -> None:
     """Beside a gyroscope and its accelerometer, as a source with a channel of its own would record it."""

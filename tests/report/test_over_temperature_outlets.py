@@ -48,6 +48,7 @@ def entry(result: ResultDocument) -> OverTemperatureEntry:
     return result.over_temperature["imu"]["rate"]
 
 
+@pytest.mark.slow
 def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     warmed: tuple[Path, Drawn], result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:

@@ -66,6 +66,7 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
     assert attitude_residuals(FIELD, field).of == OF_ATTITUDES
 
 
+@pytest.mark.slow
 def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so() -> None:
     document = document_of(judged(open_run(RECORDINGS / "rig.settings-6" / "magnetometer"), DEFAULT_ESTIMATOR))
     (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
@@ -125,6 +126,7 @@ def filled(document: ResultDocument) -> list[float]:
     return parts
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["imu", "verified", "bias_drift", "everything"])
 def test_no_sheet_but_the_last_is_left_half_empty(kind: str) -> None:

@@ -35,6 +35,7 @@ def test_every_axis_turns_both_ways_through_more_than_a_whole_turn_at_an_even_ra
         assert abs(angles[-1]) < 1e-9 and math.isclose(max(abs(rates)), 60)
 
 
+@pytest.mark.slow
 def test_the_command_prints_it_as_csv() -> None:
     done = rig("plan", DEMO, "--table")
     assert done.returncode == 0, done.stderr

@@ -10,6 +10,7 @@ import pytest
 from support.paths import FIXTURES
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_matplotlibrc_in_the_working_folder_changes_nothing(tmp_path: Path) -> None:
     drawn = []

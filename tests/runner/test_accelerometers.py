@@ -91,6 +91,7 @@ def over_std(result: dict[str, Any], world: dict[str, Any]) -> np.ndarray:
     return np.asarray((np.array(found["scale"] + found["bias_m_s2"]) - truth) / np.sqrt(np.diag(found["covariance"])))
 
 
+@pytest.mark.thorough
 def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> None:
     out, result, world, printed = in_attitudes
     assert np.abs(over_std(result, world)).max() < 4
@@ -221,6 +222,7 @@ def saturated(counts: np.ndarray) -> np.ndarray:
     return clipped
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("damage", "name"),
     [
@@ -243,6 +245,7 @@ def test_a_recording_that_is_wrong_is_refused_by_name(in_attitudes: Finished, da
     assert re.fullmatch(name, refused.value.name), refused.value
 
 
+@pytest.mark.thorough
 def test_a_board_that_goes_on_swinging_is_not_measured(tmp_path: Path) -> None:
     swings = {"world": {"arm": {"settling_rad": 2e-3, "settling_hz": 10, "settling_decay_s": 10}}}
     config = configuration(tmp_path, merge(LABORATORY, swings), {**ATTITUDES, "settle_s": 1})
@@ -251,6 +254,7 @@ def test_a_board_that_goes_on_swinging_is_not_measured(tmp_path: Path) -> None:
     assert "times as much as at rest" in done.stderr
 
 
+@pytest.mark.thorough
 def test_a_turned_tool_frame_is_refused_before_attitudes(tmp_path: Path) -> None:
     turned = {"world": {"arm": {"tcp_rotation_deg": [0, 0, 45]}}}
     config = configuration(tmp_path, merge(LABORATORY, turned), ATTITUDES)

@@ -62,6 +62,7 @@ def test_what_a_run_found_is_stored_corrects_and_is_undone_in_the_next(tmp_path:
     assert (np.abs(error) < 4 * std).all(), "the new offsets are undone as the old ones were"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_armed_autopilot_is_refused_before_anything_moves(tmp_path: Path) -> None:
     config = configuration(tmp_path, {"world": {"sensors": {"imu1": {"autopilot": {"armed": True}}}}})

@@ -37,6 +37,7 @@ def held(run: Path) -> None:
     assert np.all(np.abs(np.subtract(entry["scale"], truth["scale"])) < expanded), entry["scale"]
 
 
+@pytest.mark.thorough
 def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(tmp_path: Path) -> None:
     path, out = config(tmp_path, world={"seed": 11, "hand": {"mistakes": {"short": 0.5}}}), tmp_path / "run"
     done = rig("run", path, "--out", out, "--set", "procedure.flips=8", timeout_s=270)

@@ -30,6 +30,7 @@ def test_a_controllers_clock_that_the_boards_crystal_contradicts_fails_and_says_
     assert provenance["board_follows_crystal"] is True
 
 
+@pytest.mark.thorough
 def test_a_board_without_its_crystal_says_so_and_contradicts_nobody(tmp_path: Path) -> None:
     status, clocks, provenance = finished(tmp_path, {"board": {"crystal": False, "crystal_ppm": 9000}})
     assert status == 0 and clocks == {}

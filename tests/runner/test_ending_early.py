@@ -67,6 +67,7 @@ def test_no_motion_begins_where_the_arm_does_not_stand(keys: dict[str, object]) 
         assert np.allclose(here, plan.home_q_rad)
 
 
+@pytest.mark.slow
 def test_what_is_recorded_so_far_says_what_is_reached() -> None:
     whole = synthetic_run(Setup(noise_rad_s=0.002, repeats=2))
     found = reached_so_far([whole], "vector")

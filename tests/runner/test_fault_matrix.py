@@ -21,6 +21,7 @@ PROOF = [pytest.mark.proof, pytest.mark.thorough]
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", FEW)
 def test_a_fault_in_a_sweep(name: str, tmp_path: Path) -> None:
     cell = carry_out(

@@ -19,6 +19,7 @@ def held(table: Table) -> None:
     assert np.all(off < 1.5), (off, table.again)
 
 
+@pytest.mark.slow
 def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     table = Table(seed=3)
     table.sit()
@@ -28,6 +29,7 @@ def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
     held(table)
 
 
+@pytest.mark.slow
 def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     short = Table(seed=4, settings=replace(LIST, wanted_scale_u=2e-3))
     short.sit()
@@ -35,6 +37,7 @@ def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     assert float(max(short.solution.expanded_scale)) <= 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mistakes", "names"),
     [
@@ -51,6 +54,7 @@ def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, 
     held(table)
 
 
+@pytest.mark.thorough
 def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
     table = Table(seed=6, mistakes={"held": 0.2}, settings=SHORT)
     table.sit()
@@ -58,6 +62,7 @@ def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
     held(table)
 
 
+@pytest.mark.slow
 def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> None:
     table = Table(seed=5, mistakes={"crumb": 0.2}, settings=SHORT)
     table.sit()
@@ -65,6 +70,7 @@ def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> 
     held(table)
 
 
+@pytest.mark.slow
 def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
     table = Table(seed=7, mistakes={"wrong_face": 0.2}, settings=SHORT)
     table.sit()
@@ -72,6 +78,7 @@ def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
     held(table)
 
 
+@pytest.mark.slow
 def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
     with pytest.raises(Fault) as ended:
         Table(seed=8, mistakes={"too_fast": 1.0}).sit()

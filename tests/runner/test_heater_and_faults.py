@@ -55,6 +55,7 @@ def off_after_s(here: Bench) -> float:
     return float(now_s - began_s)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=PROOF) for name in BY_NAME if name not in FEW)])
 def test_no_fault_leaves_the_heater_on(name: str, tmp_path: Path) -> None:
     fault, folder = BY_NAME[name], tmp_path / "cell"

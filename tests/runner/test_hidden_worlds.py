@@ -48,6 +48,7 @@ def test_what_so_many_values_allow_is_what_is_asked_or_what_chance_makes_of_it(
     assert not asked_of(180).kept(1.2, 0.95) and not asked_of(180).kept(1.0, 0.99)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_what_is_stated_in_a_hidden_world_is_as_far_off_as_it_may_be(tmp_path: Path) -> None:
     recorded("quiet", first_seed("quiet"), tmp_path / "quiet")

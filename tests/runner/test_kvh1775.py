@@ -101,6 +101,7 @@ def test_beside_a_board_whose_reference_verifies_it(tmp_path: Path) -> None:
     assert recorded["kvh"].mode == "calibrated" and recorded["reference"].mode == "raw"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_its_magnetometer_is_calibrated_in_format_c(tmp_path: Path) -> None:
     nine = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90], [-45, -90, -90]]
@@ -193,6 +194,7 @@ def earth_run(folder: Path, changes: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_axes_that_somebody_left_refuse_the_run_before_anything_moves(tmp_path: Path) -> None:
     axes = {"world": {"sensors": {"kvh": {"kvh1775": {"settings": {"AXES": "0,1,0,1,0,0,0,0,1"}}}}}}
@@ -201,6 +203,7 @@ def test_axes_that_somebody_left_refuse_the_run_before_anything_moves(tmp_path: 
     assert "pre-flight" not in done.stderr, "nothing has moved"
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_check_and_info_say_what_is_there(tmp_path: Path) -> None:
     left = {"world": {"sensors": {"kvh": {"kvh1775": {"settings": {"FILTTYPE,G": "CUSTOM"}, "serial_number": "9"}}}}}

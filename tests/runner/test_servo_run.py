@@ -20,6 +20,7 @@ def asked(**request: object) -> Act:
     return lambda seen: (seen.control(request), None)[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> None:
     config, out = configured(tmp_path), tmp_path / "run"

@@ -44,6 +44,7 @@ def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> N
     assert "Stage 2 of 2: turn the board by 90° about wrist 3" in log
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_an_instruction_that_was_not_followed_ends_the_run_before_a_sweep(tmp_path: Path) -> None:
     """The board stays as it was: no accelerometer tells, so a small turn does, about the first axis that differs."""
@@ -65,6 +66,7 @@ def test_an_accelerometer_refuses_it_before_anything_has_moved(tmp_path: Path) -
     assert "points up" in done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_that_was_interrupted_in_its_second_stage_goes_on_there(tmp_path: Path) -> None:
     out = tmp_path / "run"
@@ -83,6 +85,7 @@ def test_a_run_that_was_interrupted_in_its_second_stage_goes_on_there(tmp_path: 
     assert "stage 1 of 2" not in resumed.stderr.lower()
 
 
+@pytest.mark.slow
 def test_yes_cannot_say_that_the_item_is_mounted(tmp_path: Path) -> None:
     """Hands are at the item when it is mounted, so a person says that they are away; nothing is connected before."""
     config = hardware(configuration(tmp_path, {"procedure": {"stages": STAGES}}), tmp_path)

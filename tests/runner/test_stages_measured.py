@@ -104,6 +104,7 @@ def test_a_board_put_on_90_degrees_wrong_is_refused_before_it_is_swept(tmp_path:
         assert swept(tmp_path / str(seed), "run.h5") == 0, seed
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(5400)

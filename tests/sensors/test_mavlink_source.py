@@ -85,6 +85,7 @@ def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str)
     assert np.diff(samples["board_time_us"].astype(np.int64)).mean() == pytest.approx(1e4, rel=0.02)
 
 
+@pytest.mark.slow
 def test_three_imus_at_one_port_are_read_at_once() -> None:
     left = {"INS_GYR2OFFS_Y": 0.5, "INS_GYR3OFFS_Y": -0.5}
     imus = {"a": "SCALED_IMU", "b": "SCALED_IMU2", "c": "SCALED_IMU3"}
@@ -109,6 +110,7 @@ def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> Non
     assert np.rint(np.diff(samples["board_time_us"].astype(float)) / 1e4).tolist() == np.diff(numbers).tolist()
 
 
+@pytest.mark.slow
 def test_milliseconds_that_begin_anew_go_on() -> None:
     with (
         autopilot_on_a_wire(on_for_s=2**32 / 1000 - 4.0) as wire,
@@ -143,6 +145,7 @@ def test_px4_readings_that_no_estimator_touches_are_taken_beside_one() -> None:
         Listening({"imu": section(wire.port, "SCALED_IMU")}).__exit__()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "changes", "name"),
     [

@@ -99,6 +99,7 @@ def test_calibration_takes_the_error_out_of_the_swing() -> None:
         assert abs(found("sine", f"mean error of {axis} after calibration")) < 0.1 * before
 
 
+@pytest.mark.thorough
 def test_every_estimator_reaches_its_bound() -> None:
     ratios = [finding.value for finding in report("estimators").findings if finding.quantity.startswith("MSE/bound")]
     assert len(ratios) >= 10
@@ -196,6 +197,7 @@ def test_the_command_lists_studies_and_refuses_unknown_ones(capsys: pytest.Captu
     assert "Choose one of normal" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_the_command_prints_findings_and_shows_no_bar_off_a_terminal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -60,6 +60,7 @@ def ran(environment: dict[str, str], *command: str, status: int = 0) -> str:
     return done.stdout + (done.stderr if status else "")
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_its_states_come_back_as_it_told_them(recorded: Path, installed: dict[str, str]) -> None:
     described, shapes = ran(installed, "-c", READ, str(recorded / "run.h5")).splitlines()
@@ -86,6 +87,7 @@ def test_its_recording_is_solved_shown_and_exported(recorded: Path, installed: d
     assert len([row for row in turns if not row.endswith(",0")]) == 2
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, installed: dict[str, str]) -> None:
     config = str(recorded / "config.yaml")

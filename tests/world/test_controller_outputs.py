@@ -235,6 +235,7 @@ def test_at_rest_the_joints_bear_the_slope_of_the_potential_energy() -> None:
     assert not value(one, "target_moment").any()
 
 
+@pytest.mark.slow
 def test_moments_are_those_that_carry_the_masses_along() -> None:
     """Over a move from rest to rest their work is the potential energy that was gained."""
     one = laboratory("world.arm.vibration_fraction=0")

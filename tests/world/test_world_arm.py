@@ -160,6 +160,7 @@ def test_moves_in_tool_space_as_ur_rtdes_own_tests_make_them(home: Arm) -> None:
     wait_for(lambda: receive.getActualTCPPose() == pytest.approx(start, abs=1e-4), "the end of the path")
 
 
+@pytest.mark.thorough
 def test_with_a_turned_tool_frame_poses_are_the_tools(world: World) -> None:
     running = world({"world": {"arm": {"tcp_rotation_deg": [0.0, 0.0, 90.0]}}})
     with control_of(running) as control, reports_of(running) as receive:
@@ -180,6 +181,7 @@ def test_with_a_turned_tool_frame_poses_are_the_tools(world: World) -> None:
         wait_for(lambda: receive.getActualTCPPose() == pytest.approx(up, abs=1e-4), "the pose")
 
 
+@pytest.mark.thorough
 def test_the_tool_is_steered_as_the_joints_are(home: Arm) -> None:
     control, receive = home.control, home.receive
     tilted = [0.0, -1.5, 1.5, -1.5, -1.2, 0.3]

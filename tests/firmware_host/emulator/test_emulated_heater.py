@@ -111,6 +111,7 @@ def test_the_heater_goes_off_by_itself(happens: Callable[[int], None]) -> None:
     happens(2)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("happens", [killed, overheated, reset], ids=lambda happens: str(happens.__name__))
 def test_the_heater_goes_off_by_itself_in_20_of_20(happens: Callable[[int], None]) -> None:

@@ -43,6 +43,7 @@ def error(frame: Frame) -> str:
     return ERRORS[frame.values["code"]].name
 
 
+@pytest.mark.slow
 def test_all_sensors_stream_each_at_its_own_pace_without_a_loss() -> None:
     session = streaming()
     setups = {part: session.sensors[part] for part in ALL}
@@ -125,6 +126,7 @@ def test_a_part_that_is_not_there_is_told_from_another(part: str, fault: Fault, 
     session.configure(part)
 
 
+@pytest.mark.slow
 def test_damaged_data_are_found_by_their_checksum() -> None:
     session = streaming()
     right = samples(session.run(0.3), 2)["counts"][-1]

@@ -71,6 +71,7 @@ def test_flicker_makes_a_floor_of_the_allan_deviation() -> None:
         assert allan_deviation(rates, 0.1, time_s) == pytest.approx(1e-5, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_random_walk_grows_with_the_root_of_time() -> None:
     """Allan deviation of a rate random walk q: q √(τ / 3)."""
     rates = drift(GyroTruth(random_walk_rad_s_per_sqrt_s=3e-5), 7200.0, 0.1)

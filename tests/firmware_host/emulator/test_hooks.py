@@ -137,6 +137,7 @@ def bytes_by_tick(parts: Sequence[str], duration_s: float) -> list[bytes]:
     return sent
 
 
+@pytest.mark.slow
 def test_machine_code_gives_the_bytes_of_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = bytes_by_tick(list(PARTS), 0.2)
     monkeypatch.setattr("firmware_host.emulator.machine.Engine", PlainEngine)

@@ -26,6 +26,7 @@ def board() -> HostBoard:
 # What holds for every part
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", range(3))
 @pytest.mark.parametrize("range_g", [-1.0, 16.5, math.nan, math.inf])
 def test_a_range_of_accelerations_the_part_does_not_have_is_refused(

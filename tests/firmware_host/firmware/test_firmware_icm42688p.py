@@ -123,6 +123,7 @@ def test_it_has_100_ms_to_start_up_and_settle(board: HostBoard, rate_hz: float, 
     assert (first.values["sequence"], int(first.items["counts"][0][0])) == (0, settling)
 
 
+@pytest.mark.slow
 def test_a_conversion_in_the_middle_of_a_reading_is_no_sample(monkeypatch: pytest.MonkeyPatch) -> None:
     """The model tears what is being read, and another part delays the readings; what comes through is whole."""
     counting = iter(range(1, 10**6))

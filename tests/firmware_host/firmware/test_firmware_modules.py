@@ -66,6 +66,7 @@ def test_no_module_of_the_core_includes_what_includes_it() -> None:
     assert circle(needs) == []
 
 
+@pytest.mark.slow
 def test_no_module_of_the_core_calls_what_calls_it(objects: list[Path]) -> None:
     needs = called(objects)
     assert {"setups", "calibrating", "stored", "acquisition"} <= needs["board"]

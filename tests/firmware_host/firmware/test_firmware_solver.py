@@ -113,6 +113,7 @@ def differences(board: BoardSolution, host: Solution) -> tuple[float, float]:
     )
 
 
+@pytest.mark.thorough
 def test_the_closed_form_agrees_with_double_precision_also_where_algorithm_1_diverges() -> None:
     rng = np.random.default_rng(20261121)
     found = []
@@ -134,6 +135,7 @@ def test_the_closed_form_agrees_with_double_precision_also_where_algorithm_1_div
     assert scale[mild].max() < SCALE_AGREEMENT / 40 and bias[mild].max() < BIAS_AGREEMENT_RAD_S / 8
 
 
+@pytest.mark.thorough
 def test_algorithm_1_agrees_with_double_precision_or_says_that_it_does_not_converge() -> None:
     rng = np.random.default_rng(7)
     solved = diverged = 0

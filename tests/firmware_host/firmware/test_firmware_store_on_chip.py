@@ -106,6 +106,7 @@ def test_an_erased_calibration_is_gone_for_good(written: FlashMemory) -> None:
     assert stored(boot(session.flash)) is None
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("torn", [False, True])
 @pytest.mark.parametrize("operation", range(1, WRITE_OPERATIONS + 1))
 def test_power_that_fails_at_any_operation_of_a_write_leaves_the_old_calibration(
@@ -138,6 +139,7 @@ def test_power_that_fails_in_an_erase_leaves_the_newest_calibration_or_none(
     assert stored(boot(session.flash)) == (None if (operation, torn) == (2, True) else 2)
 
 
+@pytest.mark.thorough
 def test_power_that_fails_at_any_moment_of_a_write_leaves_the_old_calibration_or_the_new(
     written: FlashMemory,
 ) -> None:

@@ -229,6 +229,7 @@ def test_answers_there_is_no_room_for_are_counted_and_the_question_can_be_asked_
     assert report.values["tx_overruns"] == 100 - len(answered) > 0
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(
     st.lists(st.tuples(st.integers(1, 90), st.integers(1, 3), st.booleans(), st.booleans()), min_size=1, max_size=20)

@@ -86,6 +86,7 @@ class AtSpeed:
             self._act()
 
 
+@pytest.mark.thorough
 @both
 def test_a_look_moves_nothing_and_stops_no_program(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as other:
@@ -169,6 +170,7 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
     assert turned_rad / (inside[-1].time_s - inside[0].time_s) == pytest.approx(-sweep.speed_rad_s, rel=0.01)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(
     ("name", "order"),
     [
@@ -235,6 +237,7 @@ def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laborator
     wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
+@pytest.mark.one_in(3)
 @both
 @pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
 def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_second(
@@ -282,6 +285,7 @@ def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(labo
         soon(lambda: stands(laboratory), "rest", 1.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("where", ["move", "rest"])
 def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: WorldHandle, where: str) -> None:
     with Arm(laboratory.host) as arm:
@@ -424,6 +428,7 @@ def test_a_program_that_takes_no_more_states_is_noticed(world: World, monkeypatc
             stuck.set()
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root takes a processor away, on Linux")
 def test_a_controller_on_this_machine_that_gets_no_processor_is_no_lost_link(
@@ -452,6 +457,7 @@ def test_a_controller_on_this_machine_that_gets_no_processor_is_no_lost_link(
     assert held_s > TICK_S * (FROZEN_TICKS + 1), "it was not held up"
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
 def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_link(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
@@ -508,6 +514,7 @@ def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
         assert stands(laboratory)
 
 
+@pytest.mark.thorough
 def test_a_controller_that_is_gone_altogether_is_said_honestly(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
@@ -557,6 +564,7 @@ def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laborat
         assert fault.value.name == "program_stopped"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "orders"),
     [
@@ -632,6 +640,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.one_in(6)
 @pytest.mark.parametrize(
     ("laboratory", "kind"),
     [

@@ -47,6 +47,7 @@ def untouched(laboratory: WorldHandle) -> bool:
     return not state["messages"] and state["still_since_s"] == 0 and state["claims"] == []
 
 
+@pytest.mark.slow
 def test_a_ur10e_is_what_was_meant_and_says_what_it_can_do(seen: ArmReport) -> None:
     assert identity_problems(ARM, seen) == []
     assert seen.version == (5, 14, 0, 0) and seen.called == "UR10"
@@ -88,6 +89,7 @@ def refusal(host: str) -> Problem:
     return problem
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "name", "words"),
@@ -115,6 +117,7 @@ def test_a_look_tells_any_other_arm_by_name(world: World, arm: Mapping[str, Any]
     assert problem.name == name and words in problem.what, problem
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_plan_is_held_against_the_controllers_limits_where_they_are_narrower(world: World, tmp_path: Path) -> None:
     narrow = {
@@ -131,6 +134,7 @@ def test_a_plan_is_held_against_the_controllers_limits_where_they_are_narrower(w
     assert untouched(laboratory)
 
 
+@pytest.mark.slow
 def test_an_arm_that_cannot_be_told_is_not_moved(world: World, seen: ArmReport) -> None:
     closed = look(world({"world": {"arm": {"primary": False}}}).host)
     assert closed.setup is None and closed.kinematics is None

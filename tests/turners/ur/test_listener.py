@@ -14,6 +14,7 @@ from support.worlds import World, fresh_host
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
 
 
+@pytest.mark.slow
 def test_a_simulated_controller_is_found(world: World) -> None:
     laboratory = world()
     assert listener(IPv4Address(laboratory.host), PORT) == laboratory.process.pid

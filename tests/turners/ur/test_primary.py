@@ -117,6 +117,7 @@ def test_what_is_no_primary_interface_is_an_error_of_the_link() -> None:
         read_account(HOST, 5.0)
 
 
+@pytest.mark.slow
 def test_a_look_tells_the_geometry_of_the_simulated_arm(world: World) -> None:
     told = look(world({}).host)
     assert told.kinematics is not None

@@ -79,6 +79,7 @@ def test_errors_have_the_manual_s_numbers() -> None:
         assert packets.clearMultiTurn(port, 1) == (0, 0)
 
 
+@pytest.mark.slow
 def test_sync_read_is_answered_by_one_after_the_other() -> None:
     with client(ServoTruth(left=FAST), ServoTruth(left=FAST | {"ID": 2}, start_deg=90.0)) as (port, packets, _):
         group = dynamixel_sdk.GroupSyncRead(port, packets, 132, 4)
@@ -90,6 +91,7 @@ def test_sync_read_is_answered_by_one_after_the_other() -> None:
         assert (result, found) == (0, {1: [1020, 48], 2: [1020, 48]})
 
 
+@pytest.mark.slow
 def test_two_with_one_id_spoil_each_other_s_answers() -> None:
     with client(ServoTruth(left=FAST), ServoTruth(left=FAST, start_deg=200.0)) as (port, packets, _):
         results = [packets.readTxRx(port, 1, 120, 27)[1] for _ in range(5)]
