@@ -20,15 +20,19 @@ STUDIES := normal extreme speed convergence sine averaging estimators misalignme
 .PHONY: demo all-extras system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
 .DELETE_ON_ERROR:
 
+# Every test starts processes, thousands in all: what Python compiled for one it keeps for the next, also where a container
+# says that it should not.
+unexport PYTHONDONTWRITEBYTECODE
+
 demo: $(VENV)/demo.installed
 	$(BIN)/rig run configs/demo.yaml
 	@echo "make all-extras installs what else the commands can use: pictures, PDF, parquet, ROS 2, shared history, debug probe" >&2
 
 all-extras: $(VENV)/all.installed
 
-# Tests run two at a time: every simulated laboratory has a loopback address of its own. As many threads as that for linear
-# algebra would only be in each other's way.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
+# Tests run three at a time on two processors, as a third of their time is waiting for a laboratory: every simulated one has
+# a loopback address of its own. As many threads for linear algebra would only be in each other's way.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
 # of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011.
@@ -45,10 +49,15 @@ check: system $(VENV)/dev.installed
 test: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint whole
 
+# What a test file is rewritten to for its assertions is made once here, not by each of the three.
+COLLECTED := $(BIN)/pytest --collect-only --quiet > build/collected.txt
+
 fast: $(VENV)/dev.installed
+	mkdir -p build && $(COLLECTED)
 	$(PYTEST) -m "not slow"
 
 whole: $(VENV)/dev.installed
+	mkdir -p build && $(COLLECTED)
 	rm -rf build/coverage
 	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
 	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
