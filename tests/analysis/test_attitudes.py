@@ -106,6 +106,7 @@ def on_another_clock(folder: Path, late_s: float, fast: float, *, rates: bool = 
     return [samples, attitudes]
 
 
+@pytest.mark.slow
 def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -123,11 +124,13 @@ def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     assert "the samples' clock on the table's: +731." in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_papers_gyroscope_is_found_without_its_rates(capsys: pytest.CaptureFixture[str]) -> None:
     found = solved(capsys, example(SWINGING))["rate"]
     assert off(found, GYRO_MATRIX, GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S) < 4
 
 
+@pytest.mark.slow
 def test_quaternions_alone_tell_the_clock_and_the_sensor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = on_another_clock(tmp_path, late_s=12.5, fast=0.0, rates=False)
     assert main([*solve(files, "--find-clock"), "--json"]) == 0

@@ -90,6 +90,7 @@ def test_without_another_clock_nothing_is_corrected() -> None:
     assert check.std == pytest.approx(50 * PPM / np.sqrt(3))
 
 
+@pytest.mark.slow
 def test_the_jitter_of_the_states_is_measured() -> None:
     run = synthetic_run(Setup(speed_deg_s=120))
     arm = run.states.copy()
@@ -103,12 +104,14 @@ def test_the_jitter_of_the_states_is_measured() -> None:
     assert state_jitter([seen, *exact]).std_s == pytest.approx(1e-4 / np.sqrt(2), rel=0.1)
 
 
+@pytest.mark.slow
 def test_clocks_that_agree_pass_and_are_named_in_pairs() -> None:
     checks = of_clocks(with_crystal(40, crystal_ppm=-15), 1 - 40 * PPM)
     assert set(checks) == {"controller_and_computer", "controller_and_crystal", "computer_and_crystal"}
     assert all(check.passed and check.unit == "ppm" for check in checks.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller_ppm", [-146, 500, 20_000])
 def test_a_controllers_clock_beyond_what_is_stated_fails_by_how_far_it_is_off(controller_ppm: float) -> None:
     check = of_clocks(with_crystal(controller_ppm))["controller_and_crystal"]
@@ -117,6 +120,7 @@ def test_a_controllers_clock_beyond_what_is_stated_fails_by_how_far_it_is_off(co
     assert check.limit == pytest.approx(70, abs=15)  # 50 of the controller's, 20 of the crystal's
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("computer", [-9e-3, 1e-3])
 def test_a_computers_clock_that_contradicts_both_fails_with_both(computer: float) -> None:
     checks = of_clocks(with_crystal(10), 1 + computer)
@@ -130,6 +134,7 @@ def test_two_others_that_agree_name_the_controller() -> None:
     assert not checks["controller_and_computer"].passed and not checks["controller_and_crystal"].passed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pace", [0.98, 1.02, 8.0])
 def test_a_laboratory_that_is_simulated_at_a_pace_of_its_own_is_held_against_no_computer(pace: float) -> None:
     checks = of_clocks(with_crystal(10), 1 / pace)
@@ -153,16 +158,19 @@ def test_every_recording_of_a_run_is_held_against_its_computer_and_the_worst_is_
     assert both.clock is not None and abs(both.clock.error) < 5 * PPM  # speeds go by the longest
 
 
+@pytest.mark.slow
 def test_of_recordings_made_before_the_longest_alone_counts() -> None:
     before = [each.judged_by(["reckoning=1"]) for each in in_two(recorded(FAST, 1.0, REAL))]
     assert named(calibrated(before).checks) == {}
 
 
+@pytest.mark.slow
 def test_a_board_that_says_it_follows_no_crystal_is_compared_with_nothing_however_near_it_runs() -> None:
     assert of_clocks(replace(with_crystal(40), follows_crystal=False)) == {}
     assert set(of_clocks(replace(with_crystal(40), follows_crystal=None))) == {"controller_and_crystal"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reckoning", "failed"), [(1, set()), (2, {"controller_and_crystal"})])
 def test_clocks_are_in_the_verdict_but_of_recordings_made_before(reckoning: int, failed: set[str]) -> None:
     found = calibrated([recorded(with_crystal(500), 0.2).judged_by([f"reckoning={reckoning}"])])

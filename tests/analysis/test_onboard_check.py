@@ -151,6 +151,7 @@ def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) ->
     assert not any(check.passed for check in found.checks("gyro"))
 
 
+@pytest.mark.slow
 def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
     missed = BoardNotObserved("gyro", 5, "not_kept: too late")
     unsolved = solved((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "too_few_observations", sweeps=5)

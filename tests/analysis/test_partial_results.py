@@ -43,6 +43,7 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     assert np.allclose(found.solution.scale, SCALE, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
     third = list(swept(run))[2].window

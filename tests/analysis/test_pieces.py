@@ -42,6 +42,7 @@ def pieces_of(run: RunData) -> Pieces:
     return cut("gyro", recordings, result, result.explained, run.settings.site)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lost_s", "known_rad_s"), [(0.0, 4e-5), (0.3, 8e-5)])
 def test_of_a_vibration_that_no_encoder_sees_a_piece_keeps_no_more_than_is_stated(
     lost_s: float, known_rad_s: float

@@ -55,6 +55,7 @@ def test_the_calibration_is_that_of_the_reference_temperature(outcome: Outcome) 
     assert failed == {"gyro.board_scale", "gyro.board_bias"}  # no board has solved these
 
 
+@pytest.mark.slow
 def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
     found = outcome.polynomials["gyro"][RATE]
     stds = np.sqrt(np.diag(found.covariance))

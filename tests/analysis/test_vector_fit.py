@@ -53,6 +53,7 @@ def off(setup: Setup) -> Array:
     return error / np.sqrt(np.diag(result.solution.covariance))
 
 
+@pytest.mark.slow
 def test_three_axes_do_not_tell_the_sensors_angles_from_the_arms_and_say_so() -> None:
     found, std = skew_deg(solved(THREE))
     assert found > 0.04

@@ -47,6 +47,7 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_o
     assert held.scale.temperature_c != held.bias.temperature_c
 
 
+@pytest.mark.slow
 def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     document = document_of(calibrated([warming(synthetic_run(Setup()))]))
     sensor = document.sensors["gyro"]
@@ -68,6 +69,7 @@ def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_
     np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))
 
 
+@pytest.mark.slow
 def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
     first, again = (synthetic_run(Setup(seed=seed)) for seed in (1, 2))
     later = datetime.fromisoformat(first.provenance.started_utc) + timedelta(hours=2)
@@ -76,6 +78,7 @@ def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
     assert later < held.bias.from_utc < held.bias.to_utc < later + timedelta(minutes=3)
 
 
+@pytest.mark.slow
 def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> None:
     lean = np.radians(12)
     result = calibrated([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
@@ -88,6 +91,7 @@ def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> N
     assert load_words(document_of(result).sensors["gyro"]) == "x 60.0, y 58.7, z 58.7"
 
 
+@pytest.mark.slow
 def test_upright_axes_are_loaded_with_the_speed_of_the_sweeps_and_nothing_is_said() -> None:
     result = calibrated([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
     assert load_words(document_of(result).sensors["gyro"]) is None

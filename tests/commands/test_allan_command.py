@@ -48,6 +48,7 @@ def test_people_see_random_walk_and_why_there_is_no_bias_instability(
     assert "bias instability: recording_too_short" in printed and "Record at rest for 600 s or more" in printed
 
 
+@pytest.mark.slow
 def test_machines_get_the_curves_in_si_units(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["allan", str(run), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

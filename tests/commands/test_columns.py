@@ -73,6 +73,7 @@ def solved(*arguments: str | Path) -> dict[str, list[float]]:
     return {name: sensor[name] for name in ("scale", "bias_rad_s")}
 
 
+@pytest.mark.slow
 def test_a_log_in_its_own_words_gives_what_the_files_of_the_rig_give(tmp_path: Path) -> None:
     told = tmp_path / "columns.yaml"
     told.write_text(SAMPLES + TABLE, encoding="utf-8")

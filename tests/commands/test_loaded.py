@@ -57,6 +57,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("list", "--csv"), ("G-0",), ("show", "1"), ("compare", "1", "3")])
 def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], place: Path) -> None:
     assert loaded("history", *words) == ([], [])

@@ -60,6 +60,7 @@ def run(tmp_path: Path) -> Path:
     return Path(shutil.copytree(FIXTURES / "calibration", tmp_path / "run"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "command"),
     [

@@ -112,6 +112,7 @@ def test_what_was_signed_is_whole_and_says_who_when_and_that_it_is_simulated(lab
     assert all("RIG-" in " ".join(each["history"]) for each in (pdf, xml, page)) and beside["history"]
 
 
+@pytest.mark.slow
 def test_it_is_told_in_words_and_nobody_is_trusted_unasked(lab: Laboratory, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", str(lab.folder / PDF)]) == 0
     said = capsys.readouterr().out

@@ -68,6 +68,7 @@ def test_a_scalar_comes_back_as_it_was_recorded_and_is_no_gyroscope(barometer: R
     assert barometer.channel(PRESSURE).values(found.samples["barometer"]) == pytest.approx(PRESSURE_PA)
 
 
+@pytest.mark.slow
 def test_a_scalar_is_exported_in_its_unit_on_the_arms_clock(tmp_path: Path) -> None:
     run = beside_a_gyroscope(IN_COUNTS)
     writer_of_readings("csv")([observe_run(run, run.settings.observation)], tmp_path)

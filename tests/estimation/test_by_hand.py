@@ -69,6 +69,7 @@ def mistaken(kind: str, at: int, size: float | None) -> list[Action]:
     return actions
 
 
+@pytest.mark.slow
 def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     recorded = handle(TWELVE, 1)
     found = solved(recorded)

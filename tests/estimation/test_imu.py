@@ -201,6 +201,7 @@ def test_attitudes_alone_give_what_the_attitude_weighted_fit_gives(rms_rad: floa
     )
 
 
+@pytest.mark.slow
 def test_a_few_arms_that_err_by_a_milliradian() -> None:
     few = errors(SIX_AND_REST, 1e-3, "ADIS16465", 5)
     assert few.rms[0] < 8 and few.rms[2] < 8 and (few.over_stated < 1.5).all()
@@ -360,6 +361,7 @@ def _spoilt(array: Array, place: tuple[int, ...], value: float) -> Array:
     return spoilt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "damage"),
     [

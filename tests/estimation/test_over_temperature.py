@@ -81,6 +81,7 @@ def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
     assert np.sqrt(np.mean(np.square(after))) <= 1.2 * np.sqrt(np.mean(np.square(u)))
 
 
+@pytest.mark.slow
 def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
     sensor, rng = upright(1)
     of = session()
@@ -93,6 +94,7 @@ def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
     assert np.allclose(leant.scale[1] / leant.scale[0], straight.scale[1] / straight.scale[0], rtol=0.05, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_u_grows_towards_both_ends_and_there_is_none_beyond() -> None:
     sensor, rng = upright(0, gradient_k=0.0)
     of = session()
@@ -106,6 +108,7 @@ def test_u_grows_towards_both_ends_and_there_is_none_beyond() -> None:
         assert refused.value.name == "temperature_outside"
 
 
+@pytest.mark.slow
 def test_the_order_is_that_of_the_sensor() -> None:
     rng = np.random.default_rng(4)
     sensor = drawn(rng)
@@ -117,6 +120,7 @@ def test_the_order_is_that_of_the_sensor() -> None:
     assert np.abs(found.bias[1] - straight.bias[1]).max() < 2e-5
 
 
+@pytest.mark.slow
 def test_a_hysteresis_is_found_and_covered() -> None:
     sensor, rng = upright(3, hysteresis=2e-3)
     found = calibrated(sensor, session(), rng)
@@ -129,12 +133,14 @@ def test_a_hysteresis_is_found_and_covered() -> None:
         assert (np.abs(held.values[3:] - sensor.at(40.0)[3:] - way * sensor.hysteresis) < 1.3 * held.expanded[3:]).all()
 
 
+@pytest.mark.slow
 def test_a_sensor_that_only_warmed_says_nothing_of_hysteresis() -> None:
     sensor, rng = upright(3)
 
     assert calibrated(sensor, session(both_ways=False), rng).hysteresis is None
 
 
+@pytest.mark.slow
 def test_the_lag_of_the_thermometer_is_found() -> None:
     sensor, rng = upright(5)
     found = calibrated(replace(sensor, lag_s=20.0), session(), rng)

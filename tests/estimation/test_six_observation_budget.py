@@ -26,6 +26,7 @@ def turns() -> Turns:
     return observations, solve_six_observation(observations, "newton"), see(recordings, "gyro", surroundings)
 
 
+@pytest.mark.slow
 def test_it_is_the_derivative_of_the_solution(turns: Turns) -> None:
     observations, found, seen = turns
     response = response_of(found, seen)

@@ -71,6 +71,7 @@ def test_a_speed_that_changes_slowly_takes_nothing_from_gravity(vibration: float
     assert np.abs(expected.harmonic_m_s2).max() > 9
 
 
+@pytest.mark.slow
 def test_the_stated_covariance_is_the_scatter() -> None:
     found = [reduced(revolution(seed, 300.0)) for seed in range(40)]
     scatter = np.std([each.harmonic_m_s2.ravel() for each in found], axis=0)
@@ -87,6 +88,7 @@ def test_coloured_noise_widens_the_covariance() -> None:
     np.testing.assert_allclose(wide.covariance_m2_s4, 4 * white.covariance_m2_s4)
 
 
+@pytest.mark.slow
 def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> None:
     """2.4 mg at 14 Hz that no encoder sees: in x and z nearly all that is read, and of a turn's mean hardly any."""
     rng = np.random.default_rng(4)

@@ -23,6 +23,7 @@ def magnetic() -> rig.Run:
     return rig.load(RECORDINGS / "rig.settings-7" / "magnetometer")
 
 
+@pytest.mark.slow
 def test_an_accelerometer_is_read_beside_its_gyroscope(imu: rig.Readings) -> None:
     found = imu.acceleration
     assert found.values.shape == (len(found.time_s), 3) and found.unit == "m/s²"

@@ -57,6 +57,7 @@ def feeling_gravity(run: RunData, rad_s_per_g: float) -> RunData:
     return replace(run, samples={"gyro": samples})
 
 
+@pytest.mark.slow
 def test_gravity_that_turns_with_the_sensor_is_no_noise() -> None:
     """0.3 °/s/g of a sensor with a noise of 0.002 rad/s: over a revolution nothing of it is left in the mean."""
     quiet = synthetic_run(Setup(noise_rad_s=0.002))
@@ -145,6 +146,7 @@ def test_the_demo_s_clock_is_known_to_half_a_millisecond() -> None:
     np.testing.assert_allclose(np.diff(clock.controller_time_s(later)), 10 * (1 + clock.drift))
 
 
+@pytest.mark.slow
 def test_every_sweep_becomes_one_whole_revolution() -> None:
     seen = look(USUAL).revolutions
     assert [(o.joint_name, o.direction, o.axis, o.sign) for o in seen] == [
@@ -181,6 +183,7 @@ def test_a_clock_that_runs_far_off_is_refused() -> None:
         look(synthetic_run(Setup(drift=0.06)))
 
 
+@pytest.mark.slow
 def test_coloured_noise_widens_the_uncertainty() -> None:
     rng = np.random.default_rng(8)
     white = rng.normal(size=(200, 1500))
@@ -415,6 +418,7 @@ def gap_in_states(run: RunData) -> RunData:
     return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1130)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoilt", "name"),
     [
@@ -499,6 +503,7 @@ def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool) -> None
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.3
 
 
+@pytest.mark.slow
 def test_a_few_lost_samples_are_counted_and_allowed() -> None:
     gap = between(USUAL, 3.0, 3.05)
     seen = look(lose(USUAL, gap), replace(SETTINGS, max_lost_fraction=0.05))
@@ -515,6 +520,7 @@ def test_samples_the_board_itself_missed_are_noticed_by_the_clock() -> None:
         look(with_samples(lose(USUAL, between(USUAL, 3.0, 3.1)), renumbered))
 
 
+@pytest.mark.slow
 def test_the_sequence_number_may_wrap() -> None:
     def near_the_end(samples: NDArray[Any]) -> NDArray[Any]:
         samples["sequence"] += np.uint32(2**32 - 1500)
@@ -566,6 +572,7 @@ def test_a_sensor_without_noise_is_known_to_a_part_of_a_count() -> None:
         assert np.abs(errors).max() < SENSITIVITY
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_solved_from_all_its_recordings() -> None:
     whole = solve_runs([USUAL])["gyro"].solution
     other = synthetic_run(Setup(boot_s=50.0))

@@ -35,6 +35,7 @@ def errors(seen: Observation) -> Array:
     return found / np.hypot(seen.average.mean_std_rad_s, seen.speed_std_rad_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seen_rad_s", "unseen_rad_s"), [(0.004, 0.0), (0.010, 0.0), (0.010, 0.004)])
 def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vibration(
     seen_rad_s: float, unseen_rad_s: float
@@ -50,6 +51,7 @@ def test_the_scale_is_as_well_known_as_stated_whatever_the_encoders_see_of_a_vib
     assert 0.75 < np.sqrt(np.mean([error**2 for error, _ in found])) < 1.25
 
 
+@pytest.mark.slow
 def test_the_speed_is_that_of_a_turn_where_nothing_was_taken_out_of_the_readings() -> None:
     quiet = synthetic_run(QUIET)
     seen = synthetic_run(replace(QUIET, seen_vibration_rad_s=0.010))

@@ -33,6 +33,7 @@ def stuck_in_sweep(index: int) -> RunData:
     return replace(USUAL, samples={"gyro": samples})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [3, 4])
 def test_a_gyroscope_that_turns_on_where_the_arm_rests_has_told_nothing(index: int) -> None:
     stuck = stuck_in_sweep(index)
@@ -42,6 +43,7 @@ def test_a_gyroscope_that_turns_on_where_the_arm_rests_has_told_nothing(index: i
         observe_run(stuck, SETTINGS)
 
 
+@pytest.mark.slow
 def test_when_the_last_sweep_is_sound_the_rest_after_it_still_tells() -> None:
     with pytest.raises(Fault, match=r"stuck_sensor: at rest the gyroscope reads .* as if it turned"):
         observe_run(stuck_in_sweep(5), SETTINGS)

@@ -24,6 +24,7 @@ def readings(duration_s: float, vibration_hz: float, seed: int) -> tuple[Array, 
     return (edges[1:] + edges[:-1]) / 2, np.diff(angle, axis=0) * RATE_HZ + noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vibration_hz", [14.0, 9.3])
 def test_nothing_is_left_of_a_vibration_and_the_variance_is_that_of_the_noise(vibration_hz: float) -> None:
     off, stated, plain = [], [], []
@@ -41,6 +42,7 @@ def test_nothing_is_left_of_a_vibration_and_the_variance_is_that_of_the_noise(vi
     assert 0.85 < np.sqrt(np.mean(np.square(off)) / np.mean(stated)) < 1.15
 
 
+@pytest.mark.slow
 def test_white_noise_does_not_vibrate_nor_does_a_bias_that_wanders() -> None:
     rng = np.random.default_rng(1)
     white = rng.normal(size=(20, 2500, 3))

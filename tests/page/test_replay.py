@@ -45,6 +45,7 @@ def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert progress[-1].remaining_s < 0.2
 
 
+@pytest.mark.slow
 def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed: list[Moment]) -> None:
     seen = [moment for moment in replayed if isinstance(moment.event, ArmSeen)]
     for moment in seen[:: len(seen) // 20]:
@@ -69,6 +70,7 @@ def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
     """Rounded twice, its last digit there would be another than at the terminal."""
     found = so_far([run])

@@ -152,6 +152,7 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("samples", "table", "estimator"),
     [

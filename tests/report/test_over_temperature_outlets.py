@@ -65,6 +65,7 @@ def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
     assert any(line.name == "polynomials over temperature" for line in calibration.budget.contributors)  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_the_run_folder_has_picture_certificate_and_history(
     warmed: tuple[Path, Drawn], capsys: pytest.CaptureFixture[str]
 ) -> None:

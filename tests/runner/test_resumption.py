@@ -36,11 +36,13 @@ def known_to_the_board(run: RunData) -> RunData:
     )
 
 
+@pytest.mark.slow
 def test_sweeps_that_agree_count() -> None:
     run = known_to_the_board(readings_of(SETUP).recording())
     assert resumption([run], run.settings, SCRIPT).done == set(range(6))
 
 
+@pytest.mark.slow
 def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     """And the one about the same axis the other way, for which of the two was disturbed nobody can tell."""
     damaged = offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP))
