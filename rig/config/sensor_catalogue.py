@@ -113,6 +113,14 @@ class MagnetometerPart:
     ranges_gauss: tuple[float, ...]
     default_rate_hz: float
 
+    def accept_rate(self, rate_hz: float) -> float:
+        """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+        return nearest_rate(rate_hz, self.rates_hz, in_words(self.rates_hz))
+
+    def accept_range(self, range_gauss: float) -> float:
+        """`range_gauss` if the part has it. Raises ValueError naming the nearest otherwise."""
+        return one_of(range_gauss, self.ranges_gauss)
+
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
     """The rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -353,6 +361,8 @@ MAGNETOMETERS: Mapping[str, MagnetometerPart] = MappingProxyType(
         ),
     }
 )
+
+CATALOGUE: Mapping[str, Part | MagnetometerPart] = MappingProxyType({**PARTS, **MAGNETOMETERS})
 
 if TYPE_CHECKING:
     PartName = str
