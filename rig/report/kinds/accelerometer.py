@@ -24,9 +24,10 @@ from rig.estimation.accelerometer_model import DELAY, SECOND
 from rig.estimation.arrays import scale_of
 from rig.estimation.imu import MODEL
 from rig.estimation.residuals import dwell_residual_std_m_s2
+from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triads import Alignment
 from rig.estimation.triaxial import TriaxialSolution
-from rig.report.axes import PARAMETERS, dwell_entry, skew_known, triple
+from rig.report.axes import dwell_entry, skew_known, triple
 from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines

@@ -22,7 +22,8 @@ from rig.errors import Fault
 from rig.estimation.arrays import scale_of
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
 from rig.estimation.residuals import attitude_residual_std
-from rig.report.axes import PARAMETERS, dwell_entry, skew_known, triple
+from rig.estimation.six_observation import PARAMETERS
+from rig.report.axes import dwell_entry, skew_known, triple
 from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
