@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, HeldOut
-from rig.analysis.accelerometer_errors import NONLINEARITY
 from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_accelerometer
@@ -23,6 +22,7 @@ from rig.errors import Fault
 from rig.estimation.accelerometer_model import DELAY, SECOND
 from rig.estimation.arrays import scale_of
 from rig.estimation.imu import MODEL
+from rig.estimation.own_errors import NONLINEARITY
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triads import Alignment
