@@ -16,7 +16,13 @@ from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Contributor
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
-from rig.estimation.own_errors import from_their_mean, unseen_k
+from rig.estimation.own_errors import (
+    BIAS_OVER_TEMPERATURE,
+    NONLINEARITY,
+    SCALE_OVER_TEMPERATURE,
+    from_their_mean,
+    unseen_k,
+)
 from rig.estimation.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
 from rig.estimation.reference_budget import Spread
 from rig.motion.geometry import WRIST_1, DenavitHartenberg
@@ -24,8 +30,7 @@ from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 
-NONLINEARITY, INSTABILITY, FLICKER = "nonlinearity", "bias instability", "flicker of the bias"
-BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
+INSTABILITY, FLICKER = "bias instability", "flicker of the bias"
 KNOWN = "what is known of the part"
 STANDARD = np.sqrt(3)  # a half-width is so many standard uncertainties
 MILLI_G = 1000  # µg

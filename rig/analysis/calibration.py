@@ -221,14 +221,11 @@ def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
 
 
 def solve_observations(
-    observations: Sequence[Observation],
-    estimator: Estimator,
-    rests: Sequence[Average] = (),
-    nominal_mounting: Array | None = None,
+    observations: Sequence[Observation], estimator: Estimator, rests: Sequence[Average] = ()
 ) -> Estimate:
-    """Scale and bias by any of the estimators; only the vector model makes use of rests and mounting."""
+    """Scale and bias by any of the estimators; only the vector model makes use of rests."""
     if estimator == "vector":
-        return solve_vector(observations, rests, nominal_mounting)
+        return solve_vector(observations, rests)
     if estimator == "levenberg_marquardt":
         return _solve_levenberg_marquardt(observations)
     return solve_six_observation(observations, estimator)

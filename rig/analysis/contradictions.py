@@ -10,7 +10,6 @@ from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.consistency import consistency
-from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.pieces import cut
@@ -22,12 +21,14 @@ from rig.analysis.reference_contradictions import (
     reference_statistics,
 )
 from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
 from rig.analysis.verdict import fitness
 from rig.analysis.ways import with_ways
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
+from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
@@ -88,12 +89,28 @@ def contradictions(
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
         if surroundings is not None and settings.checked_by_model:
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
-            leaning = leaning_deg(explained.solution, stated_deg, rate)
+            leaning = _leaning_deg(explained.solution, stated_deg, rate)
             checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
         disturbed |= named.keys()
         if surroundings is not None:
             told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
     return Contradictions(tuple(checks), frozenset(disturbed), told_from)
+
+
+def _leaning_deg(solution: VectorSolution, stated_deg: float, rate: float) -> Statistic:
+    """The angle between two axes that is farthest off 90° for what is stated, and its limit, in degrees.
+
+    `stated_deg` is a half-width; beside it stands what of the angle is not known, so that chance is beyond the limit in
+    a share `rate` of recordings at most. Sweeps about three axes do not tell a wrist whose zero is off from a sensor's
+    axis that leans: no residual shows it, and the scale factors of a sensor that is mounted askew are off by it.
+    """
+    from scipy.special import ndtri
+
+    off_deg = np.degrees(np.abs(solution.non_orthogonality_rad))
+    std_deg = np.degrees(np.sqrt(np.diag(solution.angles_covariance_rad2)[:3]))
+    limits_deg = stated_deg + std_deg * float(ndtri(1 - rate / 6))
+    worst = int(np.argmax(off_deg - limits_deg))
+    return float(off_deg[worst]), float(limits_deg[worst])
 
 
 def in_reference(

@@ -144,9 +144,9 @@ def reference_consistency(read: Read, rate: float, *, drifting: bool = False) ->
     )
 
 
-def would_tell(read: Read, rate: float, *, drifting: bool = False) -> dict[str, float]:
+def would_tell(read: Read, rate: float) -> dict[str, float]:
     """`told_from` alone."""
-    return _told_from(_held(read, drifting=drifting), read, rate)
+    return _told_from(_held(read, drifting=False), read, rate)
 
 
 def _told_from(held: HeldReadings, read: Read, rate: float) -> dict[str, float]:

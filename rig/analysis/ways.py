@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.analysis.allowance import STANDS_RAD
 from rig.analysis.pieces import FEWEST_AT_REST, REST, Pieces, Stretch
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import RATE
@@ -31,7 +32,6 @@ SPARSE_S = 0.0105  # samples that are farther apart miss what the servo's vibrat
 # interval it may lie (Euler and Maclaurin); B₂, Bernoulli's second polynomial, is √(1/180) RMS, and either end has two.
 CORNERS = (2 / 180) ** 0.5 / 2
 LOST = 0.01  # of the samples, at most
-STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 STEPS = 48
 WRISTS = 3  # whose ways count, the last joints
 

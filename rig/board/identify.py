@@ -7,10 +7,8 @@ from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibra
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import BoardSection, SensorsConfig
-from rig.config.sensor_sections import MagnetometerSection, SensorSection
+from rig.config.sensor_sections import ConfiguredSensor, SensorSection
 from rig.errors import Fault, Refused, raised_as
-
-Configured = SensorSection | MagnetometerSection
 
 NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
 
@@ -41,7 +39,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
         )
 
 
-def sensor_entry(identity: BoardIdentity, name: str, section: Configured) -> SensorInfo:
+def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
     """The board's entry for a configured sensor, whatever answers in its place. Raises Refused `sensor_missing`."""
     for info in identity.sensors:
         if configured_part(info.part) == section.part:
@@ -49,7 +47,7 @@ def sensor_entry(identity: BoardIdentity, name: str, section: Configured) -> Sen
     raise _missing(name, section, "no driver for it")
 
 
-def find_sensor(identity: BoardIdentity, name: str, section: Configured) -> SensorInfo:
+def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
     """The board's entry for a configured sensor that answers. Raises Refused `sensor_missing` or `sensor_mismatch`."""
     info = sensor_entry(identity, name, section)
     if info.present:
@@ -64,7 +62,7 @@ def find_sensor(identity: BoardIdentity, name: str, section: Configured) -> Sens
     )
 
 
-def _missing(name: str, section: Configured, seen: str) -> Refused:
+def _missing(name: str, section: ConfiguredSensor, seen: str) -> Refused:
     return Refused(
         "sensor_missing",
         f"sensors.{name}: the board finds no {section.part} ({seen})",

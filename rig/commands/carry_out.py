@@ -73,13 +73,11 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
     from rig.turners.registry import kind_of
 
     config = configured.loaded.config
-    parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
-    parts |= {name: f"{each.part} {each.serial_number}" for name, each in config.magnetometers.items()}
     return About(
         folder=str(folder),
         procedure=config.procedure.name,
         may_answer=page is not None and page.may_answer,
-        parts=parts,
+        parts={name: f"{each.part} {each.serial_number}" for name, each in config.all_sensors.items()},
         simulated=configured.loaded.simulated,
         storing=_storing(folder, configured),
         arm=built(kind_of(config.turner).meant(config.turner).kinematics),

@@ -33,7 +33,7 @@ from rig.config.section import (
     checked_port,
 )
 from rig.config.sensor_catalogue import MAGNETOMETERS
-from rig.config.sensor_sections import MagnetometerSection, SensorSection, field_name
+from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection, field_name
 from rig.config.station_section import StationSection
 
 HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
@@ -290,7 +290,7 @@ class SensorsConfig(Section):
         return magnetometers
 
     @property
-    def all_sensors(self) -> Mapping[str, SensorSection | MagnetometerSection]:
+    def all_sensors(self) -> Mapping[str, ConfiguredSensor]:
         """Every sensor by name, gyroscopes first."""
         return {**self.sensors, **self.magnetometers}
 
@@ -300,7 +300,7 @@ class SensorsConfig(Section):
         return {name: sensor for name, sensor in self.sensors.items() if sensor.on_board}
 
     @property
-    def parts_on_board(self) -> Mapping[str, SensorSection | MagnetometerSection]:
+    def parts_on_board(self) -> Mapping[str, ConfiguredSensor]:
         """All that the board reads, by name, gyroscopes first."""
         return {**self.on_board, **self.magnetometers}
 

@@ -12,7 +12,7 @@ from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
 from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
-from rig.config.servo_procedure import ServoSixObservationSection
+from rig.config.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
 
 __all__ = [
@@ -35,7 +35,6 @@ DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # once round at the slowest speed
 HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
 MIN_RANGE_C = 10.0  # what polynomials need: that of rig.estimation.over_temperature
-SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
 class SixSweepsSection(ProcedureSection):

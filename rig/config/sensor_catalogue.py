@@ -9,22 +9,6 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 
 @dataclass(frozen=True, slots=True)
-class AccelerometerSheet:
-    """What a data sheet says of an accelerometer, or of one of its kind: half-widths.
-
-    `nonlinearity_percent` is how far it may be from the best straight line, of the range `nonlinear_over_g` either way,
-    the one that is set where that is 0; `bias_mg_k` and `scale_ppm_k` what a degree changes of bias and scale.
-    `bias_instability_ug` is the least Allan deviation of the bias.
-    """
-
-    nonlinearity_percent: float
-    bias_mg_k: float
-    scale_ppm_k: float
-    bias_instability_ug: float
-    nonlinear_over_g: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class Delivered:
     """How far a part may be off as it is delivered: half-widths, None where its data sheet has no figure.
 
@@ -47,10 +31,11 @@ class Part:
     `scale_ppm_k` how much bias and scale may change with temperature, `angle_random_walk_deg_sqrt_h` is its white
     noise, `bias_instability_deg_h` the least Allan deviation of its bias, `non_orthogonality_deg` how far from 90° two
     of its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
-    `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what else is known of
-    it; `delivered` is what calibrating finds. A part with a port of its own stands beside the board, with a clock
-    of its own. `any_rate` says that it may be any sensor: its rates and ranges are what its section says, and the
-    half-widths are those of a consumer part.
+    `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz; its nonlinearity is of the range
+    `acceleration_nonlinear_over_g` either way, the one that is set where that is 0; the rest is as the gyroscope's.
+    `delivered` is what calibrating finds. A part with a port of its own stands beside the board, with a clock of its
+    own. `any_rate` says that it may be any sensor: its rates and ranges are what its section says, and the half-widths
+    are those of a consumer part.
     """
 
     rates_hz: tuple[float, ...]
@@ -68,31 +53,14 @@ class Part:
     non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
-    accelerometer: AccelerometerSheet
+    acceleration_nonlinearity_percent: float
+    acceleration_bias_mg_k: float
+    acceleration_scale_ppm_k: float
+    acceleration_bias_instability_ug: float
+    acceleration_nonlinear_over_g: float = 0.0
     delivered: Delivered = Delivered()
     own_port: bool = False
     any_rate: bool = False
-
-    @property
-    def acceleration_nonlinearity_percent(self) -> float:
-        """The accelerometer's nonlinearity, as what follows is the accelerometer's."""
-        return self.accelerometer.nonlinearity_percent
-
-    @property
-    def acceleration_nonlinear_over_g(self) -> float:
-        return self.accelerometer.nonlinear_over_g
-
-    @property
-    def acceleration_bias_mg_k(self) -> float:
-        return self.accelerometer.bias_mg_k
-
-    @property
-    def acceleration_scale_ppm_k(self) -> float:
-        return self.accelerometer.scale_ppm_k
-
-    @property
-    def acceleration_bias_instability_ug(self) -> float:
-        return self.accelerometer.bias_instability_ug
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -112,6 +80,14 @@ class MagnetometerPart:
     rates_hz: tuple[float, ...]
     ranges_gauss: tuple[float, ...]
     default_rate_hz: float
+
+    def accept_rate(self, rate_hz: float) -> float:
+        """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+        return nearest_rate(rate_hz, self.rates_hz, in_words(self.rates_hz))
+
+    def accept_range(self, range_gauss: float) -> float:
+        """`range_gauss` if the part has it. Raises ValueError naming the nearest otherwise."""
+        return one_of(range_gauss, self.ranges_gauss)
 
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
@@ -165,9 +141,11 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
-            accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
-                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260, bias_instability_ug=30
-            ),
+            # of the accelerometer: not stated; that of the MPU-9250
+            acceleration_nonlinearity_percent=0.5,
+            acceleration_bias_mg_k=1.5,
+            acceleration_scale_ppm_k=260,
+            acceleration_bias_instability_ug=30,
             delivered=Delivered(bias_deg_s=30),  # at ±2000 °/s
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
@@ -186,12 +164,11 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
-            accelerometer=AccelerometerSheet(  # PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
-                nonlinearity_percent=0.5,
-                bias_mg_k=1.5,
-                scale_ppm_k=260,
-                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
-            ),
+            # of the accelerometer: PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
+            acceleration_nonlinearity_percent=0.5,
+            acceleration_bias_mg_k=1.5,
+            acceleration_scale_ppm_k=260,
+            acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             delivered=Delivered(bias_deg_s=5, scale_percent=3, rate_percent=1),  # PS-MPU-9250A-01, table 1
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
@@ -210,13 +187,12 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
-            accelerometer=AccelerometerSheet(  # assumed: the data sheet of the part has it, not looked up
-                nonlinearity_percent=0.25,
-                nonlinear_over_g=2,
-                bias_mg_k=0.05,
-                scale_ppm_k=20,
-                bias_instability_ug=3.6,  # data sheet, features
-            ),
+            # of the accelerometer, assumed: the data sheet of the part has it, not looked up
+            acceleration_nonlinearity_percent=0.25,
+            acceleration_nonlinear_over_g=2,
+            acceleration_bias_mg_k=0.05,
+            acceleration_scale_ppm_k=20,
+            acceleration_bias_instability_ug=3.6,  # data sheet, features
         ),
         "icm42688p": Part(  # DS-000347 rev. 1.8, section 14.37; slower rates let through more than half of themselves
             rates_hz=(25, 50, 100, 200, 500, 1000, 2000),
@@ -234,13 +210,12 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=70,  # table 2: of z; x and y have 65
-            accelerometer=AccelerometerSheet(  # table 2
-                nonlinearity_percent=0.1,
-                nonlinear_over_g=2,
-                bias_mg_k=0.15,
-                scale_ppm_k=50,
-                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
-            ),
+            # of the accelerometer: table 2
+            acceleration_nonlinearity_percent=0.1,
+            acceleration_nonlinear_over_g=2,
+            acceleration_bias_mg_k=0.15,
+            acceleration_scale_ppm_k=50,
+            acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             delivered=Delivered(
                 bias_deg_s=0.5,  # table 1
                 scale_percent=0.5,
@@ -267,13 +242,11 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.72,  # not stated; assumed, as of the ICM-42688-P
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=60,  # table 3, high-performance mode, whose noise this mode has (section 6.5)
-            accelerometer=AccelerometerSheet(
-                nonlinearity_percent=0.1,  # not stated; assumed, as of the ICM-42688-P
-                nonlinear_over_g=2,
-                bias_mg_k=0.07,  # table 3
-                scale_ppm_k=100,  # table 3, ±0.01 %/°C
-                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
-            ),
+            acceleration_nonlinearity_percent=0.1,  # not stated; assumed, as of the ICM-42688-P
+            acceleration_nonlinear_over_g=2,
+            acceleration_bias_mg_k=0.07,  # table 3
+            acceleration_scale_ppm_k=100,  # table 3, ±0.01 %/°C
+            acceleration_bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             # Table 3; the accelerometer's scale factor has no figure there
             delivered=Delivered(bias_deg_s=1, scale_percent=0.3, acceleration_bias_mg=12, rate_percent=1),
         ),
@@ -293,9 +266,12 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
-            accelerometer=AccelerometerSheet(  # assumed: the maker's data sheet has it, not looked up
-                nonlinearity_percent=0.9, nonlinear_over_g=10, bias_mg_k=0.05, scale_ppm_k=100, bias_instability_ug=50
-            ),
+            # of the accelerometer, assumed: the maker's data sheet has it, not looked up
+            acceleration_nonlinearity_percent=0.9,
+            acceleration_nonlinear_over_g=10,
+            acceleration_bias_mg_k=0.05,
+            acceleration_scale_ppm_k=100,
+            acceleration_bias_instability_ug=50,
             own_port=True,
         ),
         # IMUs of autopilots are of many kinds: what follows is what the ICM-42688-P of TDK states, DS-000347, table 1
@@ -316,9 +292,11 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.72,  # cross-axis sensitivity ±1.25 %
             ranges_g=(16, 8, 4),
             acceleration_noise_ug_sqrt_hz=70,
-            accelerometer=AccelerometerSheet(
-                nonlinearity_percent=0.1, nonlinear_over_g=2, bias_mg_k=0.15, scale_ppm_k=50, bias_instability_ug=30
-            ),
+            acceleration_nonlinearity_percent=0.1,
+            acceleration_nonlinear_over_g=2,
+            acceleration_bias_mg_k=0.15,
+            acceleration_scale_ppm_k=50,
+            acceleration_bias_instability_ug=30,
             own_port=True,
         ),
         "lines": Part(  # any device: assumed to be as bad as the worst of the parts above; `uncertainty` says better
@@ -337,9 +315,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=1.15,
             ranges_g=(),
             acceleration_noise_ug_sqrt_hz=300,
-            accelerometer=AccelerometerSheet(
-                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260, bias_instability_ug=30
-            ),
+            acceleration_nonlinearity_percent=0.5,
+            acceleration_bias_mg_k=1.5,
+            acceleration_scale_ppm_k=260,
+            acceleration_bias_instability_ug=30,
             own_port=True,
             any_rate=True,
         ),
@@ -353,6 +332,8 @@ MAGNETOMETERS: Mapping[str, MagnetometerPart] = MappingProxyType(
         ),
     }
 )
+
+CATALOGUE: Mapping[str, Part | MagnetometerPart] = MappingProxyType({**PARTS, **MAGNETOMETERS})
 
 if TYPE_CHECKING:
     PartName = str

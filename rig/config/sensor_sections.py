@@ -1,30 +1,16 @@
 """The sections of a sensor: its part and rate, how it is mounted, the port of its own, what of it is known before."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.lines_section import GAP, LinesSection
 from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
 from rig.config.mavlink_section import MavlinkSection
-from rig.config.section import (
-    RATIO,
-    Positive,
-    Section,
-    Vector3,
-    checked_port,
-)
-from rig.config.sensor_catalogue import (
-    MAGNETOMETERS,
-    PARTS,
-    MagnetometerName,
-    PartName,
-    in_words,
-    nearest_rate,
-    one_of,
-)
+from rig.config.section import RATIO, Positive, Section, Vector3, checked_port
+from rig.config.sensor_catalogue import CATALOGUE, MAGNETOMETERS, PARTS, MagnetometerName, PartName, in_words
 
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
@@ -119,11 +105,45 @@ class AccelerationSection(Section):
     )
 
 
+class ConfiguredSensor(Protocol):
+    """What every sensor's section has, whatever it measures; what its part can do is in the catalogue."""
+
+    @property
+    def part(self) -> str: ...
+    @property
+    def serial_number(self) -> str: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def mounting(self) -> MountingSection: ...
+
+
+def checked_serial_number(value: str) -> str:
+    """A serial number that the board can store beside the calibration. Raises ValueError when it could not."""
+    if value == GAP:
+        raise ValueError("nobody but you knows it: write the number of this specimen here")
+    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
+    return value
+
+
+def the_part_has_it(value: float, info: ValidationInfo) -> float:
+    """A rate or range that the part can do, never silently another one."""
+    part = CATALOGUE.get(info.data.get("part", ""))
+    if part is None:
+        return value
+    return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
+
+
+SerialNumber = Annotated[str, AfterValidator(checked_serial_number)]
+OfThePart = Annotated[float, AfterValidator(the_part_has_it)]
+
+
 class SensorSection(Section):
     """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
     part: PartName = Field(description="which gyroscope it is; `lines` is any that prints its samples as lines")
-    serial_number: str = Field(
+    serial_number: SerialNumber = Field(
         description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
         "its own, and another number is refused",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
@@ -133,10 +153,10 @@ class SensorSection(Section):
         description="purpose of the sensor: it is calibrated, or it is the reference with which the others are "
         "compared; at most one is the reference",
     )
-    rate_hz: float = Field(
+    rate_hz: OfThePart = Field(
         description="samples per second, one of the part's rates; 333.33 means 1000/3", json_schema_extra=OF_THE_PART
     )
-    range_deg_s: float = Field(
+    range_deg_s: OfThePart = Field(
         description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
         json_schema_extra=OF_THE_PART,
     )
@@ -192,21 +212,6 @@ class SensorSection(Section):
             return data
         usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
         return {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
-
-    @field_validator("serial_number")
-    @classmethod
-    def the_board_can_keep_it(cls, value: str) -> str:
-        """The board stores it beside the calibration, in a field of fixed width."""
-        return checked_serial_number(value)
-
-    @field_validator("rate_hz", "range_deg_s")
-    @classmethod
-    def the_part_has_it(cls, value: float, info: ValidationInfo) -> float:
-        """A rate or range that the part can do, never silently another one."""
-        part = PARTS.get(info.data.get("part", ""))
-        if part is None:
-            return value
-        return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
 
     @field_validator("acceleration")
     @classmethod
@@ -267,51 +272,22 @@ class SensorSection(Section):
         return value
 
 
-def checked_serial_number(value: str) -> str:
-    """Raises ValueError when the board could not keep it."""
-    if value == GAP:
-        raise ValueError("nobody but you knows it: write the number of this specimen here")
-    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
-        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
-    return value
-
-
 class MagnetometerSection(Section):
     """One magnetometer on the board, under a name that no gyroscope has: recorded, and calibrated in attitudes."""
 
     part: MagnetometerName = Field(description="which magnetometer it is")
-    serial_number: str = Field(
+    serial_number: SerialNumber = Field(
         description="serial number of this sensor; in every result",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
-    rate_hz: float = Field(
+    rate_hz: OfThePart = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
         description="samples per second, one of the part's rates",
         json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
     )
-    range_gauss: float = Field(
+    range_gauss: OfThePart = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss[0],
         description="full scale, one of the part's ranges; 1 gauss is 100 µT, twice the Earth's field",
         json_schema_extra={"unit": "gauss", "allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss)},
     )
     mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
-
-    @field_validator("serial_number")
-    @classmethod
-    def as_any_other(cls, value: str) -> str:
-        """A serial number, checked as a gyroscope's is."""
-        return checked_serial_number(value)
-
-    @field_validator("rate_hz")
-    @classmethod
-    def a_rate_of_the_part(cls, value: float, info: ValidationInfo) -> float:
-        """A rate that the part has, never silently another one."""
-        part = MAGNETOMETERS.get(info.data.get("part", ""))
-        return value if part is None else nearest_rate(value, part.rates_hz, in_words(part.rates_hz))
-
-    @field_validator("range_gauss")
-    @classmethod
-    def a_range_of_the_part(cls, value: float, info: ValidationInfo) -> float:
-        """A range that the part has, never silently another one."""
-        part = MAGNETOMETERS.get(info.data.get("part", ""))
-        return value if part is None else one_of(value, part.ranges_gauss)

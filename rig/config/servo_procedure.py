@@ -13,7 +13,7 @@ from rig.config.servo_section import FASTEST_DEG_S
 from rig.config.stage_section import Instruction, StageMountSection, mount_matrix
 
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
-AXES_SPAN = 0.5  # the smallest singular value of the shaft's directions in the item; 1 where they are orthogonal
+AXES_SPAN = 0.5  # the smallest singular value of the directions that are swept; 1 where they are orthogonal
 HANDS = "switch the servo's supply off with a hand on the item, screw it on with its {axis} axis along the shaft, away "
 REST = "from the servo, and switch the supply on"
 

@@ -51,18 +51,13 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike, weights: Array
         return _solution(p - gamma[:, None] * q, centre, steps, found)
 
 
-def algorithm_1_batch(
-    means_rad_s: ArrayLike,
-    speeds_rad_s: ArrayLike,
-    weights: ArrayLike | None = None,
-    tolerance: float = ALGORITHM_1_TOLERANCE,
-) -> BatchSolution:
+def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
     """SIX, Algorithm 1, as published, for every run; `iterations` counts as `by_algorithm_1` does.
 
-    Shapes as in `newton_batch`: `means_rad_s` (R, N, 3), `speeds_rad_s` and `weights` (N,) or (R, N).
+    Shapes as in `newton_batch`: `means_rad_s` (R, N, 3), `speeds_rad_s` (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
-    p, q, _ = _responses(means, speeds_rad_s, weights)
+    p, q, _ = _responses(means, speeds_rad_s, None)
     beta, last_change = p.copy(), np.full(len(p), np.inf)
     passes = np.ones(len(p), dtype=np.int64)
     active, converged = np.ones(len(p), dtype=np.bool_), np.zeros(len(p), dtype=np.bool_)
@@ -74,7 +69,7 @@ def algorithm_1_batch(
             gamma = np.sum(beta[at, 3:] ** 2 / (4 * beta[at, :3]), axis=1)
             improved = p[at] - gamma[:, None] * q[at]
             change = np.sum(np.abs(improved - beta[at]), axis=1)
-            done = change <= tolerance
+            done = change <= ALGORITHM_1_TOLERANCE
             growing = ~done & ~(change < last_change[at])
             beta[at], last_change[at] = improved, change
             passes[at] += 1

@@ -49,7 +49,7 @@ class ImuSolution:
     - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.accelerometer_model`); zero for what was
       held. `response` (22, 3 K): how they change with the readings.
     - `attitude_error`: δ of the arm, about each axis.
-    - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
+    - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and of the sweeps', which
       left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
     - `own`: what the sensor adds, with what the readings say of it; None where nothing is known.
@@ -65,7 +65,6 @@ class ImuSolution:
     response: Array
     attitude_error: AttitudeError
     dwell_residuals_m_s2: Array
-    sweep_residuals_m_s2: Array
     chi_square: float
     freedom: int
     rank: int
@@ -143,7 +142,6 @@ def solve_imu(
         if attitude_std_rad is None
         else AttitudeError(attitude_std_rad, 0.0),
         dwell_residuals_m_s2=residuals[:count],
-        sweep_residuals_m_s2=residuals[count:].reshape(-1, 3, 3),
         chi_square=float(white @ white),
         freedom=freedom,
         rank=told.rank,

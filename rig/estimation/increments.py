@@ -102,15 +102,6 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
     )
 
 
-def noise_rad2(durations_s: Array, random_walk_rad_sqrt_s: float, bias_walk_rad_s_sqrt_s: float = 0.0) -> Array:
-    """Variance (w,) of an increment about each axis by white noise of the rate and a bias that walks from its start on.
-
-    Angle random walk N: N² T; a bias that is right at the start and walks by K: K² T³/3.
-    """
-    variance: Array = random_walk_rad_sqrt_s**2 * durations_s + bias_walk_rad_s_sqrt_s**2 * durations_s**3 / 3
-    return variance
-
-
 def _blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
     """Readings and the instants between them; each block begins with the last reading of the one before."""
     first = 0

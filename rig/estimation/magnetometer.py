@@ -58,12 +58,6 @@ def solve_magnetometer(
     return MagnetometerSolution(fit.matrix, fit.bias, fit.reference, hard_iron, fit.covariance, fit)
 
 
-def field(readings_t: ArrayLike, solution: MagnetometerSolution) -> Array:
-    """Calibrated readings (…, 3) in tesla, in body coordinates."""
-    readings = np.asarray(readings_t, dtype=np.float64)
-    return np.asarray((readings - solution.bias_t) @ np.linalg.inv(solution.matrix).T, dtype=np.float64)
-
-
 @dataclass(frozen=True, slots=True)
 class Uniformity:
     """Whether the field was the same in all attitudes: χ² of what the model leaves, and what noise rarely makes it.

@@ -223,25 +223,23 @@ def converging() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class Conditioning:
-    """Rank, condition number (largest over smallest singular value that should count), and the weakest column."""
+    """Rank, condition number (largest over smallest singular value that should count)."""
 
     rank: int
     condition: float
-    weakest: int
 
 
 def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
     """Conditioning of a design (n, p) with columns in comparable units, of which `needed` directions must be told.
 
     Singular values at rounding, or within three times `noise` (the norm that measurement noise gives a design which is
-    itself measured), do not count towards the rank. `weakest` is the column that dominates the direction least told.
+    itself measured), do not count towards the rank.
     """
-    _, singular, directions = np.linalg.svd(design, full_matrices=False)
+    _, singular, _ = np.linalg.svd(design, full_matrices=False)
     floor = max(1e-10 * float(singular[0]), 3 * noise)
     last = float(singular[needed - 1]) if len(singular) >= needed else 0.0
     condition = float(singular[0]) / last if last > 0 else float("inf")
-    weakest = int(np.argmax(np.abs(directions[min(needed, len(directions)) - 1])))
-    return Conditioning(int(np.sum(singular > floor)), condition, weakest)
+    return Conditioning(int(np.sum(singular > floor)), condition)
 
 
 def check_conditioning(told: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:

@@ -22,7 +22,6 @@ from rig.estimation.arrays import Array
 
 MODEL = "g = K (m + b)"
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
-PARAMETER_UNITS = ("1", "1", "1", "rad/s", "rad/s", "rad/s")
 
 ALGORITHM_1_TOLERANCE = 1e-6  # SIX, Algorithm 1
 ALGORITHM_1_LIMIT = 1000

@@ -22,6 +22,7 @@ from rig.estimation.own_errors import KnownSensor, OwnError, own_errors
 from rig.estimation.vector_model import VectorSolution, check_told, design_matrix, of_the_speed
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
+TELLS = 0.25  # of the largest load: what is smaller has less than a sixteenth of its weight in the scale factor
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +141,15 @@ class Explained:
     nonlinearity: Nonlinearity | None
     mounts: Array = field(default_factory=partial(np.zeros, 0))
     mounts_covariance: Array = field(default_factory=partial(np.zeros, (0, 0)))
+
+    @property
+    def loads_rad_s(self) -> Array:
+        """(3, 2) smallest and largest rate along its x, y, z, either way, in the sweeps that tell its scale factors."""
+        along = np.abs(self.seen.turns_rad_s @ (self.solution.matrix * self.solution.scale[:, None]).T)
+        largest = along.max(axis=0)
+        smallest = np.where(along >= TELLS * largest, along, np.inf).min(axis=0)
+        loads: Array = np.column_stack([smallest, largest])
+        return loads
 
 
 def centripetal_m_s2(turns_rad_s: Array, way_m: Array) -> Array:

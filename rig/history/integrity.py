@@ -35,12 +35,12 @@ class Found:
         return self.state in ("changed", "missing")
 
 
-def examined(history: History, computer: str | None = None) -> Iterator[Found]:
+def examined(history: History) -> Iterator[Found]:
     """Rows against the journal, every run's against its result, files against their hashes where they were seen last.
 
     What was entered on another computer and is not to be seen from here is `elsewhere`.
     """
-    here = computer or platform.node()
+    here = platform.node()
     for each in history.broken():
         yield Found(each.what, each.state, each.why)
     documents = _documents_by_folder(history)

@@ -39,12 +39,12 @@ def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.
     return place(said or section.url)
 
 
-def own_place(said: str | None, environment: Mapping[str, str] = os.environ) -> Place | None:
+def own_place(said: str | None) -> Place | None:
     """The user's: as `said` in a command, else in `RIG_HISTORY`, else the file of their own; None where it is off.
 
     Raises Refused `history_address`.
     """
-    said = said or environment.get(ENVIRONMENT)
+    said = said or os.environ.get(ENVIRONMENT)
     return None if said == OFF else place(said)
 
 

@@ -1,5 +1,6 @@
 """Series of calibrations: what they say of a sensor over the years, and of the rigs it was calibrated on. Pure."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
@@ -10,7 +11,6 @@ import numpy as np
 from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
-from rig.history.statistics.agreement import normalised_error
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
@@ -120,8 +120,8 @@ class Change:
 
     @property
     def normalised_error(self) -> float:
-        """E_n; above 1 the change is beyond the uncertainty."""
-        return normalised_error(self.before.value, self.now.value, self.before.expanded, self.now.expanded)
+        """E_n = |y₂ − y₁| / √(U₁² + U₂²) (ISO 13528:2022, 9.7); above 1 the change is beyond the uncertainty."""
+        return abs(self.now.value - self.before.value) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property
     def beyond(self) -> bool:

@@ -123,7 +123,6 @@ class Segmenter:
     def __init__(self, range_rad_s: float | None = None) -> None:
         self._range_rad_s = range_rad_s
         self._pieces: list[tuple[Array, Array, Array | None]] = []
-        self._left_out: list[float] = []  # the middles of moves that were taken back
         self._given_s = -np.inf  # beginning of the last rest that was given
         self._looked_s = -np.inf
         self._session = Handled(np.empty(0), np.empty((0, 3)), None, (), ())
@@ -147,10 +146,6 @@ class Segmenter:
             self._given_s = rest.start_s
         return tuple(found)
 
-    def leave_out(self, move: Move) -> None:
-        """Takes a move back: it ties the rests beside it no more."""
-        self._left_out.append((move.start_s + move.end_s) / 2)
-
     @property
     def handled(self) -> Handled:
         """Everything so far, to the last rest that has settled."""
@@ -158,11 +153,7 @@ class Segmenter:
         count = len(session.rests)
         while count and session.rests[count - 1].end_s - session.rests[count - 1].start_s < SETTLED_S - 2 * MARGIN_S:
             count -= 1
-        moves = tuple(
-            replace(move, left_out=any(move.start_s < middle < move.end_s for middle in self._left_out))
-            for move in session.moves[: max(count - 1, 0)]
-        )
-        return replace(session, rests=session.rests[:count], moves=moves)
+        return replace(session, rests=session.rests[:count], moves=session.moves[: max(count - 1, 0)])
 
     @property
     def live(self) -> Live:

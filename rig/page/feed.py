@@ -132,11 +132,6 @@ class Broadcast:
         """Whether the run is over."""
         return self._feed.ended
 
-    @property
-    def deserted(self) -> bool:
-        """Whether nobody looks."""
-        return not self._mailboxes
-
     def post(self, frame: bytes) -> None:
         """One frame for everybody."""
         for mailbox in self._mailboxes:

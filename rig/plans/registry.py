@@ -1,19 +1,21 @@
-"""The procedures by name. A package adds its own through the entry-point group `rig.procedures`.
+"""The procedures by name: the stock ones, and those that packages add through the entry-point group `rig.procedures`.
 
-Nothing in the rig knows a procedure except through its `Procedure`; one that is not installed comes from a file of its
-own (`rig.plans.script_file`).
+The stock ones are those of `STOCK_SECTIONS`: the script of each is the module of its name in `procedures/`. Nothing in
+the rig knows a procedure except through its `Procedure`; one that is not installed comes from a file of its own
+(`rig.plans.script_file`).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from rig.analysis.analyses import calibrated
 from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator
 from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
+from rig.config.procedure_sections import STOCK_SECTIONS
 from rig.data.run_file import RunData
 from rig.errors import Refused
 from rig.motion.state import Joints
@@ -101,8 +103,9 @@ Procedures = Mapping[str, AnyProcedure]
 @cache
 def _found() -> Mapping[str, tuple[AnyProcedure, str]]:
     """The installed procedures by name, each with the module it stands in."""
+    stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
     found = {}
-    for entry in entry_points(group=GROUP):
+    for entry in (*stock, *entry_points(group=GROUP)):
         try:
             procedure = entry.load()
         except (ImportError, AttributeError) as error:

@@ -16,8 +16,8 @@ from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
 from rig.analysis.shortest import Budgets, Candidate, Planned, Reached, Searched, Shortest, Wanted, shortest
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedure_sections import LONGEST_SWEEP_S, SPEED_TO_RANGE, SixObservationSection
-from rig.config.servo_procedure import ServoSixObservationSection
+from rig.config.procedure_sections import LONGEST_SWEEP_S, SixObservationSection
+from rig.config.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.solution import REAL_HANDS

@@ -11,6 +11,7 @@ import numpy as np
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.section import Direction
+from rig.config.servo_procedure import AXES_SPAN
 from rig.config.stage_section import Wrist, mount_matrix
 from rig.errors import Refused
 from rig.estimation.arrays import Array
@@ -23,8 +24,6 @@ from rig.motion.steps import Plan, Rest, Stage, Step, Sweep, Transfer, trapezoid
 from rig.plans.drift import drift_effect
 from rig.plans.ways import approach, transfer
 
-# The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
-AXES_SPAN = 0.5
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
 BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")
 WORTHWHILE = 2 / 3  # an order that is not better by a third is not worth leaving the paper's

@@ -37,7 +37,6 @@ class Dwelled(Protocol):
 
 
 FEWEST_DECIMALS = 5
-PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
 def triple(values: Iterable[float], form: str) -> str:

@@ -24,8 +24,9 @@ from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import REFERENCE, SECOND, F
 from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.sensor_axes import SensorAxes
+from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triaxial import TriaxialSolution
-from rig.report.axes import PARAMETERS, dwell_entry
+from rig.report.axes import dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 

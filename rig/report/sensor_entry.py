@@ -6,7 +6,6 @@ import numpy as np
 
 from rig.analysis.calibration import SensorResult
 from rig.analysis.freedom_beside import of_angles, of_sensitivity
-from rig.analysis.loads import loads_rad_s
 from rig.analysis.onboard_check import Agreement
 from rig.data.quantity import RATE
 from rig.data.result_file import (
@@ -79,7 +78,7 @@ def _uncertain(result: SensorResult) -> dict[str, Any]:
     if (explained := result.explained) is not None:
         found["bias_process"] = bias_process_entry(explained)
         found["speeds_rad_s"] = explained.seen.speeds_rad_s
-        found["loads_rad_s"] = loads_rad_s(explained)
+        found["loads_rad_s"] = explained.loads_rad_s
         if explained.nonlinearity is not None:
             found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:

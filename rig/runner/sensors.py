@@ -11,7 +11,7 @@ from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibrat
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
 from rig.config.models import SensorsConfig
-from rig.config.sensor_sections import MagnetometerSection, SensorSection
+from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
@@ -96,7 +96,7 @@ def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> Boar
     return BoardSensor(info.index, _described(section, setup.rate_hz, field))
 
 
-def _described(section: SensorSection | MagnetometerSection, rate_hz: float, *channels: Channel) -> RecordedSensor:
+def _described(section: ConfiguredSensor, rate_hz: float, *channels: Channel) -> RecordedSensor:
     mounting = recorded_mounting(section.mounting)
     return RecordedSensor(section.part, section.serial_number, rate_hz, channels, mounting)
 

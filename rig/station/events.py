@@ -16,8 +16,6 @@ from rig.motion.steps import Plan, Step
 from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation
 
-Vector = tuple[float, float, float]
-
 
 @dataclass(frozen=True, slots=True)
 class BoardConnected:

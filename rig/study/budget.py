@@ -18,6 +18,7 @@ from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED
 from rig.estimation.own_errors import KnownSensor
+from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.vector_fit import Seen, centripetal_m_s2, explain
 from rig.estimation.vector_model import solve_vector_model
 from rig.study.report import Finding, Report, Settings, table
@@ -35,7 +36,6 @@ ATTITUDES = 72  # of a turn
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
 SAMPLE_RATE_HZ = 238.0
 WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID025715, table 4
-PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
 @dataclass(frozen=True, slots=True)

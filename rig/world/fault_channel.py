@@ -36,13 +36,11 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
-from rig.world.autopilot.mounting import AutopilotMount
 from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
-from rig.world.kvh1775.mounting import Mount
+from rig.world.instruments import Place
 from rig.world.laboratory import Laboratory
-from rig.world.lines.mounting import PrinterMount
 from rig.world.servo.bench import ServoBench
 from rig.world.servo.drive import Faults
 from rig.world.servo.wire_format import WRITE, Packet
@@ -58,6 +56,8 @@ SHOWN = (
     "Profile Velocity",
 )
 FAULTS = tuple(each.name for each in fields(Faults))
+KINDS = ("kvh", "autopilot", "printer")  # of instruments
+OF_LINE = {"bit_error_rate", "silent", "host_baud"}
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
 
 
@@ -69,11 +69,7 @@ class World(Protocol):
     clock: Clock
 
     @property
-    def kvh_lines(self) -> Mapping[str, SerialLine]: ...
-    @property
-    def autopilot_lines(self) -> Mapping[str, SerialLine]: ...
-    @property
-    def printer_lines(self) -> Mapping[str, SerialLine]: ...
+    def instrument_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
     def close_dashboard(self) -> None: ...
@@ -95,12 +91,8 @@ class ControlSession:
         self._buffer = bytearray()
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
         self._orders: dict[str, Callable[..., Reply | None]] = {
-            "kvh_fault": self._kvh_fault,
-            "kvh_power": self._kvh_power,
-            "autopilot_fault": self._autopilot_fault,
-            "autopilot_power": self._autopilot_power,
-            "printer_fault": self._printer_fault,
-            "printer_power": self._printer_power,
+            **{f"{kind}_fault": partial(self._instrument_fault, kind) for kind in KINDS},
+            **{f"{kind}_power": partial(self._instrument_power, kind) for kind in KINDS},
             "mount": lambda stage: world.laboratory.mount(int(stage)),
             "fit": lambda part: world.fit_part(str(part)),
             "air": self._air,
@@ -280,77 +272,24 @@ class ControlSession:
     def _sensor_fault(self, sensor: str, fault: str | None) -> None:
         self._world.laboratory.set_sensor_fault(sensor, fault)
 
-    def _kvh_fault(
-        self,
-        sensor: str,
-        *,
-        bit_error_rate: float | None = None,
-        lose: int = 0,
-        status: int | None = None,
-        test: int | None = None,
-        silent: bool | None = None,
-    ) -> None:
-        kvh = self._kvh(sensor).kvh
-        if kvh is None:
-            raise ValueError(f"the KVH 1775 {sensor!r} is switched off")
-        line, faults = self._world.kvh_lines[sensor], kvh.faults
-        line.bit_error_rate = line.bit_error_rate if bit_error_rate is None else float(bit_error_rate)
-        line.silent = line.silent if silent is None else bool(silent)
-        faults.lose += int(lose)
-        faults.status = faults.status if status is None else int(status)
-        faults.test = faults.test if test is None else int(test)
+    def _instrument_fault(self, kind: str, *, sensor: str = "", port: str = "", **wrong: Any) -> None:
+        instrument = self._place(kind, sensor or port).instrument
+        if instrument is None:
+            raise ValueError(f"the {kind} {sensor or port!r} is switched off")
+        line = self._world.instrument_lines[sensor or port]
+        for name in wrong.keys() & OF_LINE:
+            setattr(line, name, wrong.pop(name))
+        instrument.misbehave(**wrong)
 
-    def _kvh_power(self, sensor: str, on: bool) -> None:
-        mount = self._kvh(sensor)
-        self._world.laboratory.switch_on(sensor) if on else mount.switch_off()
+    def _instrument_power(self, kind: str, on: bool, *, sensor: str = "", port: str = "") -> None:
+        place = self._place(kind, sensor or port)
+        self._world.laboratory.switch_on(sensor or port) if on else place.switch_off()
 
-    def _kvh(self, sensor: str) -> Mount:
-        mounts = self._world.laboratory.kvhs
-        if sensor not in mounts:
-            raise ValueError(f"no KVH 1775 {sensor!r}; there are {', '.join(mounts) or 'none'}")
-        return mounts[sensor]
-
-    def _autopilot_fault(self, port: str, **wrong: float) -> None:
-        autopilot = self._autopilot(port).autopilot
-        if autopilot is None:
-            raise ValueError(f"the autopilot at {port!r} is switched off")
-        line = self._world.autopilot_lines[port]
-        for name, value in wrong.items():
-            if name == "armed":
-                autopilot.armed = bool(value)
-            elif name in ("silent", "bit_error_rate", "host_baud"):
-                setattr(line, name, value)
-            else:
-                setattr(autopilot.faults, name, value)  # an unknown name is an error: it has slots
-
-    def _autopilot_power(self, port: str, on: bool) -> None:
-        mount = self._autopilot(port)
-        self._world.laboratory.switch_on_autopilot(port) if on else mount.switch_off()
-
-    def _autopilot(self, port: str) -> AutopilotMount:
-        mounts = self._world.laboratory.autopilots
-        if port not in mounts:
-            raise ValueError(f"no autopilot at {port!r}; there are {', '.join(mounts) or 'none'}")
-        return mounts[port]
-
-    def _printer_fault(self, sensor: str, *, lose: int = 0, stuck: bool | None = None, **of_line: float) -> None:
-        printer = self._printer(sensor).printer
-        if printer is None:
-            raise ValueError(f"the device {sensor!r} is switched off")
-        printer.faults.lose += int(lose)
-        printer.faults.stuck = printer.faults.stuck if stuck is None else bool(stuck)
-        for name in of_line.keys() & {"bit_error_rate", "silent", "host_baud"}:
-            setattr(self._world.printer_lines[sensor], name, of_line[name])
-
-    def _printer_power(self, sensor: str, on: bool) -> None:
-        mount = self._printer(sensor)
-        self._world.laboratory.switch_on_printer(sensor) if on else mount.switch_off()
-
-    def _printer(self, sensor: str) -> PrinterMount:
-        mounts = self._world.laboratory.printers
-        if sensor not in mounts:
-            raise ValueError(f"no device that prints lines {sensor!r}; there are {', '.join(mounts) or 'none'}")
-        return mounts[sensor]
+    def _place(self, kind: str, name: str) -> Place:
+        places = {each: place for each, place in self._world.laboratory.instruments.items() if place.kind == kind}
+        if name not in places:
+            raise ValueError(f"no {kind} {name!r}; there are {', '.join(places) or 'none'}")
+        return places[name]
 
     def _silence_board(self, on: bool) -> None:
         """A cable that carries nothing, with its port still there."""

@@ -1,6 +1,6 @@
 """The simulated laboratory without its sockets: what turns, board and sensors on one clock, deterministic."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 
 import numpy as np
@@ -18,6 +18,7 @@ from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.instruments import Place
 from rig.world.kvh1775.mounting import mounts
 from rig.world.lines.mounting import printer_mounts
 from rig.world.magnetic_field import magnetic_field_of
@@ -49,28 +50,19 @@ class Laboratory:
         self._mount = np.eye(3)  # from the flange's frame to the item's
         self._laid_in: set[str] = set()  # parts of a series
         self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
-        self.kvhs = mounts(config, world)
-        self.autopilots = autopilot_mounts(config, world)
-        self.printers = printer_mounts(config, world)
+        # By the sensor's name; an autopilot, which may have several, by its port.
+        self.instruments: Mapping[str, Place] = {
+            **mounts(config, world),
+            **autopilot_mounts(config, world),
+            **printer_mounts(config, world),
+        }
         self.plug_in()
-        for name in self.kvhs:
+        for name in self.instruments:
             self.switch_on(name)
-        for port in self.autopilots:
-            self.switch_on_autopilot(port)
-        for name in self.printers:
-            self.switch_on_printer(name)
 
     def switch_on(self, name: str) -> None:
-        """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
-        self.kvhs[name].switch_on(self._motion_of, self._field_of, self._time_s)
-
-    def switch_on_printer(self, name: str) -> None:
-        """Give the device that prints lines of that name power, if it has none."""
-        self.printers[name].switch_on(self._motion_of, self._field_of, self._time_s)
-
-    def switch_on_autopilot(self, port: str) -> None:
-        """Give the autopilot at that port power, if it has none."""
-        self.autopilots[port].switch_on(self._motion_of, self._time_s)
+        """Give the instrument of that name power, if it has none. Raises KeyError when there is none."""
+        self.instruments[name].switch_on(self._motion_of, self._field_of, self._time_s)
 
     @property
     def on_arm(self) -> OnArm:
@@ -181,15 +173,9 @@ class Laboratory:
             self.board.advance(self._time_s)
         if self.body is not None:
             self.body.advance(self._time_s, self.heater_duty, powered=self.board is not None)
-        for mount in self.kvhs.values():
-            if mount.kvh is not None:
-                mount.kvh.advance(self._time_s)
-        for each in self.autopilots.values():
-            if each.autopilot is not None:
-                each.autopilot.advance(self._time_s)
-        for place in self.printers.values():
-            if place.printer is not None:
-                place.printer.advance(self._time_s)
+        for place in self.instruments.values():
+            if place.instrument is not None:
+                place.instrument.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:

@@ -22,7 +22,7 @@ from rig.config.world_models import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import PATIENCE_S, Clock
-from rig.world.fault_channel import ControlSession
+from rig.world.fault_channel import KINDS, ControlSession
 from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
@@ -57,30 +57,15 @@ class World:
         section = world_section(loaded)
         self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(lambda: self.laboratory.board)
-        self.kvh_lines = {
-            name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
-            for name, mount in self.laboratory.kvhs.items()
+        places = self.laboratory.instruments
+        self.instrument_lines = {
+            name: SerialLine(partial(getattr, place, "instrument"), section.seed) for name, place in places.items()
         }
-        self.autopilot_lines = {
-            port: SerialLine(partial(getattr, mount, "autopilot"), section.seed)
-            for port, mount in self.laboratory.autopilots.items()
-        }
-        self.printer_lines = {
-            name: SerialLine(partial(getattr, mount, "printer"), section.seed)
-            for name, mount in self.laboratory.printers.items()
-        }
-        for name, line in self.printer_lines.items():
-            if (printing := section.sensors[name].lines) is not None:
-                line.bit_error_rate = printing.bit_error_rate
+        for name, line in self.instrument_lines.items():
+            line.bit_error_rate = places[name].bit_error_rate
         turning = self.laboratory.turning
         self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
-        self.lines = (
-            self.line,
-            *self.kvh_lines.values(),
-            *self.autopilot_lines.values(),
-            *self.printer_lines.values(),
-            *filter(None, [self.servo_line]),
-        )
+        self.lines = (self.line, *self.instrument_lines.values(), *filter(None, [self.servo_line]))
         patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
         self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
@@ -95,42 +80,30 @@ class World:
                 else self._listen("turner.port", loaded.config.turner.address, self.servo_line, gathers=False)
             )
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
-            kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
-            for name, port in kvh_ports.items():
-                self._listen(f"sensors.{name}.serial.port", port, (self.kvh_lines | self.printer_lines)[name])
-            for port, line in self.autopilot_lines.items():
-                self._listen("mavlink.port", port, line)
+            for name, line in self.instrument_lines.items():
+                self._listen(*_port_of(loaded.config, name), line)
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
             self.network.close()
             raise
         pty = _open_pty(self.line, self.network.selector) if section.board.pty else None
-        kvh_ptys = {
+        ptys = {
             name: _open_pty(line, self.network.selector)
-            for name, line in self.kvh_lines.items()
-            if (kvh := section.sensors[name].kvh1775) is not None and kvh.pty
+            for name, line in self.instrument_lines.items()
+            if places[name].pty
         }
-        autopilot_ptys = {
-            port: _open_pty(line, self.network.selector)
-            for port, line in self.autopilot_lines.items()
-            if self.laboratory.autopilots[port].section.pty
-        }
-        printer_ptys = {
-            name: _open_pty(line, self.network.selector)
-            for name, line in self.printer_lines.items()
-            if (printing := section.sensors[name].lines) is not None and printing.pty
-        }
-        self._ptys = [*([pty] if pty else []), *kvh_ptys.values(), *autopilot_ptys.values(), *printer_ptys.values()]
+        self._ptys = [*([pty] if pty else []), *ptys.values()]
         self._description = {
             "ready": True,
             "arm": loaded.config.turner.address or None,
             "board": None if board is None else board.port,
             "pty": pty.path if pty else None,
-            "kvh_ports": kvh_ports,
-            "kvh_ptys": {name: each.path for name, each in kvh_ptys.items()},
-            "autopilot_ptys": {port: each.path for port, each in autopilot_ptys.items()},
-            "printer_ptys": {name: each.path for name, each in printer_ptys.items()},
+            "kvh_ports": {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None},
+            **{
+                f"{kind}_ptys": {name: each.path for name, each in ptys.items() if places[name].kind == kind}
+                for kind in KINDS
+            },
             "control": f"{host}:{control_port}",
         }
 
@@ -266,6 +239,14 @@ def _host_of(config: RigConfig) -> str:
     if config.turner.simulated_at is not None or config.board is None:
         return config.turner.simulated_at or ""
     return _address("board.port", config.board.port)[0]
+
+
+def _port_of(config: RigConfig, name: str) -> tuple[str, str]:
+    """The key of an instrument's port in the configuration, and the port; an autopilot has that for a name."""
+    if name not in config.sensors:
+        return "mavlink.port", name
+    key, port = config.sensors[name].own_port or ("", "")
+    return f"sensors.{name}.{key}", port
 
 
 def _closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:

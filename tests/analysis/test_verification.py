@@ -21,8 +21,7 @@ from rig.estimation.arrays import Array
 from rig.observation.observed_run import observe_runs
 from rig.observation.windows import rested
 from rig.report.figures import draw_verifications
-from rig.report.verification_entry import verification_entry
-from rig.report.verification_table import verification_lines, verification_table
+from rig.report.kinds.verification import verification_entry, verification_lines, verification_table
 from rig.station.events import Plotted
 from rig.station.words import line
 from support.solving import solve_runs

@@ -9,6 +9,7 @@ from rig.errors import RigError
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand import HandSolution, Told, progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
+from rig.observation.hand_runs import NotCounted
 from rig.observation.handled import Segmenter, handled
 from rig.world.hand.habits import Action, Face, Flip, Mistake, Turn
 from support.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, handle
@@ -155,17 +156,17 @@ def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = Turn(1, Mistake("short", 5.0))
     recorded = handle((*TWELVE[:9], Turn(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)
-    feed, known, asked = Segmenter(), [], []
+    feed, refused, known, asked = Segmenter(), NotCounted(), [], []
     for start in range(0, len(recorded.time_s), 12):
         rows = slice(start, start + 12)
         if feed.feed(recorded.time_s[rows], recorded.rates[rows], recorded.acceleration[rows]):
-            found = progress(feed.handled, TOLD)
+            found = progress(refused.without(feed.handled), TOLD)
             known.append(found.expanded_scale.max())
             if found.asked is not None:
                 asked.append((len(known), found.asked.problem.name))
-                feed.leave_out(feed.handled.moves[-1])
+                refused.moves.append((feed.handled.moves[-1].start_s, feed.handled.moves[-1].end_s))
     assert asked == [(12, "turn_not_closed")]
     assert known[0] > 0.1 and known[-1] < 6e-4
     assert (np.diff(known[8:]) < 1e-3).all()
-    faces: set[Face | str | None] = set(progress(feed.handled, TOLD).faces)
+    faces: set[Face | str | None] = set(progress(refused.without(feed.handled), TOLD).faces)
     assert faces == {"+x", "-x", "+y", "-y", "+z", "-z"}

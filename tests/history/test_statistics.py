@@ -6,11 +6,12 @@ from scipy import stats
 from statsmodels.stats.meta_analysis import combine_effects
 
 from rig.estimation.arrays import Array
-from rig.history.statistics.agreement import normalised_error
+from rig.history.series import Change
 from rig.history.statistics.charts import FEWEST, Chart, chart
 from rig.history.statistics.random_effects import fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
+from rig.report.kinds.followed import Parameter
 
 RIGS, SENSORS = ("A", "B"), ("s1", "s2", "s3", "s4")
 
@@ -130,8 +131,9 @@ def test_a_drift_of_a_tenth_and_a_shift_of_one_sigma_are_found(thorough: bool, c
 
 
 def test_results_agree_or_do_not() -> None:
-    assert normalised_error(1.0, 1.05, 0.03, 0.04) == pytest.approx(1.0)
-    assert normalised_error(1.05, 1.0, 0.03, 0.04) == pytest.approx(1.0)
+    first, second = Parameter("kx", 1.0, 0.015, None, "1"), Parameter("kx", 1.05, 0.02, None, "1")
+    assert Change("kx", "1", first, second).normalised_error == pytest.approx(1.0)
+    assert Change("kx", "1", second, first).normalised_error == pytest.approx(1.0)
 
 
 def test_the_recall_is_when_value_and_uncertainty_reach_the_limit() -> None:

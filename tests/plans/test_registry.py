@@ -33,7 +33,7 @@ if __name__ == "__main__":
 VERIFIED = CONFIGS / "lsm9ds1_adis16465.yaml"
 
 
-def test_the_stock_procedures_are_found_by_their_entry_points() -> None:
+def test_the_stock_procedures_are_found_by_the_names_of_their_sections() -> None:
     assert installed()["six_observation"] is six_observation.PROCEDURE
     assert installed()["verify"] is verify.PROCEDURE
     found = sections(installed())

@@ -12,8 +12,8 @@ from firmware_host.answers import Calibration, StoredCalibration
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.board_info import print_stored
+from rig.report.kinds.verification import verification_table
 from rig.report.table import print_outcome, print_result
-from rig.report.verification_table import verification_table
 from support.paths import DOCS
 from support.results import SENSOR, VERIFIED, result_document
 

@@ -8,10 +8,10 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from rig.world.servo.bus import Bus
-from rig.world.servo.on_a_pty import BusOnAPty
 from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import REBOOT, WRITE, Packet
+from support.bus_on_a_pty import BusOnAPty
 
 # As a servo is that is set up for the rig: 1 Mbit/s, no return delay, extended position mode, time-based profile.
 SET_UP: dict[str, int] = {"Baud Rate": 3, "Return Delay Time": 0, "Operating Mode": 4, "Drive Mode": 4}

@@ -25,7 +25,6 @@ MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX = (
     slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44),
 )  # fmt: skip
 RESTS = 44  # six of each rest from here on: attitude, bias
-UPWARDS = np.array([0.0, 0.0, 1.0])
 
 MATRIX_STD = 0.2  # of an element of F
 SENSITIVITY_STD = float(np.radians(0.1))  # rad/s per g, of an element of G
@@ -40,8 +39,8 @@ ALONG_M_S2 = 0.1  # what an accelerometer's own errors may be along the vertical
 HEADING_STD_RAD = 1.0
 HELD_HZ, AS_QUIET = 4.0, 1.5  # of a hand that holds it; so much more than the quiet rests scatters a rest as well
 
-MOVE, REST, WALK, FLAT, SQUARE, CLOSURE, LEANING, ACCELERATION, PRIOR = (
-    "move", "rest", "walk", "flat", "box", "closure", "lean", "acceleration", "prior",
+MOVE, REST, WALK, FLAT, CLOSURE, LEANING, ACCELERATION, PRIOR = (
+    "move", "rest", "walk", "flat", "closure", "lean", "acceleration", "prior",
 )  # fmt: skip
 
 

@@ -21,14 +21,12 @@ TOLD_FROM = 4  # moves, from which on one of them can be held against the others
 class Progress:
     """What a session tells so far.
 
-    - `expanded_scale`, `expanded_bias_rad_s`, `right_angles_rad` (3,): U (k = 2), by the session and its clock.
+    - `expanded_scale` (3,): U (k = 2), by the session and its clock.
     - `faces` of each rest, None on none; `moves` as they were taken; `solution` as if it ended here, if it told enough.
     - `asked`: what is wrong with the last move or the rest after it. `wanted`: faces on which it has not lain.
     """
 
     expanded_scale: Array
-    expanded_bias_rad_s: Array
-    right_angles_rad: Array
     faces: tuple[str | None, ...]
     rests: tuple[RestFound, ...]
     moves: tuple[MoveFound, ...]
@@ -44,31 +42,29 @@ def progress(session: Handled, told: Told) -> Progress:
     """
     unknown = np.full(3, UNKNOWN)
     if not session.rests:
-        return Progress(unknown, unknown, unknown, (), (), (), None, None, FACES)
+        return Progress(unknown, (), (), (), None, None, FACES)
     check_axes(session)
     asked = _at_a_glance(session)
     last = len(session.rests) - 1
     try:
         found = fit(session, told, trusted=last if last >= TOLD_FROM else None)
     except Fault as fault:
-        return Progress(unknown, unknown, unknown, (), (), (), None, asked or fault, FACES)
+        return Progress(unknown, (), (), (), None, asked or fault, FACES)
     if asked is None and last >= TOLD_FROM:
         asked = doubted(found, since=last)
     axes, chosen = SensorAxes.of(found.state.matrix), sought(found)
     covariance = found.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(found.state.matrix, axes.scale)
-    expanded = 2 * np.sqrt(np.diag(to_parameters @ covariance @ to_parameters.T))
-    expanded[:3] = np.hypot(expanded[:3], 2e-6 / np.sqrt(3) * told.clock_ppm * axes.scale)
+    expanded = 2 * np.sqrt(np.diag(to_parameters @ covariance @ to_parameters.T)[:3])
+    expanded = np.hypot(expanded, 2e-6 / np.sqrt(3) * told.clock_ppm * axes.scale)
     solution = solution_of(found)
     faces = found.faced.faces
     return Progress(
-        expanded[:3],
-        expanded[3:],
-        2 * axes.non_orthogonality_std_rad(covariance[:9, :9]),
+        expanded,
         faces,
         solution.rests,
         solution.moves,
-        solution if expanded[:3].max() < UNKNOWN / 4 else None,
+        solution if expanded.max() < UNKNOWN / 4 else None,
         asked,
         tuple(face for face in FACES if face not in faces),
     )

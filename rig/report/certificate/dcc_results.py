@@ -12,6 +12,7 @@ from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
+from rig.estimation.six_observation import PARAMETERS
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
@@ -24,7 +25,6 @@ FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{
 PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
 Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
 Skewed = VectorEntry | AccelerometerEntry | MagnetometerEntry
-SIX = ("kx", "ky", "kz", "bx", "by", "bz")
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
@@ -204,7 +204,7 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
     return _result(
         f"scale factors and biases{how} with their covariance",
         "The ellipsoid holds all six values at once with a probability of 95 %; the matrix is their covariance.",
-        real_list(SIX, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
+        real_list(PARAMETERS, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
     )
 
 

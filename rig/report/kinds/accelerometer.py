@@ -1,21 +1,39 @@
 """Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (TRIAX, section III-B)."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import NONLINEARITY
+from rig.analysis.acceleration import AccelerometerResult, HeldOut
+from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_accelerometer
-from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.accelerometer_entries import (
+    AccelerometerEntry,
+    AlignmentEntry,
+    DwellEntry,
+    HeldOutEntry,
+    InAttitudesEntry,
+)
 from rig.data.quantity import ACCELERATION
 from rig.data.result_types import ErrorEntry
-from rig.report.accelerometer_entry import accelerometer_entry
-from rig.report.axes import skew_known, triple
+from rig.errors import Fault
+from rig.estimation.accelerometer_model import DELAY, SECOND
+from rig.estimation.arrays import scale_of
+from rig.estimation.imu import MODEL
+from rig.estimation.own_errors import NONLINEARITY
+from rig.estimation.residuals import dwell_residual_std_m_s2
+from rig.estimation.six_observation import PARAMETERS
+from rig.estimation.triads import Alignment
+from rig.estimation.triaxial import TriaxialSolution
+from rig.report.axes import dwell_entry, skew_known, triple
+from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import accelerometers_elsewhere
+from rig.report.entry import counted, entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.triad import Words, attitude_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
@@ -32,6 +50,61 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
         )
         for name, result in outcome.accelerometers.items()
     }
+
+
+def accelerometer_entry(result: AccelerometerResult, **more: Any) -> AccelerometerEntry:
+    """Scale, bias and covariance; beside them the other methods from the attitudes alone, and what `more` there is."""
+    solution = result.solution
+    std, expected = np.sqrt(np.diag(solution.covariance)), dwell_residual_std_m_s2(solution, result.movement)
+    return entry(
+        AccelerometerEntry, result, result.sensor, solution,
+        role="calibrate",
+        range_m_s2=result.sensor.channel(ACCELERATION).range,
+        model=MODEL,
+        estimator="attitude_weighted",
+        covariance_combined=None if result.budget is None else result.budget.covariance,
+        budget=None if result.budget is None else budget_entry(result.budget),
+        covariance_order=PARAMETERS,
+        covariance_units=ACCELERATION.parameter_units,
+        second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
+        attitude_error_rad=solution.attitude_error.std_rad,
+        attitude_error_std_rad=solution.attitude_error.uncertainty_rad,
+        lever_arm_m=result.lever_arm_m,
+        lever_arm_std_m=result.lever_arm_std_m,
+        delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
+        alignment=None if result.alignment is None else _alignment(result.alignment),
+        dwells=[
+            dwell_entry(DwellEntry, ACCELERATION, *each)
+            for each in zip(result.dwells, solution.dwell_residuals_m_s2, expected, strict=True)
+        ],
+        beside={name: _beside(found) for name, found in result.beside.items()},
+        non_orthogonality_freedom=counted(of_acceleration_angles(result)),
+        second_order_freedom=counted(of_second_order(result)),
+        held_out=None if result.held_out is None else _held_out(result.held_out),
+        **more,
+    )  # fmt: skip
+
+
+def _alignment(alignment: Alignment) -> AlignmentEntry:
+    return entry(
+        AlignmentEntry, alignment,
+        rotation_rad=alignment.vector_rad,
+        std_rad=np.sqrt(np.diag(alignment.covariance_rad2)),
+    )  # fmt: skip
+
+
+def _held_out(held: HeldOut) -> HeldOutEntry:
+    return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
+
+
+def _beside(solution: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry:
+    if isinstance(solution, Fault):
+        return ErrorEntry(error=str(solution))
+    return entry(
+        InAttitudesEntry, solution,
+        scale=scale_of(solution.matrix),
+        bias_m_s2=solution.bias,
+    )  # fmt: skip
 
 
 def _lines(found: AccelerometerEntry) -> Iterator[str]:

@@ -13,7 +13,8 @@ from rig.data.budget_entries import expanded_uncertainties
 from rig.data.quantity import RATE
 from rig.data.result_file import BoardEntry, EstimateEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
 from rig.data.result_types import ErrorEntry, Role
-from rig.report.axes import PARAMETERS, decimals, matrix_lines, skew_known, triple
+from rig.estimation.six_observation import PARAMETERS
+from rig.report.axes import decimals, matrix_lines, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
 from rig.report.certificate import dcc_results
 from rig.report.earth_rate import earth_rate_lines

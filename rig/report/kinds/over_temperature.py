@@ -22,7 +22,6 @@ from rig.report.temperature_entry import temperature_entry
 from rig.report.temperature_words import about_lines, shown_rows
 from rig.station.plain_text import plain
 
-PPM = 1e-6
 SCALE_SLOPE, BIAS_SLOPE = slice(3, 6), slice(15, 18)  # of the covariance
 
 

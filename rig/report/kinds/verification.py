@@ -2,28 +2,98 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 from rich.table import Table
 
+from rig.analysis.comparison import Comparison
 from rig.analysis.outcome import Outcome
+from rig.analysis.verification import Verification
 from rig.data.quantity import RATE
-from rig.data.result_file import ResultDocument, VerificationEntry
+from rig.data.result_file import (
+    ComparisonEntry,
+    DeviationEntry,
+    ResultDocument,
+    RevolutionErrorEntry,
+    RotationEntry,
+    VerificationEntry,
+)
 from rig.report.certificate import dcc_results
+from rig.report.entry import entry
 from rig.report.kinds.kind import Found, Measured, ResultKind, Without
-from rig.report.verification_entry import verification_entry
-from rig.report.verification_table import verification_lines, verification_table
+from rig.station.plain_text import plain
 
 
 def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
     return {name: verification_entry(found) for name, found in outcome.verifications.items()}
 
 
+def verification_entry(verification: Verification) -> VerificationEntry:
+    """The statistics of both comparisons, without their curves."""
+    before, reference = verification.before, verification.reference
+    return entry(
+        VerificationEntry, verification,
+        reference=reference.name,
+        reference_scale=reference.scale,
+        reference_bias_rad_s=reference.bias_rad_s,
+        rotation=entry(RotationEntry, verification.rotation),
+        before=None if before is None else _comparison(before),
+        after=_comparison(verification.after),
+    )  # fmt: skip
+
+
+def _comparison(comparison: Comparison) -> ComparisonEntry:
+    return entry(
+        ComparisonEntry, comparison,
+        movement=entry(DeviationEntry, comparison.movement),
+        sweeps=entry(DeviationEntry, comparison.sweeps),
+        revolutions=[entry(RevolutionErrorEntry, turn, joint=turn.joint_name) for turn in comparison.revolutions],
+    )  # fmt: skip
+
+
 def _found(document: ResultDocument) -> Iterator[Found[VerificationEntry]]:
-    return (Found(name, RATE, entry) for name, entry in document.verification.items())
+    return (Found(name, RATE, each) for name, each in document.verification.items())
 
 
 def _printed(found: Found[VerificationEntry]) -> Iterator[Table | str]:
     yield verification_table(found.sensor, found.entry)
     yield from verification_lines(found.entry)
+
+
+def verification_table(name: str, found: VerificationEntry) -> Table:
+    """Error of each axis before and after, from a sensor's entry; a dash where there was no before."""
+    table = Table(
+        title=plain(f"{name} against {found.reference}, sweeps and rests", "table.title"), title_justify="left"
+    )
+    for heading in ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"):
+        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    before, after = found.before, found.after
+    for i, axis in enumerate("xyz"):
+        table.add_row(
+            axis,
+            "–" if before is None else f"{before.movement.rms_rad_s[i]:.4f}",
+            f"{after.movement.rms_rad_s[i]:.4f}",
+            "–" if after.noise_rad_s is None else f"{after.noise_rad_s[i]:.4f}",
+            "–" if before is None else f"{before.movement.mse_rad2_s2[i]:.2e}",
+            f"{after.movement.mse_rad2_s2[i]:.2e}",
+        )
+    return table
+
+
+def verification_lines(found: VerificationEntry) -> Iterator[str]:
+    """What stands below the table: how the two sensors sit to each other, the reference, whole turns, the delay."""
+    rotation = found.rotation
+    turned = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
+    yield f"mounted off nominal to the reference by: {turned} ° (± {np.degrees(max(rotation.std_rad)):.3f})"
+    errors = [turn.error_rad_s for turn in found.after.revolutions]
+    stds = [turn.std_rad_s for turn in found.after.revolutions]
+    yield f"the reference itself, against the arm: at most {found.reference_error_rad_s:.5f} rad/s off"
+    yield f"mean over a revolution after: at most {np.abs(errors).max():.5f} rad/s off (± {np.max(stds):.5f})"
+    held = [turn.gravity_rad_s for turn in found.after.revolutions]
+    if None not in held:
+        without = np.abs(np.array(errors) - np.array(held)).max()
+        yield f"    of which gravity, which the board cannot see: without it at most {without:.5f}"
+    for delay, std in zip(found.after.delay_s, found.after.delay_std_s, strict=True):
+        yield f"lags the reference by {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), taken out"
 
 
 def _in_short(found: Found[VerificationEntry]) -> Iterator[str]:

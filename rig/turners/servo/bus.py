@@ -52,7 +52,7 @@ class PortGone(BusError):
 class Bus:
     """The line to one servo. Only one thread at a time may use it."""
 
-    def __init__(self, path: str, baud: int, servo_id: int, slack_s: float = SLACK_S) -> None:
+    def __init__(self, path: str, baud: int, servo_id: int) -> None:
         """Opens and locks the port. Raises Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
         try:
             from dynamixel_sdk import PacketHandler
@@ -63,7 +63,7 @@ class Bus:
         self._gone = False
         self.alert = False  # of the newest reply
         try:
-            self._port = Port(path, baud, slack_s)
+            self._port = Port(path, baud, SLACK_S)
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise Refused.of(_no_port(path, baud, error)) from error
         try:

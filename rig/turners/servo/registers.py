@@ -27,7 +27,6 @@ class Register(NamedTuple):
 
 MODEL_NUMBER = Register(0, "<H", "Model Number")
 FIRMWARE = Register(6, "<B", "Firmware Version")
-RETURN_DELAY = Register(9, "<B", "Return Delay Time")
 DRIVE_MODE = Register(10, "<B", "Drive Mode")
 OPERATING_MODE = Register(11, "<B", "Operating Mode")
 SECONDARY_ID = Register(12, "<B", "Secondary ID")

@@ -81,6 +81,12 @@ class SimulatedAutopilot:
         """The speed of its port."""
         return self._baud
 
+    def misbehave(self, *, armed: bool | None = None, **faults: float) -> None:
+        """Set the faults that are given, and whether it is `armed`. Raises AttributeError for what it cannot do."""
+        self.armed = self.armed if armed is None else bool(armed)
+        for name, value in faults.items():
+            setattr(self.faults, name, value)
+
     def transmitted(self) -> bytes:
         """What it has sent since it was asked last."""
         data = bytes(self._sent)

@@ -1,7 +1,7 @@
 """The autopilots of the laboratory: their parameters, and the IMUs on the flange that they read."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from rig.world.autopilot.autopilot import SimulatedAutopilot
 from rig.world.autopilot.imu import Imu
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
-
-MotionAt = Callable[[float], Sequence[float]]
+from rig.world.instruments import FieldOf, MotionOf
 
 
 @dataclass(slots=True)
@@ -25,17 +24,24 @@ class AutopilotMount:
     A place between that no sensor names has an IMU too, which reads what the first one does.
     """
 
+    kind: ClassVar[str] = "autopilot"
+    bit_error_rate: ClassVar[float] = 0.0
     config: RigConfig
     world: WorldSection
     imus: dict[int, str]
     section: SimulatedAutopilotSection
     configured_baud: int
     parameters: Parameters
-    autopilot: SimulatedAutopilot | None = None  # None: without power
+    instrument: SimulatedAutopilot | None = None
 
-    def switch_on(self, motion_of: Callable[[SensorTruth], MotionAt], time_s: float) -> None:
+    @property
+    def pty(self) -> bool:
+        """Whether a pseudo-terminal is wanted too."""
+        return self.section.pty
+
+    def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
-        if self.autopilot is not None:
+        if self.instrument is not None:
             return
         section = self.section
         made = SimulatedAutopilot(
@@ -51,13 +57,13 @@ class AutopilotMount:
             time_s=time_s,
         )
         made.faults.lost, made.faults.doubled, made.faults.slowest = section.lost, section.doubled, section.slowest
-        self.autopilot = made
+        self.instrument = made
 
     def switch_off(self) -> None:
         """Take its power away."""
-        self.autopilot = None
+        self.instrument = None
 
-    def _imu(self, place: int, motion_of: Callable[[SensorTruth], MotionAt], time_s: float) -> Imu:
+    def _imu(self, place: int, motion_of: MotionOf, time_s: float) -> Imu:
         name = self.imus.get(place, next(iter(self.imus.values())))
         # It has an accelerometer whether the rig reads it or not.
         sensor = self.config.sensors[name]

@@ -11,7 +11,7 @@ from rig.world.hand.rotations import Array, shortest, turned, vector_of
 
 GRAVITY_M_S2 = 9.81
 MG = 1e-3 * GRAVITY_M_S2
-DROP_M_S2, KNOCKS = 160.0, 0.1  # what a drop is felt by; and of it a knock
+DROP_M_S2 = 160.0  # what a drop is felt by
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,9 @@ class Hand:
     Nothing but `seed` decides what is drawn, action for action.
     """
 
-    def __init__(self, habits: Habits, seed: int, face: Face = "+z") -> None:
-        self.habits, self.face = habits, face
+    def __init__(self, habits: Habits, seed: int) -> None:
+        self.habits = habits
+        self.face: Face = "+z"
         self.lies_from_s = 0.0
         self._rng = rng = np.random.default_rng(seed)
         self._normals = {name: _axis(name) @ turned(1e-3 * habits.faces_mrad * rng.normal(size=3)) for name in FACES}
@@ -45,7 +46,7 @@ class Hand:
         self._courses: list[Course] = []
         self._lost_s: list[tuple[float, float]] = []
         self._fell: list[tuple[float, Array, Array]] = []  # from when on, and by what the biases have jumped
-        self._attitude = self._laid(turned(rng.uniform(-3, 3) * np.array([0.0, 0.0, 1.0])), face)
+        self._attitude = self._laid(turned(rng.uniform(-3, 3) * np.array([0.0, 0.0, 1.0])), self.face)
         self._add(course_of(self._attitude, np.array([-STEP_S, 0.0]), np.zeros((2, 3)), habits), 0.0)
 
     def act(self, action: Action, start_s: float) -> float:

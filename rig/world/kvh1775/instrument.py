@@ -81,6 +81,13 @@ class Kvh1775:
         """The baud rate of both directions."""
         return float(self._memory["BAUD"])
 
+    def misbehave(self, *, lose: int = 0, status: int | None = None, test: int | None = None) -> None:
+        """Set the faults that are given; those of `lose` come on top of what is still to be lost."""
+        faults = self.faults
+        faults.lose += int(lose)
+        faults.status = faults.status if status is None else int(status)
+        faults.test = faults.test if test is None else int(test)
+
     def transmitted(self) -> bytes:
         """What it has sent since it was asked last."""
         data = bytes(self._sent)

@@ -1,7 +1,7 @@
 """The KVH 1775s of the laboratory: their memories, and the instruments on the flange that use them."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,30 +11,31 @@ from rig.config.world_models import SimulatedKvhSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.instruments import FieldOf, MotionOf
 from rig.world.kvh1775.instrument import Kvh1775
 from rig.world.kvh1775.memory import Memory
-
-MotionAt = Callable[[float], Sequence[float]]
 
 
 @dataclass(slots=True)
 class Mount:
     """One instrument's place: what stays there when it is switched off, which is its memory."""
 
+    kind: ClassVar[str] = "kvh"
+    bit_error_rate: ClassVar[float] = 0.0
     name: str
     config: RigConfig
     world: WorldSection
     memory: Memory
-    kvh: Kvh1775 | None = None  # None: without power
+    instrument: Kvh1775 | None = None
 
-    def switch_on(
-        self,
-        motion_of: Callable[[SensorTruth], MotionAt],
-        field_of: Callable[[MountedMagnetometer], MotionAt],
-        time_s: float,
-    ) -> None:
+    @property
+    def pty(self) -> bool:
+        """Whether a pseudo-terminal is wanted too."""
+        return _section(self.world, self.name).pty
+
+    def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
-        if self.kvh is not None:
+        if self.instrument is not None:
             return
         sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
         # It sends accelerations whether the rig reads them or not.
@@ -44,7 +45,7 @@ class Mount:
         magnetometer = MountedMagnetometer(
             sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
         )
-        self.kvh = Kvh1775(
+        self.instrument = Kvh1775(
             truth,
             motion_of(truth),
             self.memory,
@@ -59,7 +60,7 @@ class Mount:
 
     def switch_off(self) -> None:
         """Take its power away."""
-        self.kvh = None
+        self.instrument = None
 
 
 def mounts(config: RigConfig, world: WorldSection) -> dict[str, Mount]:

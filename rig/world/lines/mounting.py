@@ -1,7 +1,7 @@
 """The devices of the laboratory that print lines, on the flange."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,44 +11,53 @@ from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_models import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.instruments import FieldOf, MotionOf
 from rig.world.lines.printer import Printer
-
-MotionAt = Callable[[float], Sequence[float]]
 
 
 @dataclass(slots=True)
 class PrinterMount:
     """One device's place."""
 
+    kind: ClassVar[str] = "printer"
     name: str
     config: RigConfig
     world: WorldSection
-    printer: Printer | None = None  # None: without power
+    instrument: Printer | None = None
 
-    def switch_on(
-        self,
-        motion_of: Callable[[SensorTruth], MotionAt],
-        field_of: Callable[[MountedMagnetometer], MotionAt],
-        time_s: float,
-    ) -> None:
+    @property
+    def section(self) -> SimulatedLinesSection:
+        """What the world says of it."""
+        return self.world.sensors[self.name].lines or SimulatedLinesSection()
+
+    @property
+    def pty(self) -> bool:
+        """Whether a pseudo-terminal is wanted too."""
+        return self.section.pty
+
+    @property
+    def bit_error_rate(self) -> float:
+        """Share of wrong bits on its line."""
+        return self.section.bit_error_rate
+
+    def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
-        if self.printer is not None:
+        if self.instrument is not None:
             return
         sensor, simulated = self.config.sensors[self.name], self.world.sensors[self.name]
         if sensor.lines is None or sensor.serial is None:
             raise ValueError(f"{self.name} prints no lines")
-        section, baud = simulated.lines or SimulatedLinesSection(), sensor.serial.baud
-        prints = section.prints or sensor.lines
+        baud, prints = sensor.serial.baud, self.section.prints or sensor.lines
         if "ax" in prints.columns:  # it prints accelerations whether the rig reads them or not
             sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
         truth = SensorTruth(sensor, simulated, time_s)
         magnetometer = MountedMagnetometer(
             sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
         )
-        self.printer = Printer(
+        self.instrument = Printer(
             truth,
             motion_of(truth),
-            section,
+            self.section,
             prints,
             field_at=field_of(magnetometer),
             magnetometer=magnetometer.truth,
@@ -60,7 +69,7 @@ class PrinterMount:
 
     def switch_off(self) -> None:
         """Take its power away."""
-        self.printer = None
+        self.instrument = None
 
 
 def printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, PrinterMount]:

@@ -76,6 +76,11 @@ class Printer:
         self._sent = bytearray(b"".join(line.encode() + LINE_END for line in section.boot_text))
         self._line = b""
 
+    def misbehave(self, *, lose: int = 0, stuck: bool | None = None) -> None:
+        """Set the faults that are given; those of `lose` come on top of what is still to be lost."""
+        self.faults.lose += int(lose)
+        self.faults.stuck = self.faults.stuck if stuck is None else bool(stuck)
+
     def transmitted(self) -> bytes:
         """What it has sent since it was asked last."""
         data = bytes(self._sent)

@@ -1,7 +1,7 @@
 """A simulated servo as what turns the item: its shaft, the base it is screwed to, and its line."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import cos, sin
 
 import numpy as np
@@ -32,11 +32,9 @@ class ServoBench:
     may be late: what its sensors feel is then the shaft as it was.
     """
 
-    def __init__(
-        self, configured: ServoSection, world: WorldSection, wall: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, configured: ServoSection, world: WorldSection) -> None:
         section = world.servo
-        self._wall, self._began_s = wall, wall()
+        self._began_s = time.monotonic()
         self._site = site_of(world.site)
         self._ticks = 0
         seed = int(np.random.SeedSequence([world.seed, 430]).generate_state(1)[0])
@@ -63,7 +61,7 @@ class ServoBench:
 
     def now_s(self) -> float:
         """The servo's time: that on the wall, since the world began. No tick is ahead of it."""
-        return self._wall() - self._began_s + AHEAD_S
+        return time.monotonic() - self._began_s + AHEAD_S
 
     @property
     def time_s(self) -> float:

@@ -48,8 +48,8 @@ def joint_modes(robot: Robot) -> tuple[int, ...]:
     return (JOINT_MODES.get(robot.robot_mode, JOINT_MODE_OFF),) * 6
 
 
-def _volts_when_on(volts: float) -> Callable[[Robot], float]:
-    return lambda robot: volts if robot.robot_mode >= RobotMode.POWER_ON else 0.0
+def _supply_v(robot: Robot) -> float:
+    return 48.0 if robot.robot_mode >= RobotMode.POWER_ON else 0.0
 
 
 def _load(robot: Robot) -> Load:
@@ -103,8 +103,8 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_speed_fraction": ("DOUBLE", lambda r: r.speed_slider),
     "actual_digital_output_bits": ("UINT64", lambda r: r.digital_outputs),
     "actual_configurable_digital_output_bits": ("UINT64", lambda r: r.digital_outputs & CONFIGURABLE),
-    "actual_joint_voltage": ("VECTOR6D", lambda r: (_volts_when_on(48.0)(r),) * 6),
-    "actual_robot_voltage": ("DOUBLE", _volts_when_on(48.0)),
+    "actual_joint_voltage": ("VECTOR6D", lambda r: (_supply_v(r),) * 6),
+    "actual_robot_voltage": ("DOUBLE", _supply_v),
     "standard_analog_output0": ("DOUBLE", lambda r: r.analog_outputs[0]),
     "standard_analog_output1": ("DOUBLE", lambda r: r.analog_outputs[1]),
     "payload": ("DOUBLE", lambda r: r.payload_kg),
