@@ -45,7 +45,7 @@ def _limit(name: str) -> Iterator[str]:
         row = LIMITS[key]
         of = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
         unit = "" if row.unit == "1" else f", in {row.unit}"
-        yield f"limits.{key}: a limit that holds {of}: {Limits.model_fields[key].description}{unit}."
+        yield f"limits.{key}: a limit on {of}: {Limits.model_fields[key].description}{unit}."
         yield "More: docs/configuration.md"
 
 

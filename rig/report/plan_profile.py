@@ -46,8 +46,8 @@ def _of_axis(axis: str, sweeps: list[tuple[Sweep, float]]) -> Iterator[Point]:
         even_s = sweep.duration_s - 2 * ramp_s
         for for_s, turned_deg, rate, what in (
             (0.0, 0.0, 0.0, "at rest"),
-            (ramp_s, rate_deg_s * ramp_s / 2, rate_deg_s, "even rate begins"),
-            (even_s, rate_deg_s * even_s, rate_deg_s, "even rate ends"),
+            (ramp_s, rate_deg_s * ramp_s / 2, rate_deg_s, "constant rate begins"),
+            (even_s, rate_deg_s * even_s, rate_deg_s, "constant rate ends"),
             (ramp_s, rate_deg_s * ramp_s / 2, 0.0, "at rest"),
         ):
             at_s, angle_deg = at_s + for_s, angle_deg + turned_deg

@@ -114,7 +114,8 @@ def _print_steps(planned: Planned, console: Console) -> None:
         box=SIMPLE,
     )
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
-        table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
+        left, long = heading in ("step", "joints °"), heading == "joints °"  # where a stage's instruction stands too
+        table.add_column(heading, justify="left" if left else "right", no_wrap=not long)
     at_s = 0.0
     begins = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}
     for place, step in enumerate(plan.steps):
@@ -163,15 +164,19 @@ def _measured(plan: Plan) -> str:
 
 
 def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Table:
-    """A row for each thing that may happen, a column for each sensor."""
+    """A row for each thing that may happen, a column for each sensor; a dash where nothing checks it of this sensor."""
     from rig.report.told_words import size_words, told_from_entries
 
     table = Table(box=SIMPLE)
     table.add_column(f"what happens {what}")
     for name in by_sensor:
         table.add_column(plain(name), justify="right")
-    for row in zip(*map(told_from_entries, by_sensor.values()), strict=True):
-        table.add_row(row[0].what, *(size_words(each.size, each.unit) for each in row))
+    sizes = [
+        {each.what: size_words(each.size, each.unit) for each in told_from_entries(found)}
+        for found in by_sensor.values()
+    ]
+    for happens in dict.fromkeys(happens for found in sizes for happens in found):
+        table.add_row(happens, *(found.get(happens, "–") for found in sizes))
     return table
 
 
