@@ -83,7 +83,8 @@ class CheckEntry(Entry):
 class StoredPolynomialsEntry(Entry):
     """What a temperature changed of a stored calibration: rows for (T − `temperature_c`)ⁿ, n from 1 to 3, by axis.
 
-    `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b; beyond `range_c` as at its ends.
+    `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b. Beyond `range_c` it is as at
+    its ends.
     """
 
     range_c: Vector2
