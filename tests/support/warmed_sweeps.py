@@ -66,7 +66,8 @@ def drawn(
     bias = np.array([rng.normal(0, 0.01, 3), ways[0] * DATA_SHEET_BIAS_K, ways[1] * DATA_SHEET_BIAS_K / 80])
     return Drawn(
         scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
-        (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)), rng.normal(0, 3e-4, PLACES.shape), noise, walk,
+        (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)),
+        rng.normal(0, 3e-4, PLACES.shape), noise, walk,
     )  # fmt: skip
 
 
@@ -103,6 +104,7 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
     wandered = np.cumsum(
         rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
     )
+    wandered -= wandered.mean(axis=0)  # a bias is that of the whole run
     white = rng.normal(0, 1, of.felt.shape) * sensor.noise
     found: Array = (
         of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop

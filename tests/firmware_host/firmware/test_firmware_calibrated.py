@@ -1,5 +1,6 @@
 """The board remembers calibrations and streams by them: the core on this machine."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,9 @@ from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
 from rig.estimation.arrays import Array
-from rig.estimation.over_temperature import over_temperature
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
 from support.host_flash import HostFlash
-from support.warmed_sweeps import REFERENCE_C, drawn, readings, repeated, session
+from support.warmed_sweeps import REFERENCE_C, calibrated, drawn, session
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
@@ -338,9 +338,8 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
     before, after, u = [], [], []
     for seed in range(4):
         rng = np.random.default_rng([31, seed])
-        sensor = drawn(rng, gradient_k=0.0)
-        of = session()
-        found = over_temperature(repeated(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C, 0.1)
+        sensor = replace(drawn(rng, gradient_k=0.0, walk=0.0), leaning=np.zeros((12, 3)))
+        found = calibrated(sensor, session(), rng)
         board = HostBoard()
         setup = configured(board, sensor_index, 500, 15.625)
         about = {"model": 1, "serial_number": "1", "written_unix_s": 0, "temperature_c": REFERENCE_C}
