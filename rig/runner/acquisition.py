@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE, Quantity
+from rig.data.quantity import RATE, Scalar
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.motion.state import State
@@ -175,7 +175,7 @@ class Acquisition:
         with self._lock:
             return tuple(count.seen for count in self.counts.values())
 
-    def newest_of(self, quantity: Quantity) -> dict[str, tuple[float, float]]:
+    def newest_of(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
         """The newest reading of each sensor that has such a one, and before it when it was read, s."""
         with self._lock:
             heard = {name: (each.read_s, each.latest.get(quantity.name)) for name, each in self.counts.items()}

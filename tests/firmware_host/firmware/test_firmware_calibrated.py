@@ -342,7 +342,7 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
         found = calibrated(sensor, session(), rng)
         board = HostBoard()
         setup = configured(board, sensor_index, 500, 15.625)
-        about = {"model": 1, "serial_number": "1", "written_unix_s": 0, "temperature_c": REFERENCE_C}
+        about: dict[str, Any] = {"model": 1, "serial_number": "1", "written_unix_s": 0, "temperature_c": REFERENCE_C}
         board.ask(
             "write_calibration", sensor=sensor_index, **about,
             matrix=np.diag(found.scale[0]), bias_rad_s=-found.bias[0],
