@@ -1,19 +1,19 @@
 """What the board tells, as the rest of the program sees it: made from frames, no I/O."""
 
-import struct
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from firmware_host import protocol
-from firmware_host.frames import Frame
+from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+NOTHING: Matrix = ((0.0, 0.0, 0.0),) * 3  # of what temperature changes
 
 
 _DTYPES = {"imu_samples": IMU_SAMPLE_DTYPE, "field_samples": FIELD_SAMPLE_DTYPE}
@@ -263,10 +263,29 @@ class BoardSolution:
 
 
 @dataclass(frozen=True, slots=True)
+class StoredPolynomials:
+    """What a temperature of the part's own thermometer changes, inside `range_c` and at its ends beyond it.
+
+    Row n − 1 of each belongs to (T − `temperature_c`)ⁿ, n from 1 to 3, and has an axis in each column: what is added to
+    1 and multiplies m + b, and what is added to b.
+    """
+
+    range_c: tuple[float, float]
+    scale_change: Matrix
+    bias_change_rad_s: Matrix
+
+    def most(self) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) the most that scale, as a share, and bias can change by axis, from anywhere in the range."""
+        powers = (self.range_c[1] - self.range_c[0]) ** np.arange(1, 4)
+        return powers @ np.abs(self.scale_change), powers @ np.abs(self.bias_change_rad_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """A calibration as the board keeps it: rate = `matrix` (m + `bias_rad_s`).
 
     `model` is one of `protocol.MODELS`, `serial_number` the sensor's, `temperature_c` its own during the calibration.
+    `polynomials` are there of one over temperature: matrix and bias hold at `temperature_c` then.
     """
 
     model: str
@@ -275,6 +294,7 @@ class Calibration:
     temperature_c: float
     matrix: Matrix
     bias_rad_s: Vector
+    polynomials: StoredPolynomials | None = None
 
     @property
     def scale(self) -> Vector:
@@ -294,10 +314,16 @@ class Calibration:
             temperature_c=values["temperature_c"],
             matrix=values["matrix"],
             bias_rad_s=values["bias_rad_s"],
+            polynomials=StoredPolynomials(
+                (values["lowest_c"], values["highest_c"]), values["scale_change"], values["bias_change_rad_s"]
+            )
+            if values["lowest_c"] < values["highest_c"]
+            else None,
         )
 
     def values(self) -> dict[str, Any]:
         """The stored calibration as the fields of its message."""
+        found = self.polynomials or StoredPolynomials((self.temperature_c,) * 2, NOTHING, NOTHING)
         return {
             "model": protocol.MODELS.index(self.model),
             "serial_number": self.serial_number,
@@ -305,21 +331,16 @@ class Calibration:
             "temperature_c": self.temperature_c,
             "matrix": self.matrix,
             "bias_rad_s": self.bias_rad_s,
+            "lowest_c": found.range_c[0],
+            "highest_c": found.range_c[1],
+            "scale_change": found.scale_change,
+            "bias_change_rad_s": found.bias_change_rad_s,
         }
 
     def as_kept(self) -> Self:
         """The stored calibration as it comes back from the board: single precision, whole seconds."""
-        temperature_c, *matrix, bx, by, bz = struct.unpack(
-            "<13f", struct.pack("<13f", self.temperature_c, *(k for row in self.matrix for k in row), *self.bias_rad_s)
-        )
-        mxx, mxy, mxz, myx, myy, myz, mzx, mzy, mzz = matrix
-        return replace(
-            self,
-            written_utc=self.written_utc.replace(microsecond=0),
-            temperature_c=temperature_c,
-            matrix=((mxx, mxy, mxz), (myx, myy, myz), (mzx, mzy, mzz)),
-            bias_rad_s=(bx, by, bz),
-        )
+        (frame,) = FrameReader().feed(encode("write_calibration", 1, {"sensor": 0, **self.values()}))
+        return self.of(frame.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,7 +370,7 @@ class StoredCalibration:
 
     def document(self) -> dict[str, Any]:
         """The record as plain numbers, strings and lists."""
-        calibration = self.calibration
+        calibration, found = self.calibration, self.calibration.polynomials
         return {
             "sequence": self.sequence,
             "part": self.part,
@@ -362,6 +383,7 @@ class StoredCalibration:
             "scale": list(calibration.scale),
             "matrix": [list(row) for row in calibration.matrix],
             "bias_rad_s": list(calibration.bias_rad_s),
+            "over_temperature": None if found is None else asdict(found),
         }
 
 

@@ -18,6 +18,7 @@ from firmware_host.answers import (
     SensorInfo,
     SensorSetup,
     StoredCalibration,
+    StoredPolynomials,
     reset_cause,
     sample_batches,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "SensorInfo",
     "SensorSetup",
     "StoredCalibration",
+    "StoredPolynomials",
 ]
 
 # Erasing a flash page takes 22 ms, in which the microcontroller hears nothing: a request repeated meanwhile is lost.

@@ -2,7 +2,8 @@
 
 Flash and RAM are the linker's. The stack is what the board itself reports after a session on the emulator that asks
 for everything it can do: all gyroscopes streaming with accelerations, and a magnetometer, observations kept and
-averaged, both solutions, a move by hand solved, the heater on, a calibration written, read, streamed by and erased.
+averaged, both solutions, a move by hand solved, the heater on, a calibration over temperature written, read, streamed
+by and erased.
 """
 
 import io
@@ -130,7 +131,8 @@ def stack_used(image: bytes, elf: bytes) -> int:
         solution = solutions[len(METHODS) * sensor]
         found = {"matrix": np.diag(solution["scale"]), "bias_rad_s": solution["bias_rad_s"]}
         about = {"model": 1, "serial_number": "footprint", "written_unix_s": 0, "temperature_c": 25.0}
-        session.ask("write_calibration", sensor=sensor, **about, **found)
+        changed = dict.fromkeys(("scale_change", "bias_change_rad_s"), np.full((3, 3), 1e-7))
+        session.ask("write_calibration", sensor=sensor, **about, **found, **changed, lowest_c=0.0, highest_c=50.0)
         session.ask("read_calibration", sensor=sensor)
     session.ask("start", sensors=ALL)
     session.run(0.5)

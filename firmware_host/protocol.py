@@ -21,8 +21,8 @@ import numpy as np
 
 from firmware_host.problem import Problem
 
-PROTOCOL_VERSION = 5
-FIRMWARE_VERSION = "0.8.0"  # of the shipped image
+PROTOCOL_VERSION = 6
+FIRMWARE_VERSION = "0.9.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -159,9 +159,13 @@ CALIBRATION = (  # what the host knows of a calibration; the board adds which pa
     Field("model", "u8", "enum calibration_model"),
     Field("serial_number", "text24", "of the sensor, as the configuration names it"),
     Field("written_unix_s", "u64", "when it was written, seconds since 1970 UTC"),
-    Field("temperature_c", "f32", "of the sensor during the calibration, degrees Celsius"),
+    Field("temperature_c", "f32", "at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius"),
     Field("matrix", "matrix_f32", "what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal"),
     Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
+    Field("lowest_c", "f32", "from which on the polynomials hold; below it is corrected as there"),
+    Field("highest_c", "f32", "up to which they hold; without polynomials both are temperature_c"),
+    Field("scale_change", "matrix_f32", "k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known"),
+    Field("bias_change_rad_s", "matrix_f32", "b(T) − b likewise"),
 )
 
 MESSAGES = (

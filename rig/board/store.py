@@ -6,10 +6,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from firmware_host.client import Board, Calibration, StoredCalibration
+from firmware_host.client import Board, Calibration, StoredCalibration, StoredPolynomials
 from firmware_host.errors import BoardError
 from rig.board.identify import configured_board, find_sensor
 from rig.config.models import RigConfig
+from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 
@@ -48,8 +49,11 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
             yield name, store(board, index, calibration_of(results[name]))
 
 
-def calibration_of(solved: Solved) -> Calibration:
-    """A sensor's solution as the board keeps it, dated now. Raises Refused `not_in_result` without a temperature."""
+def calibration_of(solved: Solved, found: OverTemperatureEntry | None = None) -> Calibration:
+    """A sensor's solution as the board keeps it, dated now, with the polynomials of one over temperature.
+
+    Raises Refused `not_in_result` without a temperature.
+    """
     if solved.temperature_c is None:
         raise Refused(
             "not_in_result",
@@ -63,10 +67,18 @@ def calibration_of(solved: Solved) -> Calibration:
         model="matrix_times_m_plus_b" if solved.correction == "matrix" else "k_times_m_plus_b",
         serial_number=solved.serial_number,
         written_utc=datetime.now(UTC),
-        temperature_c=solved.temperature_c,
+        temperature_c=solved.temperature_c if found is None else found.reference_c,
         matrix=(x, y, z),
         bias_rad_s=(bx, by, bz),
+        polynomials=None if found is None else _polynomials(found),
     )
+
+
+def _polynomials(found: OverTemperatureEntry) -> StoredPolynomials:
+    shares = np.array(found.scale[1:]) / np.array(found.scale[0])
+    one, two, three = ((x, y, z) for x, y, z in shares.tolist())
+    first, second, third = found.bias[1:]
+    return StoredPolynomials(found.range_c, (one, two, three), (first, second, third))
 
 
 def store(board: Board, index: int, calibration: Calibration) -> StoredCalibration:

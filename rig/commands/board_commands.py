@@ -26,6 +26,7 @@ from rig.commands.laboratory import simulated_laboratory
 from rig.commands.own_address import loaded_here
 from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
+from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, passed_result
 from rig.errors import Fault, Refused
 from rig.report.board_info import BoardInfo, BoardSensor, print_info, print_stored
@@ -169,7 +170,7 @@ def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration
         )
     calibration, range_deg_s = f"{path}: the calibration of {place.name}", degrees(entry.range_rad_s)
     refuse_other_sensor(calibration, entry.part, entry.serial_number, range_deg_s, place.section)
-    return calibration_of(entry)
+    return calibration_of(entry, result.over_temperature.get(place.name, {}).get(RATE.name))
 
 
 def _on(board: Board, changes: Iterable[str]) -> list[str]:
@@ -180,7 +181,14 @@ def _replacing(place: _Place, calibration: Calibration) -> str:
     scale = " ".join(f"{value:.5f}" for value in calibration.scale)
     bias = " ".join(f"{value:+.5f}" for value in calibration.bias_rad_s)
     old = f"replaces {_in_words(place.stored)}" if place.stored is not None else "nothing was stored before"
-    return f"{place.name}: scale {scale}, bias {bias} rad/s; {old}"
+    return f"{place.name}: scale {scale}, bias {bias} rad/s{_corrected_from(calibration)}; {old}"
+
+
+def _corrected_from(calibration: Calibration) -> str:
+    if calibration.polynomials is None:
+        return ""
+    low, high = calibration.polynomials.range_c
+    return f" at {calibration.temperature_c:g} °C, corrected by temperature from {low:.1f} to {high:.1f} °C"
 
 
 def _in_words(stored: StoredCalibration) -> str:

@@ -80,6 +80,18 @@ class CheckEntry(Entry):
         return Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep)
 
 
+class StoredPolynomialsEntry(Entry):
+    """What a temperature changed of a stored calibration: rows for (T − `temperature_c`)ⁿ, n from 1 to 3, by axis.
+
+    `scale_change` is added to 1 and multiplies m + b, `bias_change_rad_s` is added to b. Beyond `range_c` it is as at
+    its ends.
+    """
+
+    range_c: Vector2
+    scale_change: Matrix3
+    bias_change_rad_s: Matrix3
+
+
 class StoredCalibrationEntry(Entry):
     """A calibration the board had stored while it corrected its readings: g = `matrix` (m + b), else K (m + b)."""
 
@@ -94,6 +106,7 @@ class StoredCalibrationEntry(Entry):
     scale: Vector3
     bias_rad_s: Vector3
     matrix: Matrix3 | None = None
+    over_temperature: StoredPolynomialsEntry | None = None
 
 
 class KinematicsEntry(Entry):

@@ -130,6 +130,24 @@ def expected_bias_process(
     return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean, shared=shared_rad2_s2, known=known)
 
 
+def walking_bias_process(
+    design: ArrayLike,
+    means_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    windows_s: ArrayLike,
+    *,
+    instability_rad_s: float = 0.0,
+) -> BiasProcess:
+    """The bias process where parameters stand over a long time, as slopes over temperature do.
+
+    Most of their uncertainty may be of a walk that the averages hardly show. So there is one, of any size alike before
+    (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the mean of those of all sizes.
+    """
+    return _bias_process(
+        design, means_rad_s, variances_rad2_s2, windows_s, _with_a_walk, shared=None, known=instability_rad_s
+    )
+
+
 def likeliest_bias_process(
     design: ArrayLike,
     means_rad_s: ArrayLike,
@@ -185,6 +203,16 @@ def _mean(sizes: Array, likelihood: Array) -> Array:
     belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(belief - belief.max())
     return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
+
+
+def _with_a_walk(sizes: Array, likelihood: Array) -> Array:
+    """(2,) root of the mean of the squares of sizes (K, 2): a walk of any size alike, a scatter as in `_mean`.
+
+    The sizes stand on a grid of powers, so a size is as likely before as the step to the next one is long.
+    """
+    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
+    weights = sizes[:, 0] * np.exp(belief - belief.max())
+    return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 
 
 def _likeliest(sizes: Array, likelihood: Array) -> Array:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, expected_bias_process
+from rig.estimation.bias_process import BiasProcess, walking_bias_process
 from rig.estimation.coverage import coverage_factors, effective_freedom
 from rig.estimation.refusals import check_finite
 
@@ -299,7 +299,7 @@ class _Fits:
         design = np.column_stack([places, some, *turned, *([self.loop] if self.both_ways else [])])
         basis, sizes, _ = np.linalg.svd(design, full_matrices=False)
         design = basis[:, sizes > 1e-9 * sizes[0]]
-        return expected_bias_process(
+        return walking_bias_process(
             design, self.left, seen.variances, seen.windows_s, instability_rad_s=seen.instability
         )
 
@@ -420,13 +420,22 @@ def _of_loop(size: Array, std: Array) -> Array:
 
 
 def _gradient(found: OverTemperature, half_width_k: float) -> Line:
-    """What a sensor does that is so much warmer than its thermometer: all of it moves along the polynomials."""
-    moved = np.zeros((2, HIGHEST + 1, 3))
-    for n in range(HIGHEST):
-        moved[:, n] = (n + 1) * np.array([found.scale[n + 1], found.bias[n + 1]])
-    pattern = half_width_k / np.sqrt(3) * moved.ravel()
-    source = f"± {half_width_k:g} K otherwise than here"
-    return Line(GRADIENT, "B", "rectangular", source, np.inf, np.outer(pattern, pattern))
+    """What a sensor does that is so much warmer than its thermometer: all of it moves along the polynomials.
+
+    By as much everywhere, and, apart from that, by as much one way at one end of the range as the other way at the
+    other: a heater's power, and what flows off into the air, grow with the temperature.
+    """
+    both = np.array([found.scale, found.bias])
+    steep = np.arange(1, HIGHEST + 1)[:, None] * both[:, 1:]
+    low, high = found.range_c
+    middle_k, half_k = (low + high) / 2 - found.reference_c, (high - low) / 2
+    even, tilted = np.zeros((2, *both.shape))
+    even[:, :-1] = steep
+    tilted[:, 1:] = steep / half_k
+    tilted -= middle_k / half_k * even
+    patterns = half_width_k / np.sqrt(3) * np.array([even.ravel(), tilted.ravel()])
+    source = f"± {half_width_k:g} K otherwise than here, and ± as much from end to end"
+    return Line(GRADIENT, "B", "rectangular", source, np.inf, patterns.T @ patterns)
 
 
 def _repeated_often(seen: Repeated) -> Repeated:

@@ -9,7 +9,14 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from firmware_host.answers import BoardIdentity, BoardStatus, SensorCounts, SensorInfo, StoredCalibration
+from firmware_host.answers import (
+    BoardIdentity,
+    BoardStatus,
+    SensorCounts,
+    SensorInfo,
+    StoredCalibration,
+    StoredPolynomials,
+)
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
@@ -144,6 +151,21 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
             elements = (f"{element:+.6f}" for element in row) if whole else ()
             table.add_row(axis, f"{scale:.6f}", f"{bias:+.6f}", *elements)
         console.print(table)
+        if calibration.polynomials is not None:
+            _print_polynomials(console, calibration.polynomials)
+
+
+def _print_polynomials(console: Console, found: StoredPolynomials) -> None:
+    low, high = found.range_c
+    console.print(
+        f"corrected by temperature from {low:.1f} to {high:.1f} °C, beyond as there; for each power of kelvins:"
+    )
+    table = Table(box=SIMPLE)
+    for heading in ("power", "scale x", "scale y", "scale z", "bias x rad/s", "bias y rad/s", "bias z rad/s"):
+        table.add_column(heading, justify="right")
+    for power, rows in enumerate(zip(found.scale_change, found.bias_change_rad_s, strict=True), start=1):
+        table.add_row(str(power), *(f"{each:+.3e}" for row in rows for each in row))
+    console.print(table)
 
 
 def _written(record: StoredCalibration) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE
+from rig.data.quantity import RATE, Scalar
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.motion.state import State
@@ -28,7 +28,8 @@ STANDING_S = 0.25  # between those recorded after: an arm that stands needs no m
 class SensorCount:
     """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers.
 
-    `latest` are the mean readings of the newest samples, by quantity.
+    `latest` are the mean readings of the newest samples, by quantity, and `read_s` is when these were read, by the
+    clock that stamps them.
     """
 
     name: str
@@ -36,6 +37,7 @@ class SensorCount:
     samples: int = 0
     lost: int = 0
     latest: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    read_s: float = 0.0
     _next_sequence: int = 0
 
     def add(self, samples: NDArray[Any]) -> None:
@@ -46,6 +48,7 @@ class SensorCount:
         self._next_sequence = last + 1
         self.samples += len(sequence)
         self.latest = self.sensor.means(samples)
+        self.read_s = 1e-6 * float(samples["board_time_us"].mean())
 
     @property
     def seen(self) -> SensorSamples:
@@ -171,6 +174,12 @@ class Acquisition:
         """What every sensor has delivered so far."""
         with self._lock:
             return tuple(count.seen for count in self.counts.values())
+
+    def newest_of(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
+        """The newest reading of each sensor that has such a one, and before it when it was read, s."""
+        with self._lock:
+            heard = {name: (each.read_s, each.latest.get(quantity.name)) for name, each in self.counts.items()}
+        return {name: (read_s, value[0]) for name, (read_s, value) in heard.items() if value is not None}
 
     def silent(self) -> list[str]:
         """The sensors that have delivered nothing yet."""

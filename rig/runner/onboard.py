@@ -5,7 +5,9 @@ each sweep the host names two board times and the measured speed, and at the end
 answers goes into the recording, where `rig.analysis.onboard_check` holds it against the host's own arithmetic.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +27,8 @@ from rig.runner.acquisition import Acquisition
 
 # From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
 KEEP_LONGER_S = 4.0
+
+Revolution = tuple[int, int, float]  # two board times, µs, and the speed between them, rad/s
 
 
 @dataclass(slots=True)
@@ -59,11 +63,30 @@ class BoardCalibration:
         self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
-    def observe(self, sweep: Sweep) -> None:
-        """Make the board average the revolution, just after it. One that is not fit for it is noted and left out."""
+    def revolutions(self, sweep: Sweep) -> dict[str, Revolution | Fault]:
+        """When the revolution was for each sensor, just after it, or why none was found; that may take seconds."""
+        found: dict[str, Revolution | Fault] = {}
         for name in self.sensors:
             try:
-                found, speed_rad_s = self._observe(name, sweep)
+                found[name] = self._revolution(name, sweep)
+            except Fault as error:
+                found[name] = error
+        return found
+
+    @contextmanager
+    def looking(self, sweep: Sweep) -> Iterator["Future[dict[str, Revolution | Fault]]"]:
+        """The revolutions, as they will be found meanwhile."""
+        pool = ThreadPoolExecutor(max_workers=1)
+        try:
+            yield pool.submit(self.revolutions, sweep)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+    def observe(self, sweep: Sweep, revolutions: Mapping[str, Revolution | Fault]) -> None:
+        """Make the board average the revolutions. One that is not fit for it is noted and left out."""
+        for name, revolution in revolutions.items():
+            try:
+                found, speed_rad_s = self._observe(name, revolution)
             except (Fault, BoardError) as error:
                 if error.name in ("board_link_lost", "board_error"):
                     raise
@@ -78,12 +101,19 @@ class BoardCalibration:
             for method in METHODS:
                 self.note(BoardSolved(name, self.board.solve(index, method)))
 
-    def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
+    def _observe(self, name: str, revolution: Revolution | Fault) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
-        index, sensor = self.sensors[name]
+        if isinstance(revolution, Fault):
+            raise revolution
+        start_us, end_us, speed_rad_s = revolution
+        index, _ = self.sensors[name]
+        return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
+
+    def _revolution(self, name: str, sweep: Sweep) -> Revolution:
+        _, sensor = self.sensors[name]
         samples, states, new = self.acquisition.kept(name)
         turned = np.array([state.to_record() for state in states], self.turner.dtype)
-        start_us, end_us, speed_rad_s = revolution_on_the_board(
+        return revolution_on_the_board(
             samples,
             sensor,
             turned,
@@ -93,7 +123,6 @@ class BoardCalibration:
             kinematics=self.turner.geometry,
             reading_std_rad=self.turner.reading_std_rad,
         )
-        return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 
     def _count(self, name: str) -> int:
         return self._observed.setdefault(name, 0)

@@ -303,8 +303,17 @@ class Rig:
         return self.early.passes_over(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        if self.along is not None:
-            self.along.observe(sweep)
+        """Let the board average the sweep. What it is told takes seconds to find; a heater is spoken to meanwhile."""
+        if self.along is None:
+            return
+        if self.warming is None:
+            found = self.along.revolutions(sweep)
+        else:
+            with self.along.looking(sweep) as looked:
+                while not looked.done():
+                    self.devices.turner.rest(SETTLING_LOOK_S, self._check)
+            found = looked.result()
+        self.along.observe(sweep, found)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""

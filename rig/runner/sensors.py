@@ -125,11 +125,16 @@ def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_
     raw = sensor.channel(RATE)
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count
-    bias_rad_s = np.abs(calibration.bias_rad_s)
+    bias_rad_s, share = np.abs(calibration.bias_rad_s), np.ones(3)
+    if calibration.polynomials is not None:  # wherever in their range it is
+        changed, moved_rad_s = calibration.polynomials.most()
+        share, bias_rad_s = 1 - changed, bias_rad_s + moved_rad_s
     # What a saturated reading becomes, at least: the other axes may read anything beside it.
     on_axis, beside = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
     np.fill_diagonal(beside, 0.0)
-    lowest_rad_s = float(np.min(on_axis @ (limit_rad_s - bias_rad_s) - beside @ (limit_rad_s + bias_rad_s)))
+    lowest_rad_s = float(
+        np.min(on_axis @ (share * (limit_rad_s - bias_rad_s)) - beside @ ((2 - share) * (limit_rad_s + bias_rad_s)))
+    )
     full_scale = int(lowest_rad_s / sensitivity_rad_s)
     rate = replace(raw, unit_per_count=sensitivity_rad_s, full_scale_counts=full_scale)
     return replace(sensor, mode="calibrated", channels=(rate, sensor.channel(TEMPERATURE)))

@@ -89,8 +89,9 @@ class Warming:
         if self._of_set is not None:
             self._of_set.append(now_c)
         self._refuse_hot(now_c)
-        for name, temperature_c in now_c.items():
-            self._refuse_fast(name, time_s, temperature_c)
+        for name, (read_s, temperature_c) in self.acquisition.newest_of(TEMPERATURE).items():
+            if name in now_c:
+                self._refuse_fast(name, read_s, temperature_c)
         self._heat(time_s, now_c)
 
     def now_c(self) -> dict[str, float]:
@@ -156,9 +157,12 @@ class Warming:
                 "Let it cool; heat with less power (procedure.heater_power) or from farther away, then resume",
             )
 
-    def _refuse_fast(self, name: str, time_s: float, temperature_c: float) -> None:
+    def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
+        """By when the board read its thermometer: when this program hears of it is another thing on a busy computer."""
         seen = self._seen.setdefault(name, deque())
-        seen.append((time_s, temperature_c))
+        if seen and read_s <= seen[-1][0]:
+            return
+        seen.append((read_s, temperature_c))
         while seen[-1][0] - seen[0][0] > RATE_SPAN_S:
             seen.popleft()
         if seen[-1][0] - seen[0][0] < RATE_LEAST_S:

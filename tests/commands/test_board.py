@@ -22,6 +22,7 @@ from rig.board.store import calibration_of, store
 from rig.config.sensor_sections import SensorSection
 from rig.data.result_file import passed_result, read_result, write_result
 from rig.errors import Refused
+from support.certified import over_temperature
 from support.results import SENSOR, VERIFIED, result_document
 from support.worlds import World, WorldHandle, worlds
 
@@ -129,6 +130,28 @@ def test_a_calibration_is_stored_read_back_kept_through_a_reset_and_erased(
     assert [name for name, record in stored(config).items() if record is not None] == ["gyro"]
     assert rig("calibration", "erase", config, "--yes").stdout == "erased: gyro\n"
     assert "nothing to erase" in rig("calibration", "erase", config, "--yes").stdout
+
+
+def test_a_calibration_over_temperature_is_stored_with_its_polynomials_and_shown(config: Path, tmp_path: Path) -> None:
+    folder, found = result(tmp_path), over_temperature()
+    document = json.loads((folder / "result.json").read_text())
+    document["over_temperature"] = {"gyro": {"rate": found.model_dump(mode="json")}}
+    (folder / "result.json").write_text(json.dumps(document))
+    try:
+        done = rig("calibration", "write", config, folder, "--sensor", "gyro", "--yes")
+        assert done.returncode == 0 and "corrected by temperature from" in done.stderr, done
+        entry = stored(config)["gyro"]
+        assert entry["temperature_c"] == pytest.approx(found.reference_c)
+        kept = entry["over_temperature"]
+        assert kept["range_c"] == pytest.approx(found.range_c)
+        for n in range(3):
+            shares = [each / one for each, one in zip(found.scale[n + 1], found.scale[0], strict=True)]
+            assert kept["scale_change"][n] == pytest.approx(shares, rel=1e-6)
+            assert kept["bias_change_rad_s"][n] == pytest.approx(found.bias[n + 1], rel=1e-6)
+        table = rig("calibration", "read", config, "--sensor", "gyro").stdout
+        assert "corrected by temperature from" in table and f"{found.bias[1][0]:+.3e}" in table
+    finally:
+        rig("calibration", "erase", config, "--sensor", "gyro", "--yes")
 
 
 def test_nothing_is_changed_unless_somebody_agrees(config: Path, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import UTC, datetime
 from zlib import crc32
 
@@ -15,7 +16,7 @@ import pytest
 from cobs import cobs
 
 from firmware_host import protocol
-from firmware_host.client import Board, Calibration, SampleBatch
+from firmware_host.client import Board, Calibration, SampleBatch, StoredPolynomials
 from firmware_host.errors import BoardError
 from firmware_host.frames import FrameReader, decode, encode
 from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
@@ -209,6 +210,31 @@ CALIBRATION = Calibration(
     matrix=((1.1771, 0.0, 0.0), (0.0, 1.1554, 0.0), (0.0, 0.0, 1.1440)),
     bias_rad_s=(0.0077, -0.0100, -0.0051),
 )
+
+
+OVER_TEMPERATURE = replace(
+    CALIBRATION,
+    polynomials=StoredPolynomials(
+        (15.0, 62.5),
+        ((3e-4, -2e-4, 2e-4), (2e-6, 1e-6, -1e-6), (0.0, 0.0, 0.0)),
+        ((5e-4, -4e-4, 3e-4), (5e-6, 3e-6, -4e-6), (1e-8, 0.0, 0.0)),
+    ),
+)
+
+
+@ON_ONE_WIRE
+def test_polynomials_over_temperature_are_stored_with_a_calibration(wire: tuple[BoardOnAWire, str]) -> None:
+    with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
+        board.configure(0, 238, 245)
+        board.write_calibration(0, OVER_TEMPERATURE)
+        stored = board.read_calibration(0)
+        assert stored is not None and stored.calibration == OVER_TEMPERATURE.as_kept()
+        told = stored.document()["over_temperature"]
+        assert told["range_c"] == (15.0, 62.5) and told["scale_change"][0] == pytest.approx((3e-4, -2e-4, 2e-4))
+        board.write_calibration(0, CALIBRATION)
+        stored = board.read_calibration(0)
+        assert stored is not None and stored.calibration == CALIBRATION.as_kept()
+        assert stored.calibration.polynomials is None and stored.document()["over_temperature"] is None
 
 
 @ON_ONE_WIRE

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.data.quantity import TEMPERATURE
 from rig.data.result_file import read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
@@ -89,6 +90,19 @@ def test_a_heater_takes_the_sensors_through_the_range(heated: Path) -> None:
     assert [(each.first, each.end) for each in sets] == [(6 * k, 6 * k + 6) for k in range(len(sets))]
     assert all(each.heated for each in of_events(run, TemperatureWanted))
     assert run.settings.reference_c == 30
+
+
+def test_the_heater_goes_on_while_the_rig_looks_at_its_sweeps(heated: Path) -> None:
+    """It goes off 2 s after the last word from the host; then this body loses half a kelvin in a second.
+
+    On a busy machine it may go off for a moment, but not for as long as it takes to find a revolution there.
+    """
+    run = read_run(heated / "run.h5")
+    cooling = [each for each in run.events if isinstance(each.event, TemperatureWanted) and not each.event.warming]
+    samples = run.samples["gyro"]
+    warming = samples["host_time_s"] < min((each.host_time_s for each in cooling), default=np.inf)
+    warm = run.sensors["gyro"].channel(TEMPERATURE).values(samples[warming]).ravel()
+    assert (np.maximum.accumulate(warm) - warm).max() < 4
 
 
 def test_its_result_has_what_the_world_makes_of_the_sensor(heated: Path) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+from firmware_host.answers import NOTHING
 from firmware_host.frames import Frame, encode
 from support.emulated_session import PARTS, Session
 
@@ -23,6 +24,10 @@ CALIBRATION = {
     "temperature_c": 22.0,
     "matrix": ((1.1771, -0.0030, 0.0020), (-0.0031, 1.1554, -0.0025), (0.0021, -0.0026, 1.1440)),
     "bias_rad_s": (0.0077, -0.0100, -0.0051),
+    "lowest_c": 22.0,
+    "highest_c": 22.0,
+    "scale_change": NOTHING,
+    "bias_change_rad_s": NOTHING,
 }
 STARTING = 80  # conversions that may be no samples: those a part makes while it settles
 STOPPING = 5  # samples that may come from later conversions than the request to stop

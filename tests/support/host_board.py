@@ -157,9 +157,10 @@ def convert(
     sensor: int = 0,
     *,
     acceleration: Sequence[int] = (0, 0, 0),
+    temperature_counts: int = -48,
 ) -> None:
     """One conversion: the interrupt at `time_us`, the main loop `late_us` after."""
-    list(board.parts.values())[sensor].convert(counts, -48, acceleration)
+    list(board.parts.values())[sensor].convert(counts, temperature_counts, acceleration)
     board.data_ready(time_us, sensor)
     board.wait_until(time_us + late_us)
     board.run()

@@ -26,22 +26,24 @@ class Drawn:
     """A gyroscope: k(T) = k₀ (1 + s₁ d + s₂ d²), what a reading adds c(T) = c₀ + c₁ d + c₂ d², d = T − 25 °C.
 
     `hysteresis` (3,) is how much more it reads half-way when it warms, `lag_s` its thermometer's, `gradient_k` by how
-    much it is warmer in use than its thermometer says, beside how much it was in the run. `leaning` (P, 3): what each
-    place adds, such as an arm's axis that leans.
+    much it is warmer in use than its thermometer says, beside how much it was in the run: at the middle of the range,
+    and what is more at its upper end. `leaning` (P, 3): what each place adds, such as an arm's axis that leans.
     """
 
     scale: Array
     bias: Array
     hysteresis: Array
     lag_s: float
-    gradient_k: float
+    gradient_k: tuple[float, float]
     leaning: Array
     noise: float
     walk: float
 
     def at(self, temperature_c: float) -> Array:
         """(6,) k and c where the thermometer says that temperature, in use."""
-        powers = (temperature_c + self.gradient_k - REFERENCE_C) ** np.arange(3)
+        even, tilted = self.gradient_k
+        warmer_k = even + tilted * (2 * temperature_c - FROM_C - TO_C) / (TO_C - FROM_C)
+        powers = (temperature_c + warmer_k - REFERENCE_C) ** np.arange(3)
         return np.concatenate([powers @ self.scale, powers @ self.bias])
 
 
@@ -64,7 +66,8 @@ def drawn(
     bias = np.array([rng.normal(0, 0.01, 3), ways[0] * DATA_SHEET_BIAS_K, ways[1] * DATA_SHEET_BIAS_K / 80])
     return Drawn(
         scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
-        gradient_k * rng.uniform(-1, 1), rng.normal(0, 3e-4, PLACES.shape), noise, walk,
+        (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)),
+        rng.normal(0, 3e-4, PLACES.shape), noise, walk,
     )  # fmt: skip
 
 
@@ -101,6 +104,7 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
     wandered = np.cumsum(
         rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
     )
+    wandered -= wandered.mean(axis=0)  # a bias is that of the whole run
     white = rng.normal(0, 1, of.felt.shape) * sensor.noise
     found: Array = (
         of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop

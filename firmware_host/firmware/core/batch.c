@@ -38,7 +38,7 @@ static void write_rates(const struct sample *sample, uint32_t delta_us, const st
     const struct reading *reading = &sample->reading;
     struct rates_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
     int32_t rate_urad_s[3];
-    correction_apply(correction, reading->counts, rate_urad_s);
+    correction_apply(correction, reading, rate_urad_s);
     memcpy(item.rate_urad_s, rate_urad_s, sizeof item.rate_urad_s);
     memcpy(bytes, &item, sizeof item);
 }

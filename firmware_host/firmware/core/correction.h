@@ -1,20 +1,27 @@
-/* Applies a calibration to readings: g = M (m + b), from counts straight to microradians per second. */
+/* Applies a calibration to readings: g = M S(T) (m + b(T)), from counts straight to microradians per second. S is diagonal
+   and has each axis' scale factor over that at which M was found; S − 1 and b(T) − b are polynomials of temperature. */
 #ifndef CORRECTION_H
 #define CORRECTION_H
 
 #include <stdint.h>
 
+#include "sensor.h"
+
 struct correction {
     float gain_urad_s[3][3]; /* per count */
-    float offset_urad_s[3];
+    float offset_counts[3];
+    float kelvin_per_count, kelvin_at_zero; /* the thermometer's, from where matrix and bias hold */
+    float least_k, most_k;                  /* the polynomials' range */
+    float scale_change[3][3], offset_change_counts[3][3]; /* per K, K², K³, by axis */
 };
 
-/* For readings of so many rad/s per count. */
-struct correction correction_of(const float matrix[3][3], const float bias_rad_s[3], float sensitivity_rad_s);
+/* For a part that is set up so. */
+struct correction correction_of(const struct calibration_payload *record, const struct setup_payload *setup);
 
 /* The calibrated rate, rounded; what does not fit is the largest that does. Single precision rounds a gain three times,
-   its product once and each sum once: beside half a microradian per second the error is at most 8 · 2⁻²⁴ of the sum of
-   the magnitudes, which is 3 µrad/s at 245 °/s, where a count is 153. */
-void correction_apply(const struct correction *correction, const int16_t counts[3], int32_t rate_urad_s[3]);
+   what it is multiplied by four times, its product once and each sum once: beside half a microradian per second the error
+   is at most 8 · 2⁻²⁴ of the sum of the magnitudes without polynomials, which is 3 µrad/s at 245 °/s, where a count is 153.
+   Polynomials add 8 · 2⁻²⁴ of it for the share, and 8 · 2⁻²⁴ of the sum of their terms' magnitudes. */
+void correction_apply(const struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3]);
 
 #endif

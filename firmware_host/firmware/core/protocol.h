@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 5u
-#define FIRMWARE_VERSION "0.8.0"
+#define PROTOCOL_VERSION 6u
+#define FIRMWARE_VERSION "0.9.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
@@ -329,11 +329,15 @@ struct calibration_payload {
     uint8_t model; /* enum calibration_model */
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
-    float temperature_c; /* of the sensor during the calibration, degrees Celsius */
+    float temperature_c; /* at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius */
     float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
     float bias_rad_s[3]; /* b, in the units of the reading */
+    float lowest_c; /* from which on the polynomials hold; below it is corrected as there */
+    float highest_c; /* up to which they hold; without polynomials both are temperature_c */
+    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known */
+    float bias_change_rad_s[3][3]; /* b(T) − b likewise */
 } __attribute__((packed));
-_Static_assert(sizeof(struct calibration_payload) == 109, "calibration_payload");
+_Static_assert(sizeof(struct calibration_payload) == 189, "calibration_payload");
 
 /* write_calibration, from the host: store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack */
 struct write_calibration_payload {
@@ -341,11 +345,15 @@ struct write_calibration_payload {
     uint8_t model; /* enum calibration_model */
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
-    float temperature_c; /* of the sensor during the calibration, degrees Celsius */
+    float temperature_c; /* at which matrix and bias hold, by the sensor's own thermometer, degrees Celsius */
     float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
     float bias_rad_s[3]; /* b, in the units of the reading */
+    float lowest_c; /* from which on the polynomials hold; below it is corrected as there */
+    float highest_c; /* up to which they hold; without polynomials both are temperature_c */
+    float scale_change[3][3]; /* k(T)/k − 1 per K, K², K³ from temperature_c, a row each; 0 = none known */
+    float bias_change_rad_s[3][3]; /* b(T) − b likewise */
 } __attribute__((packed));
-_Static_assert(sizeof(struct write_calibration_payload) == 86, "write_calibration_payload");
+_Static_assert(sizeof(struct write_calibration_payload) == 166, "write_calibration_payload");
 
 /* erase_calibration, from the host: forget the calibration of a sensor; answered by ack */
 struct erase_calibration_payload {

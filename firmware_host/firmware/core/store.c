@@ -11,8 +11,9 @@
    a page whose erasing was cut off and that still looks like a record. */
 
 #define SLOTS 2u
-#define SEAL 0x324C4143u          /* "CAL2": another layout takes another number, and an older image finds no record then */
-#define DIAGONAL_SEAL 0x314C4143u /* "CAL1", up to firmware 0.2.1: three scale factors in the place of the matrix */
+#define SEAL 0x334C4143u          /* "CAL3": another layout takes another number, and an older image finds no record then */
+#define CONSTANT_SEAL 0x324C4143u /* "CAL2", up to firmware 0.8.0: it ends before what temperature changes */
+#define DIAGONAL_SEAL 0x314C4143u /* "CAL1", up to firmware 0.2.1: three scale factors in the place of the matrix besides */
 
 struct slot {
     struct calibration_payload record;
@@ -23,6 +24,13 @@ struct slot {
 
 #define DOUBLEWORDS (sizeof(struct slot) / sizeof(uint64_t))
 
+struct constant_slot {
+    uint8_t record[offsetof(struct calibration_payload, lowest_c)];
+    uint8_t unused[3];
+    uint32_t seal;
+    uint32_t crc;
+} __attribute__((packed));
+
 struct diagonal_slot {
     uint8_t head[offsetof(struct calibration_payload, matrix)];
     float scale[3];
@@ -32,7 +40,8 @@ struct diagonal_slot {
     uint32_t crc;
 } __attribute__((packed));
 
-_Static_assert(sizeof(struct calibration_payload) == 109, "another layout takes another seal");
+_Static_assert(sizeof(struct calibration_payload) == 189, "another layout takes another seal");
+_Static_assert(sizeof(struct constant_slot) == 120, "as it lies in flash");
 _Static_assert(sizeof(struct diagonal_slot) == 96, "as it lies in flash");
 _Static_assert(sizeof(struct slot) % sizeof(uint64_t) == 0 && offsetof(struct slot, seal) % sizeof(uint64_t) == 0,
                "the seal is the last doubleword");
@@ -53,12 +62,6 @@ static bool read_sealed(unsigned page, void *slot, size_t size, uint32_t seal)
     return end[0] == seal && end[1] == frame_crc(0, slot, size - sizeof end);
 }
 
-static bool is_diagonal(unsigned page)
-{
-    struct diagonal_slot slot;
-    return read_sealed(page, &slot, sizeof slot, DIAGONAL_SEAL);
-}
-
 static bool read_diagonal(unsigned page, struct calibration_payload *record)
 {
     struct diagonal_slot slot;
@@ -72,11 +75,30 @@ static bool read_diagonal(unsigned page, struct calibration_payload *record)
     return true;
 }
 
+static bool read_constant(unsigned page, struct calibration_payload *record)
+{
+    struct constant_slot slot;
+    if (!read_sealed(page, &slot, sizeof slot, CONSTANT_SEAL))
+        return false;
+    *record = (struct calibration_payload){0};
+    memcpy(record, slot.record, sizeof slot.record);
+    return true;
+}
+
+/* One of before, which knows one temperature alone. */
+static bool read_older(unsigned page, struct calibration_payload *record)
+{
+    if (!read_constant(page, record) && !read_diagonal(page, record))
+        return false;
+    record->lowest_c = record->highest_c = record->temperature_c;
+    return true;
+}
+
 static bool read_record(unsigned page, struct calibration_payload *record)
 {
     struct slot slot;
     if (!read_sealed(page, &slot, sizeof slot, SEAL))
-        return read_diagonal(page, record);
+        return read_older(page, record);
     *record = slot.record;
     return true;
 }
@@ -127,8 +149,8 @@ bool store_write(unsigned sensor, struct calibration_payload *record)
     slot.crc = frame_crc(0, (const uint8_t *)&slot, offsetof(struct slot, seal));
     bool stored = port_flash_erase(page) && program(page, &slot) && read_sealed(page, &written, sizeof written, SEAL) &&
                   memcmp(&written, &slot, sizeof slot) == 0;
-    /* An image that knows only the old layout would correct by the calibration before, which it can still read. */
-    if (stored && found != SLOTS && is_diagonal(page_of(sensor, found)))
+    /* An image that knows only an older layout would correct by the calibration before, which it can still read. */
+    if (stored && found != SLOTS && read_older(page_of(sensor, found), &newest))
         port_flash_erase(page_of(sensor, found));
     return stored;
 }

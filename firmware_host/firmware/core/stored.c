@@ -42,11 +42,28 @@ static bool is_usable_matrix(const struct write_calibration_payload *calibration
     return usable;
 }
 
+/* How much a polynomial can change an axis, at most, that far away. */
+static float most_change(const float change[3][3], unsigned axis, float away_k)
+{
+    return away_k * (__builtin_fabsf(change[0][axis]) +
+                     away_k * (__builtin_fabsf(change[1][axis]) + away_k * __builtin_fabsf(change[2][axis])));
+}
+
+#define MOST_SCALE_CHANGE 0.5f /* of any sensor over any temperatures */
+
+/* NaN is larger and smaller than nothing. */
 static bool is_usable(const struct write_calibration_payload *calibration)
 {
-    bool usable = is_usable_matrix(calibration);
+    float scale_change[3][3], bias_change_rad_s[3][3], reference_c = calibration->temperature_c;
+    memcpy(scale_change, calibration->scale_change, sizeof scale_change);
+    memcpy(bias_change_rad_s, calibration->bias_change_rad_s, sizeof bias_change_rad_s);
+    float away_k = calibration->highest_c - calibration->lowest_c;
+    bool usable = is_usable_matrix(calibration) && calibration->lowest_c <= reference_c &&
+                  reference_c <= calibration->highest_c && away_k < LARGEST;
     for (unsigned axis = 0; axis < 3; axis++)
-        usable = usable && __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST;
+        usable = usable && __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST &&
+                 most_change(scale_change, axis, away_k) < MOST_SCALE_CHANGE &&
+                 most_change(bias_change_rad_s, axis, away_k) < LARGEST;
     return usable;
 }
 
@@ -95,6 +112,10 @@ static enum error_code write(const struct write_calibration_payload *wanted)
     record.temperature_c = wanted->temperature_c;
     memcpy(record.matrix, wanted->matrix, sizeof record.matrix);
     memcpy(record.bias_rad_s, wanted->bias_rad_s, sizeof record.bias_rad_s);
+    record.lowest_c = wanted->lowest_c;
+    record.highest_c = wanted->highest_c;
+    memcpy(record.scale_change, wanted->scale_change, sizeof record.scale_change);
+    memcpy(record.bias_change_rad_s, wanted->bias_change_rad_s, sizeof record.bias_change_rad_s);
     return is_stored(&record) || store_write(wanted->sensor, &record) ? 0 : ERROR_FLASH_FAILED;
 }
 
@@ -139,9 +160,6 @@ enum error_code stored_correction(unsigned sensor, struct correction *correction
     if (memcmp(record.part, present.part, sizeof record.part) != 0 || record.who_am_i != present.who_am_i ||
         record.range_deg_s != present.range_deg_s)
         return ERROR_OTHER_SENSOR;
-    float matrix[3][3], bias_rad_s[3];
-    memcpy(matrix, record.matrix, sizeof matrix);
-    memcpy(bias_rad_s, record.bias_rad_s, sizeof bias_rad_s);
-    *correction = correction_of(matrix, bias_rad_s, (float)setups_of(sensor)->sensitivity_rad_s);
+    *correction = correction_of(&record, setups_of(sensor));
     return 0;
 }

@@ -42,7 +42,8 @@ def setup(range_g: float) -> bytes:
 
 SETUP = setup(0.0)
 RATES = (1 << len(GYROSCOPES)) - 1  # a mask of the gyroscopes
-RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
+CONSTANT = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
+RECORD = (*CONSTANT, 0.0, 50.0, *9 * (1e-7,), *9 * (-1e-7,))
 OBSERVATIONS = b"".join(
     frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
     for index, speed_rad_s in enumerate((0.5, -0.5, 0.5, -0.5, 0.5, -0.5))

@@ -1,16 +1,19 @@
 """The board remembers calibrations and streams by them: the core on this machine."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from firmware_host.answers import NOTHING
 from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
 from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
 from support.host_flash import HostFlash
+from support.warmed_sweeps import REFERENCE_C, calibrated, drawn, session
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
@@ -21,6 +24,10 @@ CALIBRATION: dict[str, Any] = {
     "temperature_c": 23.5,
     "matrix": np.diag(SCALE),
     "bias_rad_s": tuple(BIAS_RAD_S),
+    "lowest_c": 23.5,
+    "highest_c": 23.5,
+    "scale_change": NOTHING,
+    "bias_change_rad_s": NOTHING,
 }
 MATRIX = np.array([[1.1771, -0.0052, 0.0031], [-0.0053, 1.1554, 0.0047], [0.0032, 0.0048, 1.1440]])
 WHOLE = CALIBRATION | {"model": 2, "matrix": MATRIX}
@@ -237,3 +244,127 @@ def test_what_is_kept_is_uncalibrated_also_while_the_stream_is_calibrated() -> N
     frames = board.ask("observe", sensor=0, index=0, start_us=PERIOD_US, end_us=20 * PERIOD_US, speed_rad_s=1.0)
     (observed,) = [frame for frame in frames if frame.name == "observed"]
     assert observed.values["mean_rad_s"] == pytest.approx((1000 * RAD_S, 0, 0))
+
+
+# Over temperature
+
+
+def cubic(*rows: tuple[float, float, float]) -> Array:
+    return np.array(rows)
+
+
+OVER_TEMPERATURE: dict[str, Any] = CALIBRATION | {
+    "lowest_c": 10.0,
+    "highest_c": 60.0,
+    "scale_change": cubic((3e-4, -2e-4, 2e-4), (2e-6, 1e-6, -1e-6), (1e-8, 0.0, -2e-8)),
+    "bias_change_rad_s": cubic((5e-4, -4e-4, 3e-4), (5e-6, 3e-6, -4e-6), (-1e-8, 2e-8, 0.0)),
+}
+
+
+def twin(calibration: dict[str, Any], readings: Array, temperature_c: Array) -> tuple[Array, Array]:
+    """(n, 3) rates in double precision of readings (n, 3), and the bound of the board's error beside half a count."""
+    matrix, bias, scale_change, bias_change = (
+        np.asarray(calibration[name], dtype=np.float32).astype(float)
+        for name in ("matrix", "bias_rad_s", "scale_change", "bias_change_rad_s")
+    )
+    away = np.clip(temperature_c, calibration["lowest_c"], calibration["highest_c"]) - calibration["temperature_c"]
+    powers = away[:, None] ** np.arange(1, 4)
+    rates = ((1 + powers @ scale_change) * (readings + bias + powers @ bias_change)) @ matrix.T
+    moved = np.abs(powers) @ np.abs(bias_change)
+    magnitudes = (np.abs(readings) + np.abs(bias) + moved) @ np.abs(matrix).T
+    return rates, 16 * 2.0**-24 * magnitudes
+
+
+@pytest.mark.parametrize("base", [CALIBRATION, WHOLE], ids=["diagonal", "matrix"])
+def test_readings_are_corrected_as_warm_as_the_part_is_and_beyond_the_range_as_at_its_ends(
+    base: dict[str, Any],
+) -> None:
+    board = HostBoard()
+    setup = configured(board, 0, 238, 245)
+    calibration = OVER_TEMPERATURE | {name: base[name] for name in ("model", "matrix")}
+    (ack,) = board.ask("write_calibration", sensor=0, **calibration)
+    assert ack.name == "ack"
+    board.ask("start", sensors=1)
+    settle(board)
+    rng = np.random.default_rng(6)
+    counts, warm = rng.integers(-32767, 32768, (600, 3)), rng.integers(-700, 900, 600)
+    frames = []
+    for k, (row, temperature) in enumerate(zip(counts.tolist(), warm.tolist(), strict=True)):
+        convert(board, (k + 1) * PERIOD_US, row, temperature_counts=temperature)
+        frames += board.frames()
+    frames += board.ask("stop")
+    temperature_c = warm * setup["temperature_scale_c"] + setup["temperature_offset_c"]
+    assert temperature_c.min() < 0 and temperature_c.max() > 70
+    expected, bound = twin(calibration, counts * setup["sensitivity_rad_s"], temperature_c)
+    assert np.all(np.abs(rates(frames) - expected) <= 0.5e-6 + bound)
+    assert bound.max() < 1.2e-5
+    constant, _ = twin(calibration, counts * setup["sensitivity_rad_s"], np.full(600, 23.5))
+    assert np.abs(rates(frames) - constant).max() > 1e-2, "without temperature it would be another rate"
+
+
+def test_polynomials_come_back_as_written() -> None:
+    board = HostBoard()
+    configured(board, 0, 238, 245)
+    board.ask("write_calibration", sensor=0, **OVER_TEMPERATURE)
+    board.core.board_reset()
+    (stored,) = board.ask("read_calibration", sensor=0)
+    assert (stored.values["lowest_c"], stored.values["highest_c"]) == (10.0, 60.0)
+    for name in ("scale_change", "bias_change_rad_s"):
+        assert np.array(stored.values[name]) == pytest.approx(OVER_TEMPERATURE[name], rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"lowest_c": 24.0},
+        {"highest_c": 23.0},
+        {"lowest_c": NAN},
+        {"highest_c": INFINITY},
+        {"temperature_c": NAN},
+        {"scale_change": cubic((0.02, 0, 0), (0, 0, 0), (0, 0, 0))},
+        {"scale_change": cubic((0, 0, 0), (0, 0, 0), (0, NAN, 0))},
+        {"bias_change_rad_s": cubic((0, 0, 0), (0, 0, INFINITY), (0, 0, 0))},
+    ],
+)
+def test_polynomials_that_cannot_be_right_are_refused(wrong: dict[str, Any]) -> None:
+    board = HostBoard()
+    configured(board, 0, 238, 245)
+    assert error_of(board.ask("write_calibration", sensor=0, **OVER_TEMPERATURE | wrong)) == "bad_calibration"
+
+
+def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_than_before() -> None:
+    """Polynomials of sweeps from 20 to 60 °C and back, in the board's flash, correct a part that stands still there."""
+    sensor_index, (at_zero_c, counts_per_k) = list(BOARD_PARTS).index("icm42688p"), (25.0, 132.48)
+    before, after, u = [], [], []
+    for seed in range(4):
+        rng = np.random.default_rng([31, seed])
+        sensor = replace(drawn(rng, gradient_k=0.0, walk=0.0), leaning=np.zeros((12, 3)))
+        found = calibrated(sensor, session(), rng)
+        board = HostBoard()
+        setup = configured(board, sensor_index, 500, 15.625)
+        about: dict[str, Any] = {"model": 1, "serial_number": "1", "written_unix_s": 0, "temperature_c": REFERENCE_C}
+        board.ask(
+            "write_calibration", sensor=sensor_index, **about,
+            matrix=np.diag(found.scale[0]), bias_rad_s=-found.bias[0],
+            lowest_c=found.range_c[0], highest_c=found.range_c[1],
+            scale_change=found.scale[1:] / found.scale[0], bias_change_rad_s=-found.bias[1:],
+        )  # fmt: skip
+        board.ask("start", sensors=1 << sensor_index)
+        warm = np.linspace(*found.range_c, 9)
+        reads = np.array([sensor.at(each)[3:] for each in warm])
+        frames = []
+        for k, place in enumerate([0] * 60 + list(range(9))):  # the part settles first
+            counts = np.round(reads[place] / setup["sensitivity_rad_s"]).astype(int).tolist()
+            temperature = round((warm[place] - at_zero_c) * counts_per_k)
+            convert(board, 2000 * (k + 1), counts, sensor=sensor_index, temperature_counts=temperature)
+            frames += board.frames()
+        frames += board.ask("stop")
+        left = rates(frames)[-9:]
+        before.append(reads - sensor.at(REFERENCE_C)[3:])
+        after.append(left / found.scale[0])
+        u.append([found.at(float(each)).std[3:] for each in warm])
+    rms_before, rms_after, rms_u = (float(np.sqrt(np.mean(np.square(each)))) for each in (before, after, u))
+    print(f"before {rms_before:.2e}, after {rms_after:.2e} rad/s: 1/{rms_before / rms_after:.0f}, u {rms_u:.2e}")
+
+    assert rms_after * 30 <= rms_before
+    assert rms_after <= 1.2 * rms_u

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from firmware_host.answers import NOTHING
 from firmware_host.frames import Frame
 from support.emulated_session import FIELD_T, MAGNETIC, Session
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, sample_sequences, settle
@@ -20,6 +21,10 @@ CALIBRATION = {
     "temperature_c": 25.0,
     "matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
     "bias_rad_s": [0, 0, 0],
+    "lowest_c": 25.0,
+    "highest_c": 25.0,
+    "scale_change": NOTHING,
+    "bias_change_rad_s": NOTHING,
 }
 
 

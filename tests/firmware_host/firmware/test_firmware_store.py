@@ -3,6 +3,8 @@
 import ctypes
 import random
 import struct
+from collections.abc import Callable
+from dataclasses import dataclass
 from zlib import crc32
 
 import pytest
@@ -10,10 +12,11 @@ import pytest
 from support.host_board import core
 from support.host_flash import PAGE_BYTES, PAGES, HostFlash
 
-SEAL, OLD_SEAL = 0x324C4143, 0x314C4143  # the old one is that of firmware 0.2.1
-RECORD_BYTES = 109
-WRITE_OPERATIONS = 16  # one erase, fifteen doublewords
-HEAD_BYTES = 61  # of a record, before its matrix; old ones have three scale factors there
+SEAL, CONSTANT_SEAL, OLD_SEAL = 0x334C4143, 0x324C4143, 0x314C4143  # those of before: of firmware 0.8.0 and 0.2.1
+RECORD_BYTES = 189
+WRITE_OPERATIONS = 26  # one erase, twenty-five doublewords
+HEAD_BYTES = 61  # of a record, before its matrix; those of 0.2.1 have three scale factors there
+CONSTANT_BYTES = 109  # of a record, before what temperature changes; those of 0.8.0 end there
 
 
 class Store:
@@ -54,21 +57,35 @@ def slot(sequence: int, content: bytes) -> bytes:
     return body + struct.pack("<II", SEAL, crc32(body))
 
 
-def old_slot(sequence: int, content: bytes) -> bytes:
-    """The same as firmware 0.2.1 wrote it; `content` is 85 bytes."""
-    body = content[:2] + struct.pack("<I", sequence) + content[6:] + bytes(3)
-    return body + struct.pack("<II", OLD_SEAL, crc32(body))
+@dataclass(frozen=True)
+class Old:
+    """A record of another layout: its content, how it lies in flash, and how it is read today."""
+
+    content: bytes
+    seal: int
+    read: bytes
+
+    def slot(self, sequence: int) -> bytes:
+        body = self.content[:2] + struct.pack("<I", sequence) + self.content[6:] + bytes(3)
+        return body + struct.pack("<II", self.seal, crc32(body))
 
 
-def old_record(rng: random.Random) -> bytes:
-    """Any content of an old one."""
-    return record(rng)[:HEAD_BYTES] + struct.pack("<6f", 1.1, 1.2, 1.3, 0.1, -0.2, 0.3)
+def constant_record(rng: random.Random) -> Old:
+    """One that firmware 0.8.0 wrote: it holds at its own temperature and knows no other."""
+    content = record(rng)[:CONSTANT_BYTES]
+    return Old(content, CONSTANT_SEAL, content + 2 * content[HEAD_BYTES - 4 : HEAD_BYTES] + bytes(72))
 
 
-def as_diagonal(content: bytes) -> bytes:
-    """An old record as it is read today."""
-    head, (kx, ky, kz, *bias) = content[:HEAD_BYTES], struct.unpack("<6f", content[HEAD_BYTES:])
-    return head + struct.pack("<12f", kx, 0, 0, 0, ky, 0, 0, 0, kz, *bias)
+def diagonal_record(rng: random.Random) -> Old:
+    """One that firmware 0.2.1 wrote, with three scale factors in the place of a matrix."""
+    head, numbers = record(rng)[:HEAD_BYTES], (1.1, 1.2, 1.3, 0.1, -0.2, 0.3)
+    kx, ky, kz, *bias = numbers
+    whole = head + struct.pack("<12f", kx, 0, 0, 0, ky, 0, 0, 0, kz, *bias)
+    return Old(head + struct.pack("<6f", *numbers), OLD_SEAL, whole + 2 * head[-4:] + bytes(72))
+
+
+Made = Callable[[random.Random], Old]
+of_before = pytest.mark.parametrize("made", [constant_record, diagonal_record])
 
 
 @pytest.fixture
@@ -111,7 +128,7 @@ def test_a_write_is_one_erase_of_the_other_slot_then_each_doubleword_once_the_se
         assert len(flash.operations) == WRITE_OPERATIONS
         erase, *programs = flash.operations
         assert (erase.page, erase.value) == (page, None)
-        assert [(p.page, p.offset) for p in programs] == [(page, 8 * i) for i in range(15)]
+        assert [(p.page, p.offset) for p in programs] == [(page, 8 * i) for i in range(25)]
         seal = programs[-1].value
         assert seal is not None and seal & 0xFFFFFFFF == SEAL
 
@@ -198,7 +215,7 @@ def test_a_bit_that_flips_in_a_stored_record_brings_the_one_before_back(flash: H
     old, new = record(rng), record(rng)
     assert Store().write(old) and Store().write(new)
     whole = flash.contents(1)
-    for bit in range(8 * 120):
+    for bit in range(8 * 200):
         damaged = int.from_bytes(whole, "little") ^ 1 << bit
         flash.put(1, damaged.to_bytes(PAGE_BYTES, "little"))
         assert Store().read() == old
@@ -225,35 +242,39 @@ def test_no_page_is_touched_but_the_sensors_own(flash: HostFlash) -> None:
     assert [flash.contents(page) for page in (0, 1, 4, 5)] == [marks[page] for page in (0, 1, 4, 5)]
 
 
-# Records of firmware 0.2.1
+# Records of firmware 0.8.0 and 0.2.1
 
 
-def test_an_old_record_is_read_as_a_diagonal_also_where_the_rest_of_its_page_is_torn(flash: HostFlash) -> None:
-    old = old_record(random.Random(9))
-    flash.put(0, old_slot(7, old))
-    assert Store().read_numbered() == (7, as_diagonal(old))
-    flash.tear(0, 96)
-    assert Store().read_numbered() == (7, as_diagonal(old))
-    flash.tear(0, 88)
+@of_before
+def test_an_old_record_is_read_whole_also_where_the_rest_of_its_page_is_torn(flash: HostFlash, made: Made) -> None:
+    old = made(random.Random(9))
+    whole = old.slot(7)
+    flash.put(0, whole)
+    assert Store().read_numbered() == (7, old.read)
+    flash.tear(0, len(whole))
+    assert Store().read_numbered() == (7, old.read)
+    flash.tear(0, len(whole) - 8)
     assert Store().read() is None
 
 
-def test_the_newer_of_an_old_record_and_a_new_one_counts(flash: HostFlash) -> None:
+@of_before
+def test_the_newer_of_an_old_record_and_a_new_one_counts(flash: HostFlash, made: Made) -> None:
     rng = random.Random(10)
-    old, new = old_record(rng), record(rng)
-    flash.put(0, old_slot(7, old))
+    old, new = made(rng), record(rng)
+    flash.put(0, old.slot(7))
     flash.put(1, slot(8, new))
     assert Store().read() == new
     flash.put(1, slot(6, new))
-    assert Store().read() == as_diagonal(old)
+    assert Store().read() == old.read
 
 
+@of_before
 def test_a_write_forgets_the_old_record_once_the_new_one_is_whole_so_that_no_older_image_corrects_by_it(
-    flash: HostFlash,
+    flash: HostFlash, made: Made
 ) -> None:
     rng = random.Random(11)
-    old, new = old_record(rng), record(rng)
-    flash.put(0, old_slot(7, old))
+    old, new = made(rng), record(rng)
+    flash.put(0, old.slot(7))
     assert Store().write(new)
     assert flash.contents(0) == b"\xff" * PAGE_BYTES
     assert Store().read_numbered() == (8, new)
@@ -261,19 +282,22 @@ def test_a_write_forgets_the_old_record_once_the_new_one_is_whole_so_that_no_old
     assert flash.contents(1)[: len(slot(8, new))] == slot(8, new), "a new record stays beside the newest"
 
 
-def test_a_cut_while_the_first_record_of_today_is_written_leaves_the_old_one_or_the_new(flash: HostFlash) -> None:
+@of_before
+def test_a_cut_while_the_first_record_of_today_is_written_leaves_the_old_one_or_the_new(
+    flash: HostFlash, made: Made
+) -> None:
     news = 0
     for lasts in range(WRITE_OPERATIONS + 1):
         for seed in range(40):
             rng = random.Random(1000 * lasts + seed)
             flash = HostFlash()
-            old, new = old_record(rng), record(rng)
-            flash.put(0, old_slot(7, old))
+            old, new = made(rng), record(rng)
+            flash.put(0, old.slot(7))
             flash.power_up(lasts, rng)
             Store().write(new)
             assert flash.failed
             flash.power_up()
             found = Store().read()
-            assert found == new if lasts == WRITE_OPERATIONS else found in (as_diagonal(old), new)
+            assert found == new if lasts == WRITE_OPERATIONS else found in (old.read, new)
             news += found == new
     assert news >= 40

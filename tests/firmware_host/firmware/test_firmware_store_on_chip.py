@@ -14,8 +14,9 @@ from support.emulated_session import FIRST_RECORD, Session, shipped_flash
 pytestmark = pytest.mark.slow
 
 IMAGE_BYTES = STORE_OFFSET
-WRITE_OPERATIONS = 16  # one erase, fifteen doublewords
+WRITE_OPERATIONS = 26  # one erase, twenty-five doublewords
 ERASE_OPERATIONS = 2
+KEPT = ("matrix", "bias_rad_s", "lowest_c", "highest_c", "scale_change", "bias_change_rad_s")
 
 
 def calibration(number: int) -> dict[str, Any]:
@@ -26,6 +27,10 @@ def calibration(number: int) -> dict[str, Any]:
         "temperature_c": 20.0 + number,
         "matrix": ((1.0 + 0.125 * number, 0.125, -0.0625), (0.25, 1.25, 0.0), (0.0, 0.5, 0.75)),
         "bias_rad_s": (0.5, -0.25, 0.0625 * number),
+        "lowest_c": 10.0,
+        "highest_c": 40.0,
+        "scale_change": ((2.0**-10, 0.0, -(2.0**-12)), (2.0**-14, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        "bias_change_rad_s": ((0.0, 2.0**-11, 0.0), (0.0, 0.0, 2.0**-15), (2.0**-20, 0.0, 0.0)),
     }
 
 
@@ -47,9 +52,7 @@ def stored(session: Session) -> int | None:
         assert ERRORS[answer.values["code"]].name == "no_calibration"
         return None
     number: int = round(answer.values["temperature_c"] - 20)
-    assert {key: answer.values[key] for key in ("matrix", "bias_rad_s")} == {
-        key: calibration(number)[key] for key in ("matrix", "bias_rad_s")
-    }
+    assert {key: answer.values[key] for key in KEPT} == {key: calibration(number)[key] for key in KEPT}
     return number
 
 
