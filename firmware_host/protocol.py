@@ -22,7 +22,7 @@ import numpy as np
 from firmware_host.problem import Problem
 
 PROTOCOL_VERSION = 5
-FIRMWARE_VERSION = "0.8.0"  # of the shipped image
+FIRMWARE_VERSION = "0.9.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -462,6 +462,9 @@ MESSAGES = (
             SENSOR,
             Field("state", "u8", "enum hand_state"),
             Field("taken", "u8", "moves it is made of"),
+            Field("scale_std", "f32", "largest standard uncertainty of a scale factor"),
+            Field("range_deg_s", "f32", "that the sensor was set up to, degrees a second"),
+            Field("temperature_c", "f32", "of the sensor when it was last laid down, degrees Celsius"),
             Field("matrix", "matrix_f32", "C, row by row"),
             Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
             Field("g_sensitivity_rad_s", "matrix_f32", "of a reading, rad/s per g of specific force, row by row"),
