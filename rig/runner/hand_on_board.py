@@ -53,7 +53,7 @@ class CalibratedByBoard:
 
 
 @dataclass(slots=True)
-class _Session:
+class FollowedSession:
     """A session as the host follows it by the board's reports: what was taken, on which faces it lay."""
 
     sensor: RecordedSensor
@@ -134,7 +134,7 @@ def calibrated_by_board(
             source.start()
             source.board.begin_by_hand(index, moves, scale_std)
         with changing():
-            session = _Session(described, moves, tell)
+            session = FollowedSession(described, moves, tell)
             _follow(source, session)
             source.board.stop()
             solved = source.board.hand_solution()
@@ -179,7 +179,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
         )
 
 
-def _follow(source: BoardSource, session: _Session) -> None:
+def _follow(source: BoardSource, session: FollowedSession) -> None:
     """Look on until it is done. Raises Fault for what was wrong with the last of ten refused moves."""
     while True:
         report = source.board.hand_report()
