@@ -128,9 +128,9 @@ NAMED: dict[str, Callable[[int], Made]] = {
     "held_not_laid_down": held_each_time,
     "lost_in_move": read_otherwise(ten_lost),
     "mirrored_axis": read_otherwise(lambda seen: replace(seen, rates=seen.rates * [1, -1, 1])),
-    "not_flat": by_mistake("crumb", 5, 30.0),
+    "not_flat": by_mistake("crumb", 5, 80.0),
     "swapped_axes": read_otherwise(lambda seen: replace(seen, rates=seen.rates[:, [1, 0, 2]])),
-    "table_moved": by_mistake("table_pushed", 5, 30.0),
+    "table_moved": by_mistake("table_pushed", 5, 80.0),
     "bias_jumped": by_mistake("dropped", 5),
     "too_few_moves": lambda seed: (handle(TWELVE[:2], seed), True, TOLD),
     "turn_not_closed": by_mistake("short", 12, 10.0),
@@ -212,6 +212,15 @@ def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
     made, names = SMALLER[what]
     found = [refused(recorded, level=level, told=told) for recorded, level, told in map(made, seeds(True))]
     assert {each for each in found if each is not None} <= names, found
+
+
+@pytest.mark.parametrize(
+    ("kind", "at", "size", "said"),
+    [("crumb", 5, 30.0, "did not lie flat"), ("short", 12, 3.0, "from where it began")],
+)
+def test_one_that_makes_the_uncertainty_larger_is_warned_of(kind: Kind, at: int, size: float, said: str) -> None:
+    warned = solved(handle(mistaken(kind, at, size), 0)).turned.warnings
+    assert any(said in each for each in warned), warned
 
 
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:

@@ -3,9 +3,8 @@
 Each doubt is that some factors are not what they were taken for: they are left out, and what is left is compared. The
 doubt after which least is left is the one that is named.
 
-One rest or turn that is far off makes the sizes large that are found of a hand, and hides behind them. So where they
-are large, what is doubted is held against the sizes that are found without it, if these are much smaller. A bias is
-left out of this: real ones go by steps.
+One rest or turn that is far off makes the sizes large that are found of a hand, and hides behind them: the result
+holds, with a larger U. It is found by the sizes without it (`hidden`). A bias is left out of this: real ones go by steps.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,14 +44,21 @@ class Doubt:
 def doubted(fit: Fit, since: int | None = None) -> Fault | None:
     """What is wrong with a session, or with what came `since` a rest; None where nothing is."""
     told = [Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, since)]
-    if since is None and _much_larger(fit.sizes, STATED):
-        told.sort(key=lambda each: each.less)
-        most = {each.name: each for each in told if each.name in HIDDEN}
-        told += [replace(each, less=_less_anew(fit, each.name, each.at)) for each in most.values()]
     worst = max(told, key=lambda each: each.less, default=None)
     if worst is not None and worst.less > (BY_MUCH if since is None else AT_ONCE):
         return named(fit, worst)
     return None if since is not None else _beyond(fit)
+
+
+def hidden(fit: Fit) -> Fault | None:
+    """The one rest or turn by which the sizes of a hand are much larger than they are without it, and with them U."""
+    if not _much_larger(fit.sizes, STATED):
+        return None
+    told = sorted((Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, None)), key=lambda each: each.less)
+    most = {each.name: each for each in told if each.name in HIDDEN}
+    anew = [replace(each, less=_less_anew(fit, each.name, each.at)) for each in most.values()]
+    worst = max(anew, key=lambda each: each.less, default=None)
+    return named(fit, worst) if worst is not None and worst.less > BY_MUCH else None
 
 
 def _doubts(fit: Fit, since: int | None) -> Iterator[tuple[str, int]]:
