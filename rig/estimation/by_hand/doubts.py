@@ -4,7 +4,8 @@ Each doubt is that some factors are not what they were taken for: they are left 
 doubt after which least is left is the one that is named.
 
 One rest or turn that is far off makes the sizes large that are found of a hand, and hides behind them: the result
-holds, with a larger U. It is found by the sizes without it (`hidden`). A bias is left out of this: real ones go by steps.
+holds, with a larger U. It is found by the sizes without it (`hidden`). A bias is left out of this: real ones go by
+steps.
 """
 
 from collections.abc import Iterator, Sequence
