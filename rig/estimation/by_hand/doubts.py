@@ -112,11 +112,14 @@ def _is(row: Factor, at: int, *kinds: str) -> bool:
 
 
 def _after(fit: Fit, row: Factor, at: int) -> Factor:
-    """The row with two columns more: how the table leans from rest `at` on, and by what the way there turned more."""
+    """The row with two columns more: how the table leans from rest `at` on, and by what the way there turned more.
+
+    Not so at the last rest: there, a side that does not lie flat looks like this.
+    """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.at >= at:
         other = row.design[:, TABLE]
-    elif row.kind == MOVE and row.at == at - 1:
+    elif row.kind == MOVE and row.at == at - 1 and at < len(fit.session.rests) - 1:
         other = fit.state.attitudes[row.at].T[:, :2] @ np.array([[0.0, -1.0], [1.0, 0.0]])
     return replace(row, design=np.hstack([row.design, other]))
 
