@@ -57,12 +57,17 @@ class HandReport:
 class HandSolved:
     """A `hand_solution`: g = C (m + b) of so many moves `taken`, in single precision; `matrix` is C.
 
-    `g_sensitivity_rad_s` is what a reading has of the specific force, rad/s per g.
+    `g_sensitivity_rad_s` is what a reading has of the specific force, rad/s per g; `scale_std` the largest standard
+    uncertainty of a scale factor by that session. The sensor was set up to `range_deg_s`, and as warm as
+    `temperature_c` when it was last laid down.
     """
 
     sensor: int
     state: str
     taken: int
+    scale_std: float
+    range_deg_s: float
+    temperature_c: float
     matrix: Matrix
     bias_rad_s: Vector
     g_sensitivity_rad_s: Matrix
@@ -75,6 +80,9 @@ class HandSolved:
             sensor=values["sensor"],
             state=protocol.HAND_STATES[values["state"]],
             taken=values["taken"],
+            scale_std=values["scale_std"],
+            range_deg_s=values["range_deg_s"],
+            temperature_c=values["temperature_c"],
             matrix=values["matrix"],
             bias_rad_s=values["bias_rad_s"],
             g_sensitivity_rad_s=values["g_sensitivity_rad_s"],

@@ -31,6 +31,11 @@ def add(board: ArgumentParser) -> None:
         metavar="STD",
         help="and until the standard uncertainty of the scale by this session is no larger (0.001)",
     )
+    hand.add_argument(
+        "--fetch",
+        action="store_true",
+        help="make no session: take what the board keeps of the last one, which its button began",
+    )
     hand.add_argument("--write", action="store_true", help="store what was found as the board's calibration")
     hand.add_argument("--yes", action="store_true", help="do not ask before the board is changed")
     text = "the calibrations in the board's flash"

@@ -21,7 +21,7 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import changing, refusing
 from rig.config.models import RigConfig
 from rig.data.hand_events import HandAsked, HandMoveRefused, HandMoveTaken, HandRested, OfTheHand
-from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.motion.by_hand import Face, HandMove
@@ -45,17 +45,15 @@ AGAIN = {  # what the board calls it: the error's name, what, what to do
 
 @dataclass(frozen=True, slots=True)
 class CalibratedByBoard:
-    """What the board found of a sensor of that index, its last report, and the same in double precision."""
+    """What the board found of a sensor of that index, and the same in double precision, None without its readings."""
 
     index: int
-    report: HandReport
     solved: HandSolved
-    agreement: HandAgreement
-    temperature_c: float
+    agreement: HandAgreement | None
 
 
 @dataclass(slots=True)
-class _Session:
+class FollowedSession:
     """A session as the host follows it by the board's reports: what was taken, on which faces it lay."""
 
     sensor: RecordedSensor
@@ -67,8 +65,10 @@ class _Session:
     _asked: bool = False
 
     def take(self, report: HandReport) -> None:
-        """Take the board's report; what is new in it is told."""
+        """Take the board's report; what is new in it is told. Its button begins anew, and so does all of this."""
         wrong = None
+        if self.reports and report.judged < self.reports[-1].judged:
+            self.reports, self._taken, self._lay, self._asked = [], [], [], False
         if new := report.judged > (self.reports[-1].judged if self.reports else 0):
             self.reports.append(report)
             wrong = self._judged(report)
@@ -134,14 +134,33 @@ def calibrated_by_board(
             source.start()
             source.board.begin_by_hand(index, moves, scale_std)
         with changing():
-            session = _Session(described, moves, tell)
-            report = _followed(source, session)
+            session = FollowedSession(described, moves, tell)
+            _follow(source, session)
             source.board.stop()
             solved = source.board.hand_solution()
         samples = np.concatenate([samples for sensor, samples in drained(arrived) if sensor == name])
         agreement = hand_agreement(_readings(described, samples), session.reports, solved)
-        temperature_c = float(np.mean(described.channel(TEMPERATURE).values(samples)))
-        yield source.board, CalibratedByBoard(index, report, solved, agreement, temperature_c)
+        yield source.board, CalibratedByBoard(index, solved, agreement)
+
+
+def kept_by_board(board: Board) -> CalibratedByBoard:
+    """What the board keeps of the last session by hand, which its button or a host began: no readings are left of it.
+
+    Raises Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
+    """
+    report = board.hand_report()
+    if report.state == "done":
+        return CalibratedByBoard(report.sensor, board.hand_solution(), None)
+    why = "none has been made since it was switched on or reset"
+    if report.state == "failed":
+        why = f"it was given up, for ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
+    elif report.state != "idle":
+        why = f"it was not done after {report.taken} moves, and has ended now"
+    raise Refused(
+        "no_answer_by_hand",
+        f"the board keeps no answer of a session by hand: {why}",
+        "Press its button, make the moves until the LED flashes once a second, and leave the power on until then",
+    )
 
 
 def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
@@ -160,15 +179,15 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
         )
 
 
-def _followed(source: BoardSource, session: _Session) -> HandReport:
-    """The report with which it is done. Raises Fault for what was wrong with the last of ten refused moves."""
+def _follow(source: BoardSource, session: FollowedSession) -> None:
+    """Look on until it is done. Raises Fault for what was wrong with the last of ten refused moves."""
     while True:
         report = source.board.hand_report()
         session.take(report)
         if report.state == "failed":
             raise Fault(*AGAIN[report.outcome])
         if report.state == "done":
-            return report
+            return
         time.sleep(LOOK_S)
         source.check()
 

@@ -38,3 +38,9 @@ def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool)
     """Go on only if the operator agrees. Raises Refused `not_confirmed`."""
     if not assume_yes and not ask_operator(announcement, to_do):
         raise Refused("not_confirmed", "nobody agreed to the change", NOT_AGREED)
+
+
+def refuse_unless_answerable(assume_yes: bool) -> None:
+    """For what takes long and asks at its end. Raises Refused `not_confirmed` where nobody could agree."""
+    if not assume_yes and not sys.stdin.isatty():
+        raise Refused("not_confirmed", "there is no terminal at which somebody could agree to the change", NOT_AGREED)

@@ -1,5 +1,6 @@
 """A gyroscope that a hand turned on a table: what is found, how well that is known, and what is refused by name."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,12 @@ from rig.estimation.by_hand import HandSolution, Told, progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.hand_runs import NotCounted
 from rig.observation.handled import Segmenter, handled
-from rig.world.hand.habits import Action, Face, Flip, Mistake, Turn
+from rig.world.hand.habits import Action, Face, Flip, Kind, Mistake, Turn
 from support.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, handle
 
 TOLD = Told(20.0, first_face="+z")
 SESSION = (*TWELVE, Turn(1), Flip("+x"), Turn(1), Flip("+y"), Turn(1))
+NOT_ACTED = ("angles of the moves", "nonlinearity")  # real parts have them; the simulated one is linear
 NOISY = Part(rate_hz=238.0, noise_rad_s=0.035)
 # Actions, part, whether there is an accelerometer, and the largest RMS of scale, right angles, bias.
 SESSIONS = {
@@ -25,7 +27,7 @@ SESSIONS = {
     "both ways on three faces, much noise": (BOTH_WAYS, NOISY, True, (8.5e-4, np.inf, np.inf)),
 }
 # The mistake, at which of the actions, and the names by which it may be refused.
-MISTAKES = {
+MISTAKES: dict[Kind, tuple[int, float | None, set[str]]] = {
     "short": (12, 10.0, {"turn_not_closed"}),
     "two_turns": (12, None, set()),
     "other_way": (12, None, set()),
@@ -56,26 +58,108 @@ def refused(recorded: Recorded, *, level: bool = True, told: Told = TOLD) -> str
     return None
 
 
-def compared(found: HandSolution, recorded: Recorded) -> tuple[Array, Array]:
-    """(9,) errors of scale, bias and right angles, and the same over u."""
+def compared(found: HandSolution, recorded: Recorded) -> tuple[Array, Array, Array]:
+    """(9,) errors of scale, bias and right angles, the same over u, and (3,) of scale over what is acted out of u."""
     angles = found.turned.non_orthogonality_rad - SensorAxes.of(recorded.matrix).non_orthogonality_rad
     errors = np.concatenate([found.scale, found.bias_rad_s, angles]) - np.concatenate([recorded.truth, np.zeros(3)])
     known = np.concatenate([np.diag(found.covariance), np.diag(found.turned.angles_covariance_rad2)[:3]])
-    return errors, errors / np.sqrt(known)
+    left_out = sum(np.diag(line.covariance)[:3] for line in found.budget.contributors if line.name in NOT_ACTED)
+    return errors, errors / np.sqrt(known), errors[:3] / np.sqrt(known[:3] - left_out)
 
 
-def mistaken(kind: str, at: int, size: float | None) -> list[Action]:
+def mistaken(kind: Kind, at: int, size: float | None) -> list[Action]:
     actions = list(SESSION)
-    actions[at] = replace(actions[at], mistake=Mistake(kind, size))  # type: ignore[arg-type]
+    actions[at] = replace(actions[at], mistake=Mistake(kind, size))
     return actions
 
 
-@pytest.mark.slow
+def seeds(thorough: bool) -> range:
+    return range(20 if thorough else 1)
+
+
+Made = tuple[Recorded, bool, Told]  # what was recorded, whether its accelerometer counts, and what was told
+
+
+def by_mistake(kind: Kind, at: int, size: float | None = None, *, level: bool = True) -> Callable[[int], Made]:
+    """The session with one mistake."""
+    return lambda seed: (handle(mistaken(kind, at, size), seed), level, TOLD)
+
+
+def read_otherwise(
+    change: Callable[[Recorded], Recorded], told: Told = TOLD, *, level: bool = True
+) -> Callable[[int], Made]:
+    """The session without a mistake, and its readings changed."""
+    return lambda seed: (change(handle(SESSION, seed)), level, told)
+
+
+def too_small_a_range(seed: int) -> Made:
+    return handle(SESSION, seed, replace(LSM9DS1, range_rad_s=float(np.radians(120)))), True, TOLD
+
+
+def held_each_time(seed: int) -> Made:
+    held = [replace(action, mistake=Mistake("held", 3.0)) for action in TWELVE[:3]]
+    return handle(held, seed, rest_s=0.0), True, TOLD
+
+
+def each_turn_short(seed: int) -> Made:
+    """Every turn ends a degree before it is whole."""
+    short = [replace(each, mistake=Mistake("short", 1.0)) if isinstance(each, Turn) else each for each in SESSION]
+    return handle(short, seed), True, TOLD
+
+
+def ten_lost(recorded: Recorded) -> Recorded:
+    """Ten readings of the fastest move are not there, and the time stamps do not show it."""
+    there = int(np.argmax(np.linalg.norm(recorded.rates, axis=1)))
+    kept = np.delete(np.arange(len(recorded.time_s)), np.s_[there - 5 : there + 5])
+    return replace(
+        recorded,
+        time_s=recorded.time_s[: len(kept)],
+        rates=recorded.rates[kept],
+        acceleration=recorded.acceleration[kept],
+    )
+
+
+def late(recorded: Recorded) -> Recorded:
+    """Every time stamp is late, by up to 4 ms, as over a radio."""
+    late_s = np.random.default_rng(len(recorded.time_s)).uniform(0, 4e-3, len(recorded.time_s))
+    return replace(recorded, time_s=np.sort(recorded.time_s + late_s))
+
+
+# What is wrong, by the name that it has to have.
+NAMED: dict[str, Callable[[int], Made]] = {
+    "clipping": too_small_a_range,
+    "held_not_laid_down": held_each_time,
+    "lost_in_move": read_otherwise(ten_lost),
+    "mirrored_axis": read_otherwise(lambda seen: replace(seen, rates=seen.rates * [1, -1, 1])),
+    "not_flat": by_mistake("crumb", 5, 80.0),
+    "swapped_axes": read_otherwise(lambda seen: replace(seen, rates=seen.rates[:, [1, 0, 2]])),
+    "table_moved": by_mistake("table_pushed", 5, 80.0),
+    "bias_jumped": by_mistake("dropped", 5),
+    "too_few_moves": lambda seed: (handle(TWELVE[:2], seed), True, TOLD),
+    "turn_not_closed": by_mistake("short", 12, 10.0),
+    "wrong_face": read_otherwise(lambda seen: seen, replace(TOLD, first_face="+x"), level=False),
+    "wrong_unit": read_otherwise(lambda seen: replace(seen, rates=np.degrees(seen.rates))),
+}
+# What need not be seen, and does no harm then.
+SMALLER: dict[str, tuple[Callable[[int], Made], set[str]]] = {
+    "half a degree short": (by_mistake("short", 12, 0.5), {"turn_not_closed"}),
+    "a degree short": (by_mistake("short", 12, 1.0), {"turn_not_closed"}),
+    "two degrees short": (by_mistake("short", 12, 2.0), {"turn_not_closed"}),
+    "every turn a degree short": (each_turn_short, {"turn_not_closed"}),
+    "a crumb, without a level": (by_mistake("crumb", 5, level=False), {"not_flat"}),
+    "an accelerometer whose axes are swapped": (
+        read_otherwise(lambda seen: replace(seen, acceleration=seen.acceleration[:, [1, 0, 2]])),
+        {"swapped_axes", "mirrored_axis"},
+    ),
+    "late time stamps": (read_otherwise(late), {"lost_in_move"}),
+}
+
+
 def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     recorded = handle(TWELVE, 1)
     found = solved(recorded)
     assert [rest.face for rest in found.rests] == ["+z", *(flip.to for flip in TWELVE if isinstance(flip, Flip))]
-    errors, over = compared(found, recorded)
+    errors, over, _ = compared(found, recorded)
     assert (np.abs(over) < 3.5).all() and (np.abs(errors[:3]) < 5e-4).all()
     assert (found.expanded_scale < 6e-4).all()
     assert (found.budget.expanded[:3] > 9e-4).all(), "no hand's recording supports less"
@@ -89,11 +173,11 @@ def test_uncertainties_are_those_of_many_sessions(
     session: tuple[tuple[Action, ...], Part, bool, tuple[float, float, float]], thorough: bool
 ) -> None:
     actions, part, level, largest = session
-    both = []
+    all_three = []
     for seed in range(200 if thorough else 3):
         recorded = handle(actions, seed, part)
-        both.append(compared(solved(recorded, level=level), recorded))
-    errors, over = (np.array(each) for each in zip(*both, strict=True))
+        all_three.append(compared(solved(recorded, level=level), recorded))
+    errors, over, over_acted = (np.array(each) for each in zip(*all_three, strict=True))
     for name, columns, limit in zip(
         ("scale", "right angles", "bias"), (slice(0, 3), slice(6, 9), slice(3, 6)), largest, strict=True
     ):
@@ -102,7 +186,10 @@ def test_uncertainties_are_those_of_many_sessions(
         print(f"{name}: RMS {rms:.2e}, over u {ratio:.2f}, {100 * within:.1f} % within U")
         assert rms < limit * (1.0 if thorough else 1.5)
         if name == "scale":
-            assert (0.6 if thorough else 0.2) < ratio < (1.2 if thorough else 1.6)
+            acted = float(np.sqrt(np.mean(over_acted**2)))
+            print(f"{name}: over what is acted out of u {acted:.2f}")
+            assert ratio < (1.2 if thorough else 1.6)
+            assert (0.6 if thorough else 0.2) < acted < (1.2 if thorough else 1.6)
         assert within > (0.93 if thorough else 0.77)
 
 
@@ -111,37 +198,43 @@ def test_uncertainties_are_those_of_many_sessions(
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", MISTAKES)
-def test_a_mistake_is_named_or_within_the_uncertainty(kind: str, thorough: bool) -> None:
+def test_a_mistake_is_named_or_within_the_uncertainty(kind: Kind, thorough: bool) -> None:
     at, size, names = MISTAKES[kind]
-    seeds = range(20 if thorough else 1)
-    found = [refused(handle(mistaken(kind, at, size), seed)) for seed in seeds]
+    found = [refused(handle(mistaken(kind, at, size), seed)) for seed in seeds(thorough)]
     assert {each for each in found if each is not None} <= names, found
 
 
 @pytest.mark.slow
-def test_a_range_that_is_too_small_is_named() -> None:
-    small = replace(LSM9DS1, range_rad_s=float(np.radians(120)))
-    assert refused(handle(SESSION, 1, small)) == "clipping"
+@pytest.mark.proof
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", NAMED)
+def test_what_is_wrong_with_a_session_is_named(name: str, thorough: bool) -> None:
+    made = NAMED[name]
+    found = [refused(recorded, level=level, told=told) for recorded, level, told in map(made, seeds(thorough))]
+    assert set(found) == {name}, found
 
 
-def test_readings_of_other_axes_and_units_are_named() -> None:
-    recorded = handle(TWELVE, 2)
-    assert refused(replace(recorded, rates=recorded.rates * [1, -1, 1])) == "mirrored_axis"
-    assert refused(replace(recorded, rates=recorded.rates[:, [1, 0, 2]])) == "swapped_axes"
-    assert refused(replace(recorded, rates=np.degrees(recorded.rates))) == "wrong_unit"
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("what", SMALLER)
+def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
+    made, names = SMALLER[what]
+    found = [refused(recorded, level=level, told=told) for recorded, level, told in map(made, seeds(True))]
+    assert {each for each in found if each is not None} <= names, found
 
 
-@pytest.mark.slow
-def test_a_face_that_was_not_the_first_is_named() -> None:
-    recorded = handle(TWELVE, 2)
-    assert refused(recorded, level=False, told=replace(TOLD, first_face="+x")) == "wrong_face"
-    assert refused(recorded, level=False, told=replace(TOLD, first_face=None)) == "first_face_not_told"
+@pytest.mark.parametrize(
+    ("kind", "at", "size", "said"),
+    [("crumb", 5, 30.0, "did not lie flat"), ("short", 12, 3.0, "from where it began")],
+)
+def test_one_that_makes_the_uncertainty_larger_is_warned_of(kind: Kind, at: int, size: float, said: str) -> None:
+    warned = solved(handle(mistaken(kind, at, size), 0)).turned.warnings
+    assert any(said in each for each in warned), warned
 
 
-def test_too_little_is_named() -> None:
-    assert refused(handle(TWELVE[:2], 3)) == "too_few_moves"
-    held = [replace(action, mistake=Mistake("held", 3.0)) for action in TWELVE[:3]]
-    assert refused(handle(held, 3, rest_s=0.0)) == "held_not_laid_down"
+def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:
+    assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_not_told"
 
 
 @pytest.mark.slow

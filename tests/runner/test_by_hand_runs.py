@@ -54,9 +54,10 @@ def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(
 
 @pytest.mark.proof
 @pytest.mark.thorough
+@pytest.mark.parametrize("mistakes", [dict.fromkeys(MISTAKES, 0.0), MISTAKES], ids=["none", "mistakes"])
 @pytest.mark.parametrize("seed", range(20))
-def test_a_verdict_is_reached_without_help(seed: int, tmp_path: Path) -> None:
-    path, out = config(tmp_path, world={"seed": 200 + seed, "hand": {"mistakes": MISTAKES}}), tmp_path / "run"
+def test_a_verdict_is_reached_without_help(seed: int, mistakes: dict[str, float], tmp_path: Path) -> None:
+    path, out = config(tmp_path, world={"seed": 200 + seed, "hand": {"mistakes": mistakes}}), tmp_path / "run"
     done = rig("run", path, "--out", out, timeout_s=270)
     assert done.returncode == 0, done.stderr + done.stdout
     held(out)

@@ -1,6 +1,10 @@
 """A session by hand played to the board's core: readings in, and what the board says of every move and at the end."""
 
 import ctypes
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,3 +104,74 @@ def play(recorded: Recorded, moves: int = 12, scale_std: float = 1e-3, number: n
                 reports.append(report)
     solved = HandSolved.of(asked(board, "hand_solve"))
     return Played(times_us, counts * setup["sensitivity_rad_s"], reports, solved)
+
+
+@contextmanager
+def served(board: HostBoard) -> Iterator[str]:
+    """A board's serial line as a `socket://` port; in the `with` block nobody else may talk to it."""
+    ended = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(0.02)
+
+        def serve() -> None:
+            while not ended.is_set():
+                try:
+                    host, _ = server.accept()
+                except TimeoutError:
+                    continue
+                with host:
+                    host.settimeout(0.02)
+                    _answer(board, host, ended)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield f"socket://127.0.0.1:{server.getsockname()[1]}"
+        finally:
+            ended.set()
+            thread.join()
+
+
+def _answer(board: HostBoard, host: socket.socket, ended: threading.Event) -> None:
+    """Pass on what the host says until it hangs up."""
+    while not ended.is_set():
+        try:
+            heard = host.recv(4096)
+        except TimeoutError:
+            continue
+        except ConnectionError:
+            return
+        if not heard:
+            return
+        board.receive(heard)
+        said = bytes(board.wire)
+        board.wire.clear()
+        host.sendall(said)
+
+
+def pressed(board: HostBoard, begin_us: int, lasts_us: int = 60_000) -> None:
+    """The button is down for so long, while the main loop runs."""
+    board.core.host_press(True)
+    for time_us in range(begin_us, begin_us + lasts_us, 5_000):
+        board.set_time(time_us)
+        board.run()
+    board.core.host_press(False)
+    board.run()
+
+
+def alone(*, locked: bool = True) -> HostBoard:
+    """A board that nobody has asked for anything."""
+    board = HostBoard()
+    board.core.host_lock_clock(locked)
+    return board
+
+
+def handled_alone(recorded: Recorded) -> HostBoard:
+    """A board whose button was pressed, and which was then turned as recorded, without a computer."""
+    board = alone()
+    pressed(board, 100_000)
+    setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}
+    times_us, counts, forces = in_counts(recorded, setup)
+    for number, (time_us, rate, force) in enumerate(zip(times_us.tolist(), counts, forces, strict=True)):
+        give(board, 200_000 + time_us, number, rate, force)
+    return board

@@ -48,6 +48,8 @@ struct rest {
 static struct {
     uint8_t sensor, state, wanted, taken, refused;
     float wanted_std, scale_std, sensitivity, microsecond_s, noise_rad_s, first_rad_s[3];
+    float range_deg_s, temperature_c; /* of the sensor: as set up; when it was last laid down */
+    int16_t temperature_counts;
     int32_t end_of_range;
     uint32_t per_block, sequence;
     uint64_t last_us, judged_us;
@@ -73,7 +75,7 @@ void hand_reset(void)
 
 void hand_forget(unsigned sensor)
 {
-    if (hand.state != HAND_IDLE && hand.sensor == sensor)
+    if (hand.state < HAND_DONE && hand.sensor == sensor) /* an answer stays until the next session */
         hand_reset();
 }
 
@@ -86,6 +88,7 @@ void hand_begin(uint8_t sensor, uint8_t moves, float scale_std)
     hand.wanted = moves;
     hand.wanted_std = scale_std;
     hand.sensitivity = (float)setup->sensitivity_rad_s;
+    hand.range_deg_s = (float)setup->range_deg_s;
     struct port_health health;
     port_health(&health);
     hand.microsecond_s = health.clock_locked ? CRYSTALS_US : 1e-6f;
@@ -233,6 +236,9 @@ static void settled(void)
     struct rest *after = &hand.now;
     bool first = hand.before.samples == 0;
     float noise_rad_s = __builtin_sqrtf(after->variance / (float)after->blocks);
+    const struct setup_payload *setup = setups_of(hand.sensor);
+    hand.temperature_c =
+        (float)setup->temperature_scale_c * hand.temperature_counts + (float)setup->temperature_offset_c;
     if (first)
         rest_mean(after, hand.first_rad_s);
     if (first || noise_rad_s < hand.noise_rad_s)
@@ -322,6 +328,7 @@ static void take(uint64_t time_us, const struct reading *reading)
         block->acceleration[axis] += reading->acceleration[axis];
         block->squares += counts * counts;
     }
+    hand.temperature_counts = reading->temperature_counts;
     block->samples++;
     block->lasts_s += dt_s;
     motion_add(&hand.motion, hand.estimate.centre, hand.up, rate, dt_s, 1);
@@ -392,7 +399,14 @@ void hand_on_solve(const struct frame *request)
     float found[HAND_UNKNOWNS];
     estimate_solution(&hand.estimate, found);
     struct hand_solution_payload answer = {
-        .reply_to = request->sequence, .sensor = hand.sensor, .state = hand.state, .taken = hand.taken};
+        .reply_to = request->sequence,
+        .sensor = hand.sensor,
+        .state = hand.state,
+        .taken = hand.taken,
+        .scale_std = hand.scale_std,
+        .range_deg_s = hand.range_deg_s,
+        .temperature_c = hand.temperature_c,
+    };
     memcpy(answer.matrix, &found[HAND_MATRIX], sizeof answer.matrix);
     memcpy(answer.g_sensitivity_rad_s, &found[HAND_GRAVITY], sizeof answer.g_sensitivity_rad_s);
     for (unsigned axis = 0; axis < 3; axis++)

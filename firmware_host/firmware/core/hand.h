@@ -10,7 +10,7 @@
 
 void hand_reset(void);
 
-/* A sensor is about to be set up: a session with it ends. */
+/* A sensor is about to be set up: a session with it that goes on ends. What another has found stays until the next begins. */
 void hand_forget(unsigned sensor);
 
 /* Begins anew with a sensor that is set up; done after so many moves at least, when the scale is known so well. */

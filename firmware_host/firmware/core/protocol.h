@@ -459,10 +459,13 @@ struct hand_solution_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t state; /* enum hand_state */
     uint8_t taken; /* moves it is made of */
+    float scale_std; /* largest standard uncertainty of a scale factor */
+    float range_deg_s; /* that the sensor was set up to, degrees a second */
+    float temperature_c; /* of the sensor when it was last laid down, degrees Celsius */
     float matrix[3][3]; /* C, row by row */
     float bias_rad_s[3]; /* b, in the units of the reading */
     float g_sensitivity_rad_s[3][3]; /* of a reading, rad/s per g of specific force, row by row */
 } __attribute__((packed));
-_Static_assert(sizeof(struct hand_solution_payload) == 88, "hand_solution_payload");
+_Static_assert(sizeof(struct hand_solution_payload) == 100, "hand_solution_payload");
 
 #endif

@@ -2,22 +2,34 @@
 
 Each doubt is that some factors are not what they were taken for: they are left out, and what is left is compared. The
 doubt after which least is left is the one that is named.
+
+One rest or turn that is far off makes the sizes large that are found of a hand, and hides behind them: the result
+holds, with a larger U. It is found by the sizes without it (`hidden`). A bias is left out of this: real ones go by
+steps.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.by_hand.fit import Fit, solved
+from rig.estimation.by_hand.fit import Fit, resized, sized_anew, solved
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
-from rig.estimation.by_hand.session import LARGEST
+from rig.estimation.by_hand.session import LARGEST, STATED, Sizes
 
 A_ROW = 4.0  # of chi square: what leaves out more has to explain more
 BY_MUCH = 16.0  # of chi square beyond that: 1 in 10^5
 NEARLY = 0.99  # of the largest size
+OF_DOUBT = {
+    "turn_not_closed": (CLOSURE, LEANING),
+    "lost_in_move": (MOVE, CLOSURE, LEANING),
+    "bias_jumped": (WALK,),
+    "not_flat": (FLAT, ACCELERATION),
+}
 JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
+OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # sizes that one rest or move makes so many times as large
+HIDDEN = ("not_flat", "table_moved", "turn_not_closed")
 AT_ONCE = 8.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
 
 
@@ -32,54 +44,94 @@ class Doubt:
 
 def doubted(fit: Fit, since: int | None = None) -> Fault | None:
     """What is wrong with a session, or with what came `since` a rest; None where nothing is."""
-    told = tuple(_doubts(fit, since))
+    told = [Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, since)]
     worst = max(told, key=lambda each: each.less, default=None)
     if worst is not None and worst.less > (BY_MUCH if since is None else AT_ONCE):
         return named(fit, worst)
     return None if since is not None else _beyond(fit)
 
 
-def _doubts(fit: Fit, since: int | None) -> Iterator[Doubt]:
-    rows, count = fit.factors, len(fit.session.rests)
+def hidden(fit: Fit) -> Fault | None:
+    """The one rest or turn by which the sizes of a hand are much larger than they are without it, and with them U."""
+    if not _much_larger(fit.sizes, STATED):
+        return None
+    told = sorted((Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, None)), key=lambda each: each.less)
+    most = {each.name: each for each in told if each.name in HIDDEN}
+    anew = [replace(each, less=_less_anew(fit, each.name, each.at)) for each in most.values()]
+    worst = max(anew, key=lambda each: each.less, default=None)
+    return named(fit, worst) if worst is not None and worst.less > BY_MUCH else None
+
+
+def _doubts(fit: Fit, since: int | None) -> Iterator[tuple[str, int]]:
+    """What may be doubted of a session, or of what came `since` a rest."""
+    count = len(fit.session.rests)
     first = 0 if since is None else since
     for at in range(max(first - 1, 0), count - 1):
-        yield _doubt(fit, "turn_not_closed", at, [row for row in rows if not _is(row, at, CLOSURE, LEANING)])
-        yield _doubt(fit, "lost_in_move", at, [row for row in rows if not _is(row, at, MOVE, CLOSURE, LEANING)])
+        if fit.faced.turns[at] and fit.told.closure:
+            yield "turn_not_closed", at
+        yield "lost_in_move", at
         if np.abs(np.subtract(*(fit.session.rests[at + each].mean_rad_s for each in (1, 0)))).max() > JUMP_RAD_S:
-            yield _doubt(fit, "bias_jumped", at, [row for row in rows if not _is(row, at, WALK)])
+            yield "bias_jumped", at
     faces = fit.faced.faces
-    for at in (at for at in range(first, count) if faces[at] is not None):
-        yield _doubt(fit, "not_flat", at, [row for row in rows if not _is(row, at, FLAT, ACCELERATION)])
-    level = fit.session.acceleration is not None
-    for at in (at for at in range(max(first, 1), count) if level and faces[at] is not None):
-        yield _doubt(fit, "table_moved", at, [_after(row, at) for row in rows])
+    yield from (("not_flat", at) for at in range(first, count) if faces[at] is not None)
+    if fit.session.acceleration is not None:
+        yield from (("table_moved", at) for at in range(max(first, 1), count) if faces[at] is not None)
+
+
+def _without(fit: Fit, name: str, at: int) -> tuple[list[Factor], int]:
+    """The rows of a session without what is doubted, and how many equations these are fewer."""
+    if name == "table_moved":
+        return [_after(fit, row, at) for row in fit.factors], 2
+    rows = [row for row in fit.factors if not _is(row, at, *OF_DOUBT[name])]
+    return rows, sum(len(row.missed) for row in fit.factors) - sum(len(row.missed) for row in rows)
+
+
+def _less(fit: Fit, name: str, at: int) -> float:
+    """By how much less is left without what is doubted, beyond what leaves with as many equations."""
+    rows, freed = _without(fit, name, at)
+    try:
+        return _chi_square(fit.factors) - _chi_square(rows) - A_ROW * freed if freed else 0.0
+    except np.linalg.LinAlgError:
+        return 0.0
+
+
+def _less_anew(fit: Fit, name: str, at: int) -> float:
+    """The same by the sizes that are found without what is doubted; 0 where none of them is much smaller."""
+    rows, freed = _without(fit, name, at)
+    try:
+        rows, sizes = sized_anew(rows, fit.sizes)
+        if not freed or not _much_larger(fit.sizes, sizes):
+            return 0.0
+        return _chi_square(resized(fit.factors, fit.sizes, sizes)) - _chi_square(rows) - A_ROW * freed
+    except np.linalg.LinAlgError:
+        return 0.0
 
 
 def _is(row: Factor, at: int, *kinds: str) -> bool:
     return row.at == at and row.kind in kinds
 
 
-def _after(row: Factor, at: int) -> Factor:
-    """The row with two columns more: how the table leans from rest `at` on."""
-    other = row.design[:, TABLE] if row.kind == ACCELERATION and row.at >= at else np.zeros((len(row.design), 2))
+def _after(fit: Fit, row: Factor, at: int) -> Factor:
+    """The row with two columns more: how the table leans from rest `at` on, and by what the way there turned more.
+
+    Not so at the last rest: there, a side that does not lie flat looks like this.
+    """
+    other = np.zeros((len(row.design), 2))
+    if row.kind == ACCELERATION and row.at >= at:
+        other = row.design[:, TABLE]
+    elif row.kind == MOVE and row.at == at - 1 and at < len(fit.session.rests) - 1:
+        other = fit.state.attitudes[row.at].T[:, :2] @ np.array([[0.0, -1.0], [1.0, 0.0]])
     return replace(row, design=np.hstack([row.design, other]))
 
 
-def _doubt(fit: Fit, name: str, at: int, rows: list[Factor]) -> Doubt:
-    if len(rows) == len(fit.factors) and name != "table_moved":
-        return Doubt(name, at, 0.0)
-    try:
-        step, _ = solved(rows)
-    except np.linalg.LinAlgError:
-        return Doubt(name, at, 0.0)
-    remaining = sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
-    before = sum(float(np.sum((row.missed / row.std) ** 2)) for row in fit.factors)
-    freed = (
-        2
-        if name == "table_moved"
-        else sum(len(row.missed) for row in fit.factors) - sum(len(row.missed) for row in rows)
-    )
-    return Doubt(name, at, before - remaining - A_ROW * freed)
+def _much_larger(sizes: Sizes, than: Sizes) -> bool:
+    return any(getattr(sizes, each) > OF_ONE * getattr(than, each) for each in HIDING)
+
+
+def _chi_square(rows: Sequence[Factor]) -> float:
+    """What is left of the rows where it is least."""
+    step, _ = solved(rows)
+    return sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
 
 
 def named(fit: Fit, doubt: Doubt) -> Fault:

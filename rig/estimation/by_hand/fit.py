@@ -5,7 +5,7 @@ stated of hands as if that had been seen in a few more (`SEEN`): a short session
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -134,6 +134,26 @@ def solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
     information = (design / size).T @ (design / size)
     covariance = np.asarray(np.linalg.inv(information), dtype=np.float64) / np.outer(size, size)
     return -covariance @ (design.T @ missed), covariance
+
+
+def sized_anew(rows: Sequence[Factor], now: Sizes) -> tuple[list[Factor], Sizes]:
+    """Rows whose sizes are `now`, with the sizes that they alone tell."""
+    found = list(rows)
+    for _ in range(SIZED):
+        sizes = _sized(found, *solved(found), now)
+        found, now = resized(found, now, sizes), sizes
+    return found, now
+
+
+def resized(rows: Sequence[Factor], now: Sizes, then: Sizes) -> list[Factor]:
+    """Rows whose sizes are `now`, with the sizes `then`."""
+    cause_of = {kind: (cause, getattr(then, name) / getattr(now, name)) for name, (kind, cause) in OF_KIND.items()}
+    found = []
+    for row in rows:
+        cause, times = cause_of.get(row.kind, ("", 1.0))
+        causes = {name: std * times if name == cause else std for name, std in row.causes.items()}
+        found.append(replace(row, causes=causes))
+    return found
 
 
 def left(rows: Sequence[Factor], covariance: Array) -> tuple[float, float]:

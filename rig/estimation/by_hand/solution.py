@@ -12,7 +12,7 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand.axes import check_axes
-from rig.estimation.by_hand.doubts import doubted
+from rig.estimation.by_hand.doubts import doubted, hidden
 from rig.estimation.by_hand.fit import SEEN, Fit, fit
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
 from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told
@@ -115,11 +115,12 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
         raise reason or too_few(session, None)
     refusals.check_unit(scale_of(found.state.matrix))
     refusals.check_handedness(found.state.matrix)
-    return solution_of(found)
+    one = hidden(found)
+    return solution_of(found, () if one is None else (f"{one.what}: for this one alone U is larger",))
 
 
-def solution_of(found: Fit) -> HandSolution:
-    """The solution of a graph that has come to rest."""
+def solution_of(found: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
+    """The solution of a graph that has come to rest, with what else was found to warn of."""
     matrix, told = found.state.matrix, found.told
     axes = SensorAxes.of(matrix)
     chosen = sought(found)
@@ -146,7 +147,7 @@ def solution_of(found: Fit) -> HandSolution:
         rank=12,
         condition=float(np.sqrt(np.linalg.cond(conditioned[:, chosen].T @ conditioned[:, chosen]))),
         iterations=found.iterations,
-        warnings=_warnings(found),
+        warnings=(*_warnings(found), *warnings),
         estimator="by_hand",
     )
     return HandSolution(

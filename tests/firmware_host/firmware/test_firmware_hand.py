@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from firmware_host.emulator.gpio import Port
-from firmware_host.hand_answers import HandReport
+from firmware_host.hand_answers import HandReport, HandSolved
 from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
 from rig.errors import Fault
 from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
 from support.emulated_session import Session
-from support.hand_on_board import Played, asked, begun, give, in_counts, play
+from support.hand_on_board import Played, alone, asked, begun, give, handled_alone, in_counts, play, pressed
 from support.handled_body import LSM9DS1, TWELVE, Recorded, handle
 from support.host_board import HostBoard, configured, core, error_of
 
@@ -203,23 +203,6 @@ def test_the_lamp_tells_rest_taken_again_and_done() -> None:
 # Without a computer: the button
 
 
-def pressed(board: HostBoard, begin_us: int, lasts_us: int) -> None:
-    """The button is down for so long, while the main loop runs."""
-    board.core.host_press(True)
-    for time_us in range(begin_us, begin_us + lasts_us, 5_000):
-        board.set_time(time_us)
-        board.run()
-    board.core.host_press(False)
-    board.run()
-
-
-def alone(*, locked: bool = True) -> HostBoard:
-    """A board that nobody has asked for anything."""
-    board = HostBoard()
-    board.core.host_lock_clock(locked)
-    return board
-
-
 def state_of(board: HostBoard) -> str:
     return HandReport.of(asked(board, "hand_status")).state
 
@@ -228,15 +211,23 @@ def test_the_button_sets_a_gyroscope_up_starts_it_and_begins_a_session() -> None
     board = alone()
     pressed(board, 0, 20_000)
     assert state_of(board) == "idle", "it only rattled"
-    pressed(board, 100_000, 60_000)
+    pressed(board, 100_000)
     assert state_of(board) == "starting"
     assert asked(board, "status").values["streaming"] == 1
-    recorded = twelve()
-    setup = {"sensitivity_rad_s": np.radians(0.0175), "sensitivity_m_s2": 0.244e-3 * 9.80665}
-    times_us, counts, forces = in_counts(recorded, setup)
-    for number, (time_us, rate, force) in enumerate(zip(times_us.tolist(), counts, forces, strict=True)):
-        give(board, 200_000 + time_us, number, rate, force)
-    assert state_of(board) == "done"
+
+
+def test_what_was_found_alone_stays_until_the_next_session() -> None:
+    board = handled_alone(twelve())
+    kept = HandSolved.of(asked(board, "hand_solve"))
+    assert (kept.state, kept.taken, kept.sensor, kept.range_deg_s) == ("done", 12, 0, 500.0)
+    assert kept.temperature_c == 25.0, "the middle of the part's scale, as was given"
+    assert 1e-5 < kept.scale_std < 1e-3
+    board.ask("stop", 2)
+    configured(board, 0, 119.0, 245.0)
+    configured(board, 1, 200.0, 250.0)
+    assert HandSolved.of(asked(board, "hand_solve")) == kept
+    pressed(board, 100_000_000)
+    assert state_of(board) == "starting"
 
 
 def test_the_button_begins_anew_with_the_sensor_that_streams_accelerations_already() -> None:
