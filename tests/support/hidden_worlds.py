@@ -181,7 +181,6 @@ def prints_lines(seed: int) -> dict[str, Any]:
         lines |= {"clock": "counted", "sequence_wrap": 65536}
     changed["world"]["sensors"]["imu"]["lines"] = {
         "oscillator_ppm": float(rng.uniform(-200, 200)),
-        "lost_fraction": 1e-4,
         "comment_every": 300,
     }
     changed["limits"] |= {"scale_deviation": 0.2, "bias_rad_s": 0.2}
