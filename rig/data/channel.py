@@ -27,7 +27,7 @@ class Channel:
 
     `quantity` is a name in `measured()`, `type` NumPy's of a number. Numbers of `full_scale_counts` and more are
     saturated, None where nothing tells; `range` is the nominal end of scale in the unit, None where it is not known.
-    `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count: so far about
+    `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count: so about
     zero of numbers that were cut toward it, and half as far elsewhere.
     """
 
