@@ -43,7 +43,7 @@ def by_lines(
     printer = Printer(
         SensorTruth(wanted, _errors(model, until)),
         _felt(servo, rows),
-        SimulatedLinesSection(oscillator_ppm=-1e6 * drift, lost_fraction=1e-4),
+        SimulatedLinesSection(oscillator_ppm=-1e6 * drift),
         wanted.lines,
         field_at=lambda time_s: (0.0, 0.0, 0.0),
         magnetometer=MagnetometerTruth(),
