@@ -23,7 +23,7 @@ from rig.estimation.by_hand.solution import CLOCK, RECORDED_HANDS, solution_of
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import Face, Instruction
 from rig.motion.steps import Plan
-from rig.observation.hand_runs import turned_face
+from rig.observation.hand_runs import ITS_OWN_CLOCK, turned_face
 
 FLIP_S, TURN_S = 1.5, 2.5  # a move, from rest to rest; assumed
 ASKED_S = 1.0  # from the end of a rest to the next move: somebody reads what is asked for; assumed
@@ -59,7 +59,8 @@ def predicted_by_hand(
 
 def _told(sensor: SensorSection, known: Uncertainty, said: ByHand) -> Told:
     first = None if sensor.acceleration is not None else turned_face(FIRST, mounting_matrix(sensor.mounting))
-    return Told(known.crystal_ppm, "the board's crystal", said.box_rad, first_face=first)
+    clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
+    return Told(known.crystal_ppm, clock, said.box_rad, first_face=first)
 
 
 def _move_s(move: Instruction) -> float:

@@ -31,7 +31,8 @@ SPARSE_S = 0.0105  # samples that are farther apart miss what the servo's vibrat
 # Samples add up to a way but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, where in the
 # interval it may lie (Euler and Maclaurin); B₂, Bernoulli's second polynomial, is √(1/180) RMS, and either end has two.
 CORNERS = (2 / 180) ** 0.5 / 2
-LOST = 0.01  # of the samples, at most
+LOST = 0.01  # of the samples, at most, by a rate that a part keeps so well
+GAP = 1.5  # of the interval between samples: one is missing, and with it so much of the way
 STEPS = 48
 WRISTS = 3  # whose ways count, the last joints
 
@@ -146,6 +147,7 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
     unseen_rad = float(np.linalg.norm(motion.rate(turning, 1), axis=1).max() * CORNERS * step_s**2)
     way = Stretch(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
     whole = len(time_s) >= (1 - LOST) * (way.end_s - way.start_s) * stream.sensor.rate_hz
+    whole &= bool(np.diff(time_s).max() < GAP * step_s)
     ends = np.linalg.norm(motion.rate(np.array([way.start_s, way.end_s])), axis=1)
     in_range = not stream.sensor.channel(RATE).saturated(stream.raw[samples]).any()
     stands = ends.max() < 2 * MIN_RATE_RAD_S

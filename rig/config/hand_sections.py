@@ -8,6 +8,7 @@ from rig.config.models import ProcedureSection, RigConfig, TurnerSection
 from rig.config.section import RATIO
 
 LEAST_RATE_HZ = 50.0  # of readings that follow a hand; its tremor is at 6 to 12 Hz
+STAMPED_THERE = ("lines", "mavlink")  # parts with a port of their own, whose device tells the time of a sample
 
 
 class HandSection(TurnerSection):
@@ -57,9 +58,20 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """The board's sensors alone are read, often enough to follow a hand."""
+        """What is read has a clock that is known, and is read often enough to follow a hand."""
+        others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
+        if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
+            yield (
+                f"uncertainty.crystal_ppm: say by how much the clock of {' and '.join(others)} may be off, for nothing "
+                "in a session by hand shows it: 50 of a crystal, 5000 of a ceramic resonator, as an Arduino Uno has one"
+            )
         for name, sensor in config.sensors.items():
-            if not sensor.on_board:
-                yield f"sensors.{name}: only sensors on the board are calibrated by hand"
+            if not sensor.on_board and sensor.part not in STAMPED_THERE:
+                yield f"sensors.{name}: a {sensor.part} is not calibrated by hand"
+            elif sensor.lines is not None and sensor.lines.clock == "arrival":
+                yield (
+                    f"sensors.{name}.lines.clock: by hand the device has to tell the time; let it print a column time, "
+                    "or a column sequence if it samples by a timer"
+                )
             elif sensor.rate_hz < LEAST_RATE_HZ:
                 yield f"sensors.{name}.rate_hz: {sensor.rate_hz:g} is too slow for a hand; at least {LEAST_RATE_HZ:g}"

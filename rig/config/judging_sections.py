@@ -162,7 +162,11 @@ class UncertaintySection(Section):
         description="error of this computer's clock during a run if a time server corrects it; set "
         "50 without a time server",
     )
-    crystal_ppm: Positive = Field(default=20.0, description="error of the board's 32768 Hz crystal at room temperature")
+    crystal_ppm: Positive = Field(
+        default=20.0,
+        description="error of the board's 32768 Hz crystal at room temperature; by hand also of the clock of a device "
+        "that prints lines or of an autopilot, and then it must be stated",
+    )
     axis_deg: float = Field(
         default=0.06,
         ge=0,

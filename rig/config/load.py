@@ -313,8 +313,6 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         return
     ports = {} if config.board is None else {"board.port": config.board.port}
     ports |= {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in config.sensors.items() if s.own_port}
-    if isinstance(turner, HandSection) and config.board is None:
-        yield "board: missing; the simulated hand turns sensors on a board"
     if host is not None and not _is_loopback(host):
         key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.moved_to(host)))}"
         yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"

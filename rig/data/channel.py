@@ -27,7 +27,8 @@ class Channel:
 
     `quantity` is a name in `measured()`, `type` NumPy's of a number. Numbers of `full_scale_counts` and more are
     saturated, None where nothing tells; `range` is the nominal end of scale in the unit, None where it is not known.
-    `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count.
+    `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count: so about
+    zero of numbers that were cut toward it, and half as far elsewhere.
     """
 
     quantity: str
@@ -48,6 +49,18 @@ class Channel:
     def resolution(self) -> float:
         """The step between neighbouring readings in the quantity's unit; 0 of numbers that are no counts."""
         return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
+
+    def resolution_of(self, readings: Array) -> float | Array:
+        """The step between readings (n, 3) like these: of numbers that were cut (3,), for about zero it is another.
+
+        What they show of it is the distance of the number zero, one and a half of what is cut off, to its neighbours.
+        Where none is seen, hardly a reading was there, or all were the same, which tells nothing.
+        """
+        if self.step is None:
+            return self.resolution
+        apart = [np.diff(np.unique(axis)) / (self.step / 2) for axis in readings.T]
+        about_zero = [not len(each) or bool(np.any(np.abs(each - 1.5) < 0.25)) for each in apart]
+        return np.where(about_zero, self.step, self.step / 2)
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """The numbers (n,) or (n, 3) in samples (n,), as they were recorded."""

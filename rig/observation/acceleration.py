@@ -105,8 +105,9 @@ def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: Obs
     _check_standing(motion, window, where)
     check_complete(stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
-    count = stream.sensor.channel(ACCELERATION).resolution
-    reading, _ = mean_at_rest(accelerations(stream, inside), stream.time_s[inside], window, count)
+    readings = accelerations(stream, inside)
+    count = stream.sensor.channel(ACCELERATION).resolution_of(readings)
+    reading, _ = mean_at_rest(readings, stream.time_s[inside], window, count)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,

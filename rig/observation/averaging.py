@@ -42,8 +42,8 @@ class Averaging:
     residuals (n, 3), None where one line alone is looked for.
     """
 
-    turned: Callable[[Array, float, Passing], Mean]
-    rested: Callable[[Array, Array, Window, float], tuple[Mean, Window]]
+    turned: Callable[[Array, float | Array, Passing], Mean]
+    rested: Callable[[Array, Array, Window, float | Array], tuple[Mean, Window]]
     colour: Callable[[Array], float] = noise_left
     swings: Callable[[Array], Array] | None = None
 
@@ -55,28 +55,28 @@ def averaging_of(settings: RunSettings) -> Averaging:
     return BESIDE_LINES if settings.averages_beside_lines else AUTOREGRESSIVE
 
 
-def _turned_correlated(readings: Array, count: float, passing: Passing) -> Mean:
+def _turned_correlated(readings: Array, count: float | Array, passing: Passing) -> Mean:
     """Takes what comes once or twice in a turn for noise, and all that vibrates."""
     return mean_of(readings, count, passing.rate_rad_s[:, None], passing.covered, left_by_correlations)
 
 
-def _rested_correlated(readings: Array, _: Array, window: Window, count: float) -> tuple[Mean, Window]:
+def _rested_correlated(readings: Array, _: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
     return even_mean(readings, count, left_by_correlations), window
 
 
-def _turned(readings: Array, count: float, passing: Passing) -> Mean:
+def _turned(readings: Array, count: float | Array, passing: Passing) -> Mean:
     """Leaves nothing in the mean of what comes once or twice in a turn: gravity, and the encoder's own error."""
     return mean_of(readings, count, np.column_stack([passing.rate_rad_s, passing.turning]), passing.covered)
 
 
-def _turned_beside_lines(readings: Array, count: float, passing: Passing) -> Mean:
+def _turned_beside_lines(readings: Array, count: float | Array, passing: Passing) -> Mean:
     """Does so too, and few readings tell no lines."""
     if len(readings) >= FEWEST and passing.covered.all():
         return mean_beside_lines(readings, count, passing.turning, passing.rate_rad_s, closed=passing.closed)
     return _turned(readings, count, passing)
 
 
-def _rested_beside_lines(readings: Array, time_s: Array, window: Window, count: float) -> tuple[Mean, Window]:
+def _rested_beside_lines(readings: Array, time_s: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
     found, lasting = mean_at_rest(readings, time_s, window, count)
     if len(readings) >= FEWEST and lasting != window:
         found = rest_beside_lines(readings, time_s, window, count)

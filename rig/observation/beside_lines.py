@@ -33,7 +33,9 @@ class Noise:
     freedom: Array
 
 
-def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array, *, closed: bool = True) -> Mean:
+def mean_beside_lines(
+    readings: Array, count: float | Array, turning: Array, rate: Array, *, closed: bool = True
+) -> Mean:
     """The mean of readings (n, 3) in steps of `count`, evenly spaced, over whole turns (`closed`) or an arc.
 
     `turning` (n, k) comes and goes in a turn. `rate` (n,) is the arm's less its mean, as the encoders have it: they see
@@ -62,7 +64,7 @@ def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array
     )
 
 
-def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
+def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float | Array) -> Mean:
     """The mean at rest as `tapered_mean`, whose weights leave nothing of a vibration, by the noise beside its lines."""
     left = readings - readings.mean(axis=0)
     shaking = swinging(left)
@@ -95,7 +97,7 @@ def _columns(cycles: Array, count: int) -> Array:
     return waves(cycles, np.arange(count) / count)
 
 
-def noise_of(residuals: Array, taken: int, count: float, memories: Sequence[int]) -> Noise:
+def noise_of(residuals: Array, taken: int, count: float | Array, memories: Sequence[int]) -> Noise:
     """The noise in residuals (n, 3) of readings in steps of `count`, less so many `taken` columns: see `left_of`."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - taken), count**2 / 12)
     left = [left_of(each, memories) for each in residuals.T]

@@ -25,13 +25,19 @@ from rig.observation.timebase import NOMINAL_DRIFT
 LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
 BETWEEN_S = 10.0  # of nothing between two recordings of a session, whose boards' clocks do not tell it
 MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
+ITS_OWN_CLOCK = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
 
 Readings = tuple[Array, Array, Array | None]  # times (n,), rates (n, 3), accelerations (n, 3) where they are sent
 
 
+def microsecond_of(sensor: RecordedSensor) -> float:
+    """How long the microsecond of a sensor's time stamps is, s: the board's counter has its own."""
+    return MICROSECOND_S if sensor.on_board else 1e-6
+
+
 def readings_of(sensor: RecordedSensor, samples: NDArray[np.void], from_s: float = 0.0) -> Readings:
-    """Samples (n,) by the crystal of the board, shifted by `from_s`, in SI units."""
-    time_s = from_s + MICROSECOND_S * samples["board_time_us"].astype(np.float64)
+    """Samples (n,) by the crystal that stamps them, shifted by `from_s`, in SI units."""
+    time_s = from_s + microsecond_of(sensor) * samples["board_time_us"].astype(np.float64)
     force = sensor.channel(ACCELERATION).values(samples) if sensor.measures(ACCELERATION) else None
     return time_s, sensor.channel(RATE).values(samples), force
 
@@ -47,25 +53,29 @@ class NotCounted:
     """What of a session does not count, in the session's seconds.
 
     `moves` and `rests` from when to when each went on, `seams` in the middle between two recordings, and from when on
-    anything counts at all.
+    anything counts at all. Events tell it in microseconds of `microsecond_s`.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)
     rests: list[tuple[float, float]] = field(default_factory=list)
     seams: list[float] = field(default_factory=list)
     from_s: float = -inf
+    microsecond_s: float = MICROSECOND_S
 
     def take(self, event: Event, shift_s: float) -> None:
         """An event of a recording whose board's clock is so much behind the session's."""
         match event:
             case HandMoveRefused(begin_us, end_us):
-                self.moves.append((shift_s + MICROSECOND_S * begin_us, shift_s + MICROSECOND_S * end_us))
+                self.moves.append(self._span_s(begin_us, end_us, shift_s))
             case HandRestRefused(begin_us, end_us):
-                self.rests.append((shift_s + MICROSECOND_S * begin_us, shift_s + MICROSECOND_S * end_us))
+                self.rests.append(self._span_s(begin_us, end_us, shift_s))
             case HandBegunAnew(begin_us):
-                self.from_s = shift_s + MICROSECOND_S * begin_us
+                self.from_s = shift_s + self.microsecond_s * begin_us
             case _:
                 pass
+
+    def _span_s(self, begin_us: int, end_us: int, shift_s: float) -> tuple[float, float]:
+        return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
     def without(self, session: Handled) -> Handled:
         """The session without it: a rest that does not count is a pause of the move that goes on through it."""
@@ -115,12 +125,13 @@ def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted
     The item may have been anywhere between two recordings: the way from the last rest of one to the first of the next
     ties nothing.
     """
-    segmenter, refused, ends_s = Segmenter(range_of(runs[0].sensors[name])), NotCounted(), None
+    microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
+    segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
     for run in runs:
         samples = run.samples[name]
         if not len(samples):
             continue
-        board_s = MICROSECOND_S * samples["board_time_us"][[0, -1]].astype(np.float64)
+        board_s = microsecond_s * samples["board_time_us"][[0, -1]].astype(np.float64)
         shift_s = 0.0 if ends_s is None else ends_s + BETWEEN_S - board_s[0]
         if ends_s is not None:
             refused.seams.append(ends_s + BETWEEN_S / 2)
@@ -140,11 +151,11 @@ def session_of(runs: Sequence[RunData], name: str) -> Handled:
 def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> Told:
     """What the solution of a session needs to know besides a sensor's readings. Raises Refused `clock_unknown`.
 
-    The board's clock is the only measure of time there is, and no reading shows that it is wrong. Where no
-    accelerometer reads which side is up, it is the one that is asked for first.
+    The clock that stamps the readings is the only measure of time there is, and no reading shows that it is wrong.
+    Where no accelerometer reads which side is up, it is the one that is asked for first.
     """
     said, known = settings.by_hand, settings.uncertainty
-    if said is None or known is None or not provenance.board_follows_crystal:
+    if said is None or known is None or (sensor.on_board and not provenance.board_follows_crystal):
         raise Refused(
             "clock_unknown",
             "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
@@ -154,7 +165,7 @@ def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSenso
     first = None if sensor.measures(ACCELERATION) else turned_face(FACES[0], np.array(sensor.mounting))
     return Told(
         clock_ppm=known.crystal_ppm,
-        clock_source="the board's crystal",
+        clock_source="the board's crystal" if sensor.on_board else ITS_OWN_CLOCK,
         box_rad=said.box_rad,
         first_face=first,
         gravity_m_s2=STANDARD_GRAVITY_M_S2 if settings.site is None else settings.site.gravity_m_s2,

@@ -30,7 +30,11 @@ class Mean:
 
 
 def mean_of(
-    readings: Array, count: float, passing: Array, covered: NDArray[np.bool_], left: Callable[[Array], Left] = left_of
+    readings: Array,
+    count: float | Array,
+    passing: Array,
+    covered: NDArray[np.bool_],
+    left: Callable[[Array], Left] = left_of,
 ) -> Mean:
     """Mean and its variance of readings (n, 3) in steps of `count`.
 
@@ -59,13 +63,13 @@ def mean_of(
     )
 
 
-def even_mean(readings: Array, count: float, left: Callable[[Array], Left] = left_of) -> Mean:
+def even_mean(readings: Array, count: float | Array, left: Callable[[Array], Left] = left_of) -> Mean:
     """The mean of readings (n, 3) in steps of `count` in which nothing passes: all of them count alike."""
     steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
     return mean_of(readings, count, steady, known, left)
 
 
-def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float) -> tuple[Mean, Window]:
+def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
     """The mean of readings (n, 3) in steps of `count`, at times (n,), and from when to when it is said to last.
 
     Where the arm vibrates weights come and go, see `tapered_mean`: 2 mg at 14 Hz leave 10 µg in an even mean of three
@@ -79,7 +83,7 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float) -
     return even_mean(readings, count), window
 
 
-def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
+def tapered_mean(readings: Array, time_s: Array, window: Window, count: float | Array) -> Mean:
     """The mean of readings (n, 3) in steps of `count`, at times (n,): those in the middle of the window count most.
 
     The variance is that of the noise without the vibration, which the weights leave nothing of.
@@ -96,7 +100,7 @@ def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -
     )
 
 
-def rounding_left(variance: Array, count: float) -> Array:
+def rounding_left(variance: Array, count: float | Array) -> Array:
     """The variance that rounding to multiples of `count` leaves in a mean over any number of samples, at most.
 
     `variance` is that of a rounded sample, its own noise σ² and the rounding's count²/12 together (Sheppard). Rounding

@@ -230,7 +230,8 @@ def _observation(
         waves,
         turn.closed,
     )
-    found = averaging.turned(stream.readings_rad_s[inside], stream.sensor.channel(RATE).resolution, passing)
+    readings = stream.readings_rad_s[inside]
+    found = averaging.turned(readings, stream.sensor.channel(RATE).resolution_of(readings), passing)
     average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
@@ -265,8 +266,9 @@ def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) 
     inside = between(stream, still.start_s, still.end_s)
     if inside.stop - inside.start < MIN_REST_SAMPLES:
         return None
-    count = stream.sensor.channel(RATE).resolution
-    found, lasting = averaging.rested(stream.readings_rad_s[inside], stream.time_s[inside], still, count)
+    readings = stream.readings_rad_s[inside]
+    count = stream.sensor.channel(RATE).resolution_of(readings)
+    found, lasting = averaging.rested(readings, stream.time_s[inside], still, count)
     return _placed(averaged(stream, inside, lasting, found), motion)
 
 

@@ -31,8 +31,8 @@ from rig.estimation.by_hand.session import Move, Rest, Told
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.observation.hand_runs import (
     BETWEEN_S,
-    MICROSECOND_S,
     NotCounted,
+    microsecond_of,
     range_of,
     readings_of,
     segmented,
@@ -70,7 +70,7 @@ class HandSession:
     earlier: Sequence[RunData] = ()
     wait: Callable[[float], None] = time.sleep
     _segmenter: Segmenter = field(init=False)
-    _not_counted: NotCounted = field(default_factory=NotCounted)
+    _not_counted: NotCounted = field(init=False)
     _begins_s: float | None = None  # when this recording is to begin by the session's clock; None: as the board has it
     _shift_s: float | None = None  # from the board's clock to the session's, once samples have come
     _move: Move | None = None  # that has ended, before the rest after it is judged
@@ -86,6 +86,7 @@ class HandSession:
     def __post_init__(self) -> None:
         if not self.earlier:
             self._segmenter = Segmenter(range_of(self.sensor))
+            self._not_counted = NotCounted(microsecond_s=microsecond_of(self.sensor))
             return
         self._segmenter, self._not_counted, ends_s = segmented(self.earlier, self.name)
         self._not_counted.seams.append(ends_s + BETWEEN_S / 2)
@@ -122,7 +123,7 @@ class HandSession:
             return
         samples = np.concatenate(batches)
         if self._shift_s is None:
-            first_s = MICROSECOND_S * float(samples["board_time_us"][0])
+            first_s = microsecond_of(self.sensor) * float(samples["board_time_us"][0])
             self._shift_s = 0.0 if self._begins_s is None else self._begins_s - first_s
         for found in self._segmenter.feed(*readings_of(self.sensor, samples, self._shift_s)):
             if self._rest is not None:
@@ -240,8 +241,8 @@ class HandSession:
 
     def _board_us(self, part: Rest | Move) -> tuple[int, int]:
         """From when to when, by the board's clock."""
-        shift_s = self._shift_s or 0.0
-        return round((part.start_s - shift_s) / MICROSECOND_S), round((part.end_s - shift_s) / MICROSECOND_S)
+        shift_s, microsecond_s = self._shift_s or 0.0, microsecond_of(self.sensor)
+        return round((part.start_s - shift_s) / microsecond_s), round((part.end_s - shift_s) / microsecond_s)
 
     def _seen(self) -> HandSeen:
         live, left, known = self._segmenter.live, self._open, self._progress

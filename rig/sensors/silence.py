@@ -1,6 +1,19 @@
 """How long a sensor with a port of its own has sent nothing, by reads of its port and by another clock."""
 
+from dataclasses import dataclass
+
 from firmware_host.serial_port import READ_TIMEOUT_S
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long a driver waits: `first_s` for what comes first or for an answer, `silent_s` for more of a stream."""
+
+    first_s: float = 4.0  # an Arduino starts anew when its port is opened
+    silent_s: float = 2.0
+
+
+USUAL = Patience()
 
 
 class Silence:

@@ -235,10 +235,12 @@ class World:
 
 
 def _host_of(config: RigConfig) -> str:
-    """The address of the laboratory: that of what turns, or the board's where a hand does."""
-    if config.turner.simulated_at is not None or config.board is None:
-        return config.turner.simulated_at or ""
-    return _address("board.port", config.board.port)[0]
+    """The address of the laboratory: that of what turns, or where a hand does that of the board or a sensor."""
+    if config.turner.simulated_at is not None:
+        return config.turner.simulated_at
+    ports = [("board.port", config.board.port)] if config.board is not None else []
+    ports += [sensor.own_port for sensor in config.sensors.values() if sensor.own_port is not None]
+    return _address(*ports[0])[0]
 
 
 def _port_of(config: RigConfig, name: str) -> tuple[str, str]:

@@ -25,6 +25,8 @@ KINDS: dict[str, Callable[[RecordedRun], bool]] = {
     "accelerometers beside sweeps": lambda run: bool(run.movement[0].settings.planned_sweeps) and _accelerates(run),
     "a magnetometer": lambda run: bool(run.movement[0].measuring(FIELD)),
     "a sensor with a port of its own": lambda run: any(has_own_port(s.part) for s in run.movement[0].sensors.values()),
+    "a device that prints lines": lambda run: any(s.part == "lines" for s in run.movement[0].sensors.values()),
+    "an autopilot's IMU": lambda run: any(s.part == "mavlink" for s in run.movement[0].sensors.values()),
     "several speeds": lambda run: len({sweep.speed_rad_s for sweep in run.movement[0].settings.planned_sweeps}) > 1,
     "resumed": lambda run: len(run.raw) > 1,
     "verified": lambda run: bool(run.raw and run.corrected),

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
+from rig.data.run_file import read_run
 from support.commands import rig
 from support.paths import CONFIGS
 from support.worlds import fresh_host, merge
 
+UNEVEN_S = 0.04  # both sides of jitter_ms
 LINES = CONFIGS / "lines.yaml"
 TRUTH = np.array([1.011, 0.993, 1.006, 0.012, -0.02, 0.007])
 
@@ -75,11 +77,27 @@ def test_its_noise_is_what_its_errors_are(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1800)
 def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
-    """The laboratory goes at the computer's pace, for its clock is the sensor's."""
+    """The laboratory goes at the computer's pace, for its clock is the sensor's: a busy computer cannot tell."""
     lines = {"columns": ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"], "time": None, "clock": "arrival"}
-    entry = calibrated(tmp_path, {"sensors": {"imu": {"lines": lines}}, "world": {"time_scale": 1}})
+    for attempt in range(3):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        changes = {"sensors": {"imu": {"lines": lines}}, "world": {"time_scale": 1}}
+        done = rig("run", configuration(folder, changes), "--out", folder / "run")
+        if kept_pace(folder / "run"):
+            break
+    else:
+        pytest.skip("the simulated laboratory stood still again and again, and the computer's clock went on")
+    assert done.returncode == 0, done.stderr + done.stdout
+    entry = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["sensors"]["imu"]
     assert np.abs(off(entry)).max() < 4
-    text = json.dumps(entry)
-    assert "times of the samples" in text
+    (stamps,) = (each for each in entry["budget"]["contributors"] if each["name"] == "times of the samples")
+    assert max(stamps["std"][:3]) > 0
+
+
+def kept_pace(folder: Path) -> bool:
+    """Whether the states of a run came as evenly as lines must that are timed by when they arrive."""
+    states = read_run(folder / "run.h5").states
+    return bool(np.ptp(states["host_time_s"] - states["time_s"]) < UNEVEN_S)

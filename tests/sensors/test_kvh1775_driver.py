@@ -15,6 +15,7 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
+from rig.sensors.silence import Patience
 from support.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
@@ -192,13 +193,13 @@ def test_half_a_command_of_somebody_else_is_in_nobodys_way() -> None:
 
 def test_a_wrong_baud_rate_is_named() -> None:
     with kvh_on_a_wire({"BAUD": "115200"}) as wire, pytest.raises(SensorError) as caught:
-        Kvh1775("kvh", wire.port, 921600, timeout_s=0.4)
+        Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.4))
     assert caught.value.name == "kvh_wrong_baud_rate"
 
 
 def test_a_dead_line_and_a_missing_port_are_named() -> None:
     with kvh_on_a_wire(dead=True) as wire, pytest.raises(SensorError) as caught:
-        Kvh1775("kvh", wire.port, 921600, timeout_s=0.3)
+        Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.3))
     assert caught.value.name == "no_kvh"
     with pytest.raises(SensorError) as caught:
         Kvh1775("kvh", "/dev/there-is-none", 921600)
@@ -209,7 +210,7 @@ def test_a_line_that_carries_one_way_only_is_named() -> None:
     with kvh_on_a_wire() as wire:
         wire.line.to_device = lambda data, host_baud: None  # type: ignore[method-assign]
         with pytest.raises(SensorError) as caught:
-            Kvh1775("kvh", wire.port, 921600, timeout_s=0.5)
+            Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.5))
     assert caught.value.name == "kvh_does_not_hear"
 
 

@@ -104,15 +104,16 @@ def damaged(count: int, seed: int) -> tuple[bytes, np.ndarray, list[int]]:
 def test_damaged_lines_pass_a_sum_no_oftener_than_one_in_256(count: int) -> None:
     """One wrong byte never passes; several do by chance, and most of what does is no number any more."""
     section = lines_section(prefix="$IMU,", checksum="nmea")
-    passed = rejected = 0
+    passed = counted = 0
     for seed in range(0, count, 2000):
         data, readings, _ = damaged(min(2000, count), seed)
         values, (found,) = read(section, data)
         # A number written another way (01 for 1) is no wrong reading.
         true = {row.round(2).tobytes() for row in readings}
         passed += sum(row[1:].tobytes() not in true for row in values)
-        rejected += len(found.before) + found.comments
-    assert rejected + passed >= count * 0.99, "all are counted; a byte that becomes an end makes two lines of one"
+        counted += len(values) + len(found.before) + found.comments
+    print(f"{passed} of {count} damaged lines passed, {count // 256} may; {counted} counted")
+    assert counted >= count, "all are counted; a byte that becomes an end makes two lines of one"
     assert passed <= count / 256
     one_byte = b"".join(
         bytes([*line[:place], line[place] ^ 1 << bit, *line[place + 1 :]])

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator
 from itertools import chain, count, repeat
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,8 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.sensors.errors import SensorError
-from rig.sensors.lines.source import LinesSource, describe, lines, look
+from rig.sensors.lines.source import describe, lines, look
+from rig.sensors.silence import Patience
 from rig.sensors.source import SampleSource
 from support.printed_lines import SEVEN, pty_printing, sensor_section
 
@@ -44,17 +44,6 @@ class Taken:
         return np.concatenate(self.parts)
 
 
-def raised(source: LinesSource, timeout_s: float = 60.0) -> SensorError:
-    until_s = time.monotonic() + timeout_s
-    while time.monotonic() < until_s:
-        try:
-            source.check()
-        except SensorError as error:
-            return error
-        time.sleep(0.01)
-    raise AssertionError("nothing was raised")
-
-
 def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
     taken = Taken()
     with pty_printing(chain([BOOT], stream())) as (port, _), lines("imu", sensor_section(port), taken) as source:
@@ -80,49 +69,19 @@ def test_a_look_says_what_comes() -> None:
 @pytest.mark.parametrize(
     ("chunks", "name"),
     [
-        (list, "lines_silent"),
-        (lambda: repeat(b"\xf8\x9c\x01\xfe\x80" * 20), "lines_wrong_baud_rate"),
         (lambda: repeat(b"\x00" * 100), "lines_wrong_baud_rate"),
-        (lambda: repeat(b"$GPGGA,1234,N,11*47\r\n"), "lines_other_format"),
-        (lambda: (printed(2 * number) for number in count()), "lines_other_rate"),
         (lambda: repeat(printed(7)), "lines_time_stands"),
     ],
 )
 def test_what_is_wrong_with_it_has_a_name(chunks: Any, name: str) -> None:
+    """More of it: tests/sensors/test_faults_by_part.py."""
     with (
         pty_printing(chunks()) as (port, _),
         pytest.raises(SensorError, match=name) as refused,
-        lines("imu", sensor_section(port), Taken()),
+        lines("imu", sensor_section(port), Taken(), patience=Patience(first_s=1.0)),
     ):
         pass
     assert "sensors.imu" in str(refused.value)
-
-
-def test_no_port_is_no_port(tmp_path: Path) -> None:
-    with pytest.raises(SensorError, match="no_port"), lines("imu", sensor_section(str(tmp_path / "none")), Taken()):
-        pass
-
-
-@pytest.mark.parametrize(
-    ("then", "name"),
-    [
-        (lambda: stream(0), "lines_time_jumped"),
-        (lambda: repeat(b"Guru Meditation Error\r\n" * 20), "lines_damaged"),
-        pytest.param(list, "lines_link_lost", marks=pytest.mark.slow),
-    ],
-)
-def test_what_happens_in_a_stream_has_a_name(then: Any, name: str) -> None:
-    chunks = chain((printed(number) for number in range(10**4, 10**4 + 150)), then())
-    with pty_printing(chunks) as (port, _), lines("imu", sensor_section(port), Taken()) as source:
-        source.start()
-        assert raised(source).name == name
-
-
-def test_an_unplugged_device_is_a_lost_link() -> None:
-    with pty_printing(stream()) as (port, unplugged), lines("imu", sensor_section(port), Taken()) as source:
-        source.start()
-        unplugged.set()
-        assert raised(source).name == "lines_link_lost"
 
 
 def test_arrival_times_are_recorded_as_less_certain() -> None:

@@ -53,10 +53,13 @@ class AutopilotOnAWire:
         file: Path | None = None,
         dead: bool = False,
         armed: bool = False,
+        simulated: SimulatedSensorSection = PERFECT,
+        clock_ppm: float = 0.0,
     ) -> None:
         self.parameters = Parameters(firmware, imus, left, file)
         self._firmware, self._motion_at, self._imus, self._pace = firmware, motion_at, imus, pace
         self._on_for_s, self._armed = on_for_s, armed
+        self._simulated, self._clock_ppm = simulated, clock_ppm
         self.time_s = 0.0
         self.autopilot: SimulatedAutopilot | None = None
         self.line = SerialLine(lambda: self.autopilot, seed=5)
@@ -70,7 +73,7 @@ class AutopilotOnAWire:
         self._thread.start()
 
     def switch_on(self) -> None:
-        truth = SensorTruth(section("x"), PERFECT)
+        truth = SensorTruth(section("x"), self._simulated)
         px4 = self._firmware == "px4"
         imus = [
             Imu(place, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(place))
@@ -82,7 +85,7 @@ class AutopilotOnAWire:
             self.parameters,
             baud=921600,
             uid=UID,
-            clock_ppm=0.0,
+            clock_ppm=self._clock_ppm,
             on_for_s=self._on_for_s,
             armed=self._armed,
             seed=3,

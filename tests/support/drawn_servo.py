@@ -3,6 +3,7 @@
 What is drawn anew in each run: the encoder's phases and the noise, the gear's and the adapter's errors, the sensor.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import rotation_by
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import settings_of
@@ -51,6 +53,11 @@ class Drawn:
     bias_rad_s: Array
 
 
+Until = tuple[float, float, float]  # when a stage ends, s, by how much the sensor's clock is off, and its noise, rad/s
+# What reads a `servo` by `rows` (3, 3) in the sensor, of such scale and bias, and how a recording describes it.
+Source = Callable[[Servo, Array, tuple[Array, Array], Until, np.random.Generator], tuple[RecordedSensor, np.ndarray]]
+
+
 class Far:
     """A servo, spoken to in virtual time."""
 
@@ -84,8 +91,9 @@ def drawn_servo(
     adapter_deg: float = 1.0,
     noise_rad_s: float = 0.035,
     truth: ServoTruth | None = None,
+    source: Source | None = None,
 ) -> Drawn:
-    """A run of configs/servo.yaml with these `overrides`.
+    """A run of configs/servo.yaml with these `overrides`, with the samples of another `source` than a board.
 
     One reading has that noise. The sensor sits `mounting_deg` off its mounting, the item off each stage's by
     `adapter_deg`, ways drawn anew.
@@ -115,16 +123,15 @@ def drawn_servo(
         own = plan_servo_six_observation(config.turner, config.procedure, None, done)
         states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
         mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
-        samples = _sampled(
-            far.servo, sits @ mount, (scale, bias - felt @ sits @ mount[:, 2]), (end_s, drift, noise_rad_s), rng
-        )
+        model = scale, bias - felt @ sits @ mount[:, 2]
+        sensor, samples = (source or _sampled)(far.servo, sits @ mount, model, (end_s, drift, noise_rad_s), rng)
         runs.append(
             RunData(
                 configuration.rig_text,
                 replace(settings, stage=stage),
                 replace(PROVENANCE, turner_kind="servo", board_follows_crystal=False),
                 RecordedTurner.of("servo", SERVO.meant(config.turner), JOINTS, SERVO.fields),
-                {"gyro": replace(SENSOR, part=config.sensors["gyro"].part)},
+                {"gyro": sensor if source else replace(sensor, part=config.sensors["gyro"].part)},
                 {"gyro": samples},
                 states,
                 events,
@@ -196,8 +203,8 @@ def _driven(
 
 
 def _sampled(
-    servo: Servo, rows: Array, model: tuple[Array, Array], until: tuple[float, float, float], rng: np.random.Generator
-) -> np.ndarray:
+    servo: Servo, rows: Array, model: tuple[Array, Array], until: Until, rng: np.random.Generator
+) -> tuple[RecordedSensor, np.ndarray]:
     """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until
     time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / SENSOR.rate_hz)
@@ -209,4 +216,4 @@ def _sampled(
     samples["host_time_s"] = time_s + 1e4
     samples["counts"] = np.round(read / SENSITIVITY)
     samples["temperature_counts"] = -48
-    return samples
+    return SENSOR, samples

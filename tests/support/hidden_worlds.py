@@ -36,6 +36,7 @@ PART_WANDERS = {
     **PART_ERRORS,
     **dict.fromkeys(("mpu9250", *BY_SHEET), PART_ERRORS["lsm9ds1"]),
     "mavlink": {**PART_ERRORS["lsm9ds1"], "bias_per_k": 5e-5, "scale_per_k": 3e-5},
+    "lines": {**PART_ERRORS["lsm9ds1"], "bias_per_k": 4.6e-3, "scale_per_k": 3.6e-4},
 }
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
@@ -165,6 +166,27 @@ def autopilot(seed: int) -> dict[str, Any]:
     return changed
 
 
+def prints_lines(seed: int) -> dict[str, Any]:
+    """A device that prints lines, by its own time, by a number that it counts, or by both; some of them are lost."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("lines"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
+    document["world"]["time_scale"] = 8
+    for name in ("lines", "temperature_c", "accelerometer"):
+        document["world"]["sensors"]["imu"].pop(name)
+    changed = _with_sensors(document, rng, {"lines": 0.001})
+    lines = changed["sensors"]["imu"]["lines"]
+    if seed % 3:
+        lines["columns"] = ["time", "sequence", *lines["columns"][1:]]
+    if seed % 3 == 2:
+        lines |= {"clock": "counted", "sequence_wrap": 65536}
+    changed["world"]["sensors"]["imu"]["lines"] = {
+        "oscillator_ppm": float(rng.uniform(-200, 200)),
+        "comment_every": 300,
+    }
+    changed["limits"] |= {"scale_deviation": 0.2, "bias_rad_s": 0.2}
+    return changed
+
+
 def on_another_arm(model: str, seed: int) -> dict[str, Any]:
     """As `quiet`, on another arm."""
     document: dict[str, Any] = merge(quiet(seed), {"arm": {"model": model}})
@@ -183,6 +205,7 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         **{model: partial(on_another_arm, model) for model in (*OTHER_ARMS, *MORE_ARMS)},
         **{part: partial(by_its_sheet, part) for part in BY_SHEET},
         "autopilot": autopilot,
+        "lines": prints_lines,
     }
 )
 WORLDS = MappingProxyType(
@@ -192,7 +215,7 @@ WORLDS = MappingProxyType(
         "pair": 20,
         "imu": 20,
         "kvh": 10,
-        **dict.fromkeys((*OTHER_ARMS, *BY_SHEET, "autopilot"), 6),
+        **dict.fromkeys((*OTHER_ARMS, *BY_SHEET, "autopilot", "lines"), 6),
     }
 )
 

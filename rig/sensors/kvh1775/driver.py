@@ -18,10 +18,9 @@ from rig.sensors.errors import SensorError, no_port
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.settings import NAMES, Wanted, same
-from rig.sensors.silence import Silence
+from rig.sensors.silence import USUAL, Patience, Silence
 
 ATTEMPTS = 4  # times a command is sent; each waits twice as long as the one before
-SILENCE_S = 2.0  # without a message in a stream, and the link is lost
 KEPT_BYTES = 4096  # of what came while an answer was awaited
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
@@ -36,14 +35,20 @@ class Kvh1775:
     """
 
     def __init__(
-        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, timeout_s: float = 4.0
+        self,
+        sensor: str,
+        port: str,
+        baud: int,
+        on_messages: OnMessages | None = None,
+        *,
+        patience: Patience = USUAL,
     ) -> None:
         """Opens the port, ends a stream that may be running, and asks for number and settings.
 
         Raises SensorError: no_port, no_kvh, kvh_wrong_baud_rate, kvh_does_not_hear, kvh_command_refused.
         """
         self._sensor, self._port, self._baud = sensor, port, baud
-        self._on_messages, self._timeout_s = on_messages, timeout_s
+        self._on_messages, self._patience = on_messages, patience
         self._messages = MessageReader()
         self._bytes_seen = self._messages_seen = 0
         self._tests: list[BuiltInTest] = []
@@ -99,7 +104,7 @@ class Kvh1775:
         """Back to normal mode, in which it sends messages as it is set to. Raises SensorError `kvh_silent`."""
         seen = self._messages_seen
         period_s = 1.0 / float(self.settings["DR"])
-        for wait_s in self._waits(self._timeout_s + ATTEMPTS * period_s):
+        for wait_s in self._waits(self._patience.first_s + ATTEMPTS * period_s):
             self._write("=CONFIG,0")  # which is not answered
             if self._wait(lambda: self._messages_seen > seen, wait_s):
                 return
@@ -113,7 +118,7 @@ class Kvh1775:
         """What its built-in test says, in normal mode. Raises SensorError `kvh_no_test`, `kvh_test_failed`."""
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
-        for wait_s in self._waits(self._timeout_s + ATTEMPTS * period_s):
+        for wait_s in self._waits(self._patience.first_s + ATTEMPTS * period_s):
             self._write("?BIT")  # ?BIT,2 has bytes that the ICD does not print as 7f when all is well
             if self._wait(lambda: bool(self._tests), wait_s):
                 found = self._tests[0]
@@ -152,7 +157,7 @@ class Kvh1775:
             raise self._fault
         with self._news:
             silent_s = self._silence.seen_by(clock_s)
-        if self._counter is not None and silent_s > SILENCE_S + 2e-6 * self._counter.interval_us:
+        if self._counter is not None and silent_s > self._patience.silent_s + 2e-6 * self._counter.interval_us:
             raise SensorError(
                 "kvh_link_lost",
                 f"sensors.{self._sensor}: no whole message from the KVH 1775 on {self._port} for {silent_s:.1f} s",
@@ -201,12 +206,12 @@ class Kvh1775:
                 f"{self._bytes_seen} bytes came from {where} at {self._baud} Bd, and no message or answer in them",
                 "Set serial.baud to what the instrument is set to; it is delivered with 921600",
             )
-        return SensorError("no_kvh", f"{where}: nothing came within {self._timeout_s:g} s", _CABLE)
+        return SensorError("no_kvh", f"{where}: nothing came within {self._patience.first_s:g} s", _CABLE)
 
     def _ask(self, command: str, name: str) -> str:
         """What stands behind `name` in the answer. Raises SensorError `kvh_command_refused`, `kvh_link_lost`."""
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
-        for wait_s in self._waits(self._timeout_s):
+        for wait_s in self._waits(self._patience.first_s):
             with self._news:
                 self._heard.clear()
             self._write(command)
@@ -224,7 +229,7 @@ class Kvh1775:
         raise SensorError(
             "kvh_link_lost",
             f"sensors.{self._sensor}: the KVH 1775 on {self._port} did not answer {command} within "
-            f"{self._timeout_s:g} s",
+            f"{self._patience.first_s:g} s",
             _CABLE,
         )
 

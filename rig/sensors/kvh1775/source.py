@@ -18,6 +18,7 @@ from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.field import MESSAGES_EACH, FieldReader
 from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
+from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
 # The instrument sends single-precision floats; a sample holds whole numbers. This many stand for its full scale: far
@@ -36,7 +37,7 @@ class Kvh1775Source:
     A message that says of itself an axis is invalid is no sample: it counts as lost.
     """
 
-    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples) -> None:
+    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
         """Raises SensorError as `Kvh1775`, `refusals`, and `kvh_other_serial_number`."""
         self._name, self._on_samples = name, on_samples
         line = _line_of(section)
@@ -48,7 +49,7 @@ class Kvh1775Source:
         self._first: int | None = None  # number of the first message that became a sample
         self._field_name, self._field = field_name(name), describe_field(name, section)
         self._field_reader = FieldReader(FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS)
-        self._driver = Kvh1775(name, line.port, line.baud, self._take)
+        self._driver = Kvh1775(name, line.port, line.baud, self._take, patience=patience)
         try:
             self.serial_number = self._driver.serial_number
             for refusal in judge(self._driver, name, section):
@@ -193,9 +194,11 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
 
 
 @contextmanager
-def kvh1775(name: str, section: SensorSection, on_samples: OnSamples) -> Iterator[Kvh1775Source]:
+def kvh1775(
+    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
+) -> Iterator[Kvh1775Source]:
     """The instrument for the length of the `with` block. Raises SensorError as `Kvh1775Source`."""
-    source = Kvh1775Source(name, section, on_samples)
+    source = Kvh1775Source(name, section, on_samples, patience=patience)
     try:
         yield source
     finally:

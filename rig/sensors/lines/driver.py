@@ -14,16 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.serial_port import SerialPort
-from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection
+from rig.config.lines_section import SECONDS, LinesSection
 from rig.config.sensor_sections import OwnPortSection
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError, no_port
 from rig.sensors.lines.decoding import Decoded, LineReader
 from rig.sensors.lines.stamping import Stamper
-from rig.sensors.silence import Silence
+from rig.sensors.silence import USUAL, Patience, Silence
 
-FIRST_LINE_S = 4.0  # in which a device must have begun: an Arduino starts anew when its port is opened
 LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
 SHOWN = 60  # characters of a line that is quoted
 UNPRINTABLE = 0.05  # share of bytes from which on the speed of the line is wrong
@@ -79,14 +78,14 @@ class LinesDevice:
         rate_hz: float,
         on_values: OnValues | None = None,
         *,
-        timeout_s: float = FIRST_LINE_S,
+        patience: Patience = USUAL,
     ) -> None:
         """Opens the port, and reads until samples come at the rate that is stated.
 
         Raises SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
-        self._on_values = on_values
+        self._on_values, self._patience = on_values, patience
         self._reader = LineReader(section)
         self.counts = Counts()
         self._stamper: Stamper | None = None  # while it streams
@@ -103,7 +102,7 @@ class LinesDevice:
         self._thread = threading.Thread(target=self._read, name=f"lines {line.port}", daemon=True)
         self._thread.start()
         try:
-            self.rate_hz = self._look(timeout_s)
+            self.rate_hz = self._look(patience.first_s)
         except BaseException:
             self.close()
             raise
@@ -147,7 +146,7 @@ class LinesDevice:
             raise self._fault
         with self._news:
             silent_s = self._silence.seen_by(clock_s)
-        if self._stamper is not None and silent_s > LONGEST_GAP_S + 2 / self._rate_hz:
+        if self._stamper is not None and silent_s > self._patience.silent_s + 2 / self._rate_hz:
             raise SensorError("lines_link_lost", f"{self.where} has sent no sample for {silent_s:.1f} s", _CABLE)
 
     def fail(self, error: SensorError) -> None:

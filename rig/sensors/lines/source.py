@@ -27,6 +27,7 @@ from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.driver import LinesDevice
 from rig.sensors.lines.stamping import COARSE
+from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
 UNITS = {
@@ -45,13 +46,13 @@ _OfTriad = LineRateSection | LineAccelerationSection | LineFieldSection
 class LinesSource:
     """A device that prints what it should; its samples are handed on from `start` on."""
 
-    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples) -> None:
+    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
         """Raises SensorError as `LinesDevice`."""
         self._name, self._on_samples = name, on_samples
         line, self._section = _parts_of(section)
         self._described = describe(name, section)
         self._field_name, self._field = field_name(name), describe_field(name, section)
-        self._device = LinesDevice(name, line, self._section, section.rate_hz, self._take)
+        self._device = LinesDevice(name, line, self._section, section.rate_hz, self._take, patience=patience)
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -145,9 +146,11 @@ def stamp_std_s(lines: LinesSection, rate_hz: float) -> float | None:
 
 
 @contextmanager
-def lines(name: str, section: SensorSection, on_samples: OnSamples) -> Iterator[LinesSource]:
+def lines(
+    name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
+) -> Iterator[LinesSource]:
     """The device for the length of the `with` block. Raises SensorError as `LinesSource`."""
-    source = LinesSource(name, section, on_samples)
+    source = LinesSource(name, section, on_samples, patience=patience)
     try:
         yield source
     finally:

@@ -16,10 +16,9 @@ from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
 from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
 from rig.sensors.mavlink.port import open_port
-from rig.sensors.silence import Silence
+from rig.sensors.silence import USUAL, Patience, Silence
 
 ATTEMPTS = 4  # times something is asked; each waits twice as long as the one before
-SILENCE_S = 2.0  # without a message, and the link is lost
 HEARTBEAT_S = 1.0
 OURS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
 GROUND_STATION, NO_AUTOPILOT = 6, 8  # MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID
@@ -55,7 +54,13 @@ class Link:
     """
 
     def __init__(
-        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, timeout_s: float = 4.0
+        self,
+        sensor: str,
+        port: str,
+        baud: int,
+        on_messages: OnMessages | None = None,
+        *,
+        patience: Patience = USUAL,
     ) -> None:
         """Opens the port, and waits for the heartbeat of an autopilot that is not armed.
 
@@ -63,7 +68,7 @@ class Link:
         `missing_extra`.
         """
         self._mavlink = dialect()
-        self._sensor, self.port, self._baud, self._timeout_s = sensor, port, baud, timeout_s
+        self._sensor, self.port, self._baud, self._patience = sensor, port, baud, patience
         self._on_messages = on_messages
         self.wanted: Collection[str] = ()
         self._parser = self._mavlink.MAVLink(None, srcSystem=OURS[0], srcComponent=OURS[1])
@@ -187,7 +192,7 @@ class Link:
             raise self._fault
         with self._news:
             silent_s = self._silence.seen_by(clock_s)
-        if self._streaming and silent_s > SILENCE_S:
+        if self._streaming and silent_s > self._patience.silent_s:
             raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
@@ -216,7 +221,7 @@ class Link:
         return self.known.system, self.known.component
 
     def _find(self) -> None:
-        if not self._wait(lambda: self.autopilot is not None, self._timeout_s):
+        if not self._wait(lambda: self.autopilot is not None, self._patience.first_s):
             if self._others_seen:
                 raise SensorError(
                     "mavlink_other_device",
@@ -230,7 +235,9 @@ class Link:
                     "Set mavlink.baud to the speed of that port of the autopilot (SERIALn_BAUD, SER_TELn_BAUD), and "
                     "see that the port speaks MAVLink 2",
                 )
-            raise SensorError("no_autopilot", f"{self._where}: nothing came within {self._timeout_s:g} s", _CABLE)
+            raise SensorError(
+                "no_autopilot", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE
+            )
         if self.armed:
             raise self._armed()
 
@@ -242,7 +249,7 @@ class Link:
         )
 
     def _waits(self) -> list[float]:
-        return [self._timeout_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
+        return [self._patience.first_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
 
     def _wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
         with self._news:

@@ -22,6 +22,7 @@ from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
 from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
 from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
 FULL_SCALE_COUNTS = 1 << 30  # what a channel's range is divided into: far finer than what is sent
@@ -70,14 +71,16 @@ class _Imu:
 class MavlinkSource:
     """The autopilot's configured IMUs, set up: parameters read, rates asked for and seen to come."""
 
-    def __init__(self, sections: Mapping[str, SensorSection], on_samples: OnSamples) -> None:
+    def __init__(
+        self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
+    ) -> None:
         """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
         self._on_samples, self._started = on_samples, False
         self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
         self._first: dict[str, int] = {}
         (name, section), *_ = sections.items()
         line = line_of(section)
-        self.link = Link(name, line.port, line.baud, self._take)
+        self.link = Link(name, line.port, line.baud, self._take, patience=patience)
         try:
             self.link.identify()
             for refusal in (*unfinished(self.link), *self._judge()):
@@ -195,9 +198,11 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
 
 
 @contextmanager
-def mavlink(sections: Mapping[str, SensorSection], on_samples: OnSamples) -> Iterator[MavlinkSource]:
+def mavlink(
+    sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
+) -> Iterator[MavlinkSource]:
     """The IMUs at one port for the length of the `with` block. Raises SensorError as `MavlinkSource`."""
-    source = MavlinkSource(sections, on_samples)
+    source = MavlinkSource(sections, on_samples, patience=patience)
     try:
         yield source
     finally:
