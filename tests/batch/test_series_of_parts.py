@@ -21,9 +21,13 @@ from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
 from rig.batch.work import Bench, Work
 from rig.commands import station
+from rig.config.load import Loaded
 from rig.config.station_section import StationSection
 from rig.errors import Refused
+from rig.plans.script_file import ScriptFile
+from rig.runner.phases import Run
 from rig.station.events import Prompt
+from rig.station.station import Stations, always_yes
 
 AT = "2026-11-25T08:00:00+00:00"
 BEGUN = Begun("A. Person", "W-17", AT)
@@ -184,6 +188,14 @@ def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Pat
     said = shlex.split(station.going_on(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
     assert said[:2] == ["rig", "station"] and "secret" not in said
     assert parser.parse_args(said[2:]) == parser.parse_args([*begun, "--out", str(tmp_path)])
+
+
+def test_an_interrupted_part_is_gone_on_with_by_the_stations_own_command(tmp_path: Path) -> None:
+    going_on = "rig station a.yaml --out batch"
+    nowhere = cast(Loaded, None), cast(ScriptFile, None), Stations((), always_yes)
+    run = Run(tmp_path, *nowhere, again=going_on)
+    with pytest.raises(KeyboardInterrupt, match=f"Go on with: {going_on}$"), run.reported():
+        raise KeyboardInterrupt
 
 
 def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:
