@@ -62,7 +62,7 @@ def run(options: Namespace) -> int:
     numbers = None if options.series is None else numbers_in(options.series)
     page = wish(options)
     with configured_here(options.config, options.overrides, options.script) as found, ExitStack() as stack:
-        present = Present(Now(simulated=found.loaded.simulated, rig=found.loaded.config.history.rig))
+        present = Present(Now(simulated=found.loaded.simulated, rig=found.loaded.config.history.rig or ""))
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
         voice: Voice | None = None
         if page is not None:

@@ -1,17 +1,13 @@
 """What the floor shows of stations and of a history, and who may ask for it."""
 
 import http.client
-import json
-import os
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack
 from datetime import date, timedelta
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -32,6 +28,8 @@ from rig.page.feed import frame_of
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
+from support.beating_station import beating
+from support.floor_seen import sections, until
 from support.past_runs import FIRST, finished
 from support.postgres import postgresql
 
@@ -182,28 +180,3 @@ def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tm
         for path in ("/stop", "/answer", "/certificate.html"):
             assert asked("POST", path)[0] == 404
         assert asked("POST", "/")[0] == 405
-
-
-@contextmanager
-def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
-    command = [sys.executable, "-m", "support.beating_station", url, rig]
-    found = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, env=found, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def sections(feed: Sections) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(feed.whole().split(b"data: ", 1)[1])
-    return found
-
-
-def until(feed: Sections, so: Callable[[dict[str, str]], bool], within_s: float) -> None:
-    deadline_s = time.monotonic() + within_s
-    states: dict[str, str] = {}
-    while not so(states):
-        assert time.monotonic() < deadline_s, states
-        time.sleep(0.1)
-        states = {each["rig"]: each["state"] for each in sections(feed).get("rigs", ())}
