@@ -1,7 +1,8 @@
 """What a station is doing at this moment, made of its batch and of the events of its runs."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
@@ -9,6 +10,7 @@ from rig.batch.batch import Batch
 from rig.errors import Refused
 from rig.station.events import (
     Answered,
+    ArmConnected,
     Failed,
     Interrupted,
     PhaseRecorded,
@@ -21,14 +23,15 @@ from rig.station.events import (
 
 State = Literal["waiting", "checking", "asking", "running", "solving", "refused", "fault", "stopped", "ended"]
 NEWEST = 60  # parts that are told of: a tray has fewer
+ENDINGS = ("fault", "stopped", "ended")  # states that say how a station ended
 
 
 @dataclass(frozen=True, slots=True)
 class Now:
     """What is told of a station: its `state`, the present `part`, what it is `doing` in words, the seconds left.
 
-    `parts` are the batch's newest, serial number and state of each; `counts` how many of all became what. `over` is the
-    last word: nothing comes after it.
+    `parts` are the batch's newest, serial number and state of each; `counts` how many of all became what. `rig` is the
+    rig's name in a history, empty until it is known. `over` is the last word: nothing comes after it.
     """
 
     state: State = "waiting"
@@ -40,6 +43,7 @@ class Now:
     simulated: bool = False
     counts: dict[str, int] | None = None
     parts: tuple[tuple[str, str], ...] = ()
+    rig: str = ""
     over: bool = False
 
     def json(self) -> str:
@@ -64,6 +68,13 @@ class Present:
     def batch(self, batch: Batch) -> None:
         """The batch has changed."""
         self._becomes(of_batch(self.now, batch))
+
+    @contextmanager
+    def asking(self, what: str) -> Iterator[None]:
+        """The operator is asked something between two runs, for the length of the `with` block."""
+        self._becomes(replace(self.now, state="asking", doing=what, left_s=None))
+        yield
+        self._becomes(replace(self.now, state="checking" if self.now.part else "waiting", doing=""))
 
     def _becomes(self, now: Now) -> None:
         if now != self.now:
@@ -91,12 +102,19 @@ def of_batch(now: Now, batch: Batch) -> Now:
     )
 
 
+def last(now: Now) -> Now:
+    """What is told when nothing comes after it: a batch that has not ended, and that no fault ended, has stopped."""
+    return replace(now, state=now.state if now.state in ENDINGS else "stopped", left_s=None, over=True)
+
+
 def after(now: Now, event: RunEvent) -> Now:
     """What is told after an event of a run."""
     changed: dict[str, Any] | None = None
     match event:
+        case ArmConnected(report):
+            changed = {"rig": now.rig or report.serial_number}
         case Prompt(_, to_do):
-            changed = {"state": "asking", "doing": f"asks whether to {to_do}"}
+            changed = {"state": "asking", "doing": f"whether to {to_do}"}
         case Answered(agreed):
             changed = {"state": "checking" if agreed else "waiting", "doing": ""}
         case SamplingStarted():

@@ -2,18 +2,21 @@
 
 import json
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
-from rig.batch.now import Now
+from rig.batch.now import Now, Present, last
 from rig.batch.operators import Question
 from rig.page.application import acting, body_of
 from rig.page.control import Control
 from rig.page.guard import Door
 from rig.page.sections import Sections
+from rig.page.serving import Address, Page, serving
 
 LONGEST = 200  # characters of an answer
 LOOK_S = 0.5  # between two looks whether the page is still there
@@ -80,6 +83,24 @@ class OnPage:
             Route("/say", acting(door, say), methods=["POST"]),
             Route("/stop", acting(door, stop), methods=["POST"]),
         ]
+
+
+@contextmanager
+def on_page(present: Present, address: Address) -> Iterator[tuple[OnPage, str]]:
+    """The page of what is `present`, for the length of the `with` block, and its URL; its last word says how it ended.
+
+    Raises Refused `page_address`.
+    """
+    sections, control = Sections(), Control(may_answer=False)
+    voice = OnPage(sections, control)
+    with serving(sections, control, None, address, Page("station.html", voice.routes)) as url:
+        present.hears = (*present.hears, voice.hear)
+        voice.hear(present.now)
+        try:
+            with control.stoppable():
+                yield voice, url
+        finally:
+            voice.hear(last(present.now))
 
 
 def _typed(text: str) -> bool:

@@ -1,7 +1,8 @@
 """Who names the parts and is asked: an operator at the terminal or elsewhere, or a list that is asked nothing."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -51,11 +52,13 @@ class Terminal:
 class Asked:
     """The operator, by a `voice`; an empty number ends the batch. Nobody is asked where there is no voice.
 
-    The numbers of a list are taken one after the other where there is one.
+    The numbers of a list are taken one after the other where there is one. `asking` is held while something is asked
+    between two runs, and told what, as "to mount the part".
     """
 
     voice: Voice | None
     numbers: Sequence[str] | None = None
+    asking: Callable[[str], AbstractContextManager[None]] = lambda what: nullcontext()
 
     @property
     def attended(self) -> bool:
@@ -77,13 +80,15 @@ class Asked:
     def mounted(self, part: Part) -> bool:
         """Whether it is; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
-        while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
-            pass  # a number that is scanned twice says nothing of what is mounted
+        with self._asking("to mount the part"):
+            while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
+                pass  # a number that is scanned twice says nothing of what is mounted
         return said not in NO
 
     def goes_on(self, doubt: Doubt) -> bool:
         """Whether the operator says yes."""
-        return self._agrees("doubt", "Go on all the same? yes or no:", f"{doubt.why}.")
+        with self._asking("whether to go on all the same"):
+            return self._agrees("doubt", "Go on all the same? yes or no:", f"{doubt.why}.")
 
     def tries_again(self, part: Part, error: RigError) -> bool:
         """Whether the operator wants it again."""
@@ -104,6 +109,9 @@ class Asked:
         more = ", ".join(filter(None, [ended.certificate, repeated, ended.why]))
         say(f"{part.number:3d}  {ended.outcome.upper():7s}  {part.serial}  {more}".rstrip())
         sys.stdout.flush()
+
+    def _asking(self, what: str) -> AbstractContextManager[None]:
+        return nullcontext() if self.voice is None else self.asking(what)
 
     def _agrees(self, kind: Kind, text: str, *lines: str) -> bool:
         return self._answer(kind, text, *lines).lower() in YES

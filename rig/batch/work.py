@@ -1,5 +1,6 @@
 """One part after the other until none follows: what is entered, asked and written between their runs."""
 
+import gc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -109,6 +110,7 @@ class Work:
             if part is None:
                 break
             self._carried_out(part)
+            gc.collect()  # it counts objects, not bytes: by itself it would leave the data of several runs lying about
         self._enter(BatchEnded(now_utc()))
         self._written()
 

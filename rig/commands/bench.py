@@ -54,18 +54,22 @@ class Heard:
                 self.chip = Chip(identity.unique_id, tuple(each.who_am_i for each in identity.sensors if each.present))
             case SamplingStarted():
                 self.recorded = True
-            case Advice(_, repeats):
+            case Advice(repeats=repeats):
                 self.repeats = repeats
 
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """What holds for all parts: whether somebody sits there, who and for which work order, and who listens."""
+    """What holds for all parts: whether somebody sits there, who and for which work order, and who listens.
+
+    `going_on` is the command that goes on with the batch.
+    """
 
     attended: bool
     operator: str = ""
     work_order: str = ""
     listeners: Sequence[Listener] = ()
+    going_on: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +154,8 @@ class RigBench:
             station = Stations((logged, seen, heard, *self.station.listeners), answer, attended=self.station.attended)
             station.mount = None if self.control is None else hands_of(self.control)
             memory = remembered(config, frozenset())
-            this = Run(folder, of_part.loaded, of_part.script, station, memory, self.ahead.connected)
+            going_on, connected = self.station.going_on, self.ahead.connected
+            this = Run(folder, of_part.loaded, of_part.script, station, memory, connected, going_on)
             phase = of_part.phase
             for repeated in range(config.station.repeats + 1):
                 left, heard.repeats = config.station.repeats - repeated, False

@@ -40,6 +40,15 @@ def add(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--time-server", metavar="URL", help="a time stamp (RFC 3161) of this server in the PDF's signature"
     )
+    parser.add_argument(
+        "--long-term",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="put revocation lists under the PDF's signature (PAdES B-LT): of the authority of the key, and of that of "
+        "the time server, the list (CRL) and the certificate, as PEM; may be repeated",
+    )
     add_history(parser)
     add_set(parser, "say something else on the certificate, for example certificate.customer=Example")
 
@@ -61,9 +70,12 @@ def documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`
     and `signatory`.
     """
+    if options.sign is None and options.time_server is not None:
+        raise Refused("bad_option", "--time-server is for what is signed", "Give --sign KEY too, or leave it out")
+    if options.long_term and options.time_server is None:
+        what = "--long-term says what was revoked at a time, and no time server says which"
+        raise Refused("bad_option", what, "Give --sign KEY and --time-server URL too, or leave it out")
     if options.sign is None:
-        if options.time_server is not None:
-            raise Refused("bad_option", "--time-server is for what is signed", "Give --sign KEY too, or leave it out")
         return _documents(options, None)
     from rig.report.signatures.signatory import signatory
 
@@ -107,7 +119,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
             say_on_terminal("drawing the PDF")
             try:
                 attached = {RESULT: file.read_bytes(), **digital}
-                written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options.time_server)
+                written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options)
                 write_new(folder / PDF, written[PDF])
             except Refused as error:
                 left_out.append(error)
@@ -144,14 +156,16 @@ def _digital(
 
 
 def _pdf(
-    page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", time_server: str | None
+    page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
 ) -> bytes:
-    """The page as PDF, signed where somebody signs. Raises Refused as `pdf_of` and `signed_pdf`."""
+    """The page as PDF, signed where somebody signs. Raises Refused as `pdf_of`, `authorities_in` and `signed_pdf`."""
     from rig.report.certificate.pdf import pdf_of
 
     made = pdf_of(page, attached)
     if by is None:
         return made
+    from rig.report.signatures.long_term import authorities_in
     from rig.report.signatures.signing import signed_pdf
 
-    return signed_pdf(made, by, reason, time_server)
+    authorities = authorities_in(options.long_term) if options.long_term else None
+    return signed_pdf(made, by, reason, options.time_server, authorities)

@@ -62,7 +62,7 @@ def run(options: Namespace) -> int:
     numbers = None if options.series is None else numbers_in(options.series)
     page = wish(options)
     with configured_here(options.config, options.overrides, options.script) as found, ExitStack() as stack:
-        present = Present(Now(simulated=found.loaded.simulated))
+        present = Present(Now(simulated=found.loaded.simulated, rig=found.loaded.config.history.rig or ""))
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
         voice: Voice | None = None
         if page is not None:
@@ -70,7 +70,7 @@ def run(options: Namespace) -> int:
         elif numbers is None or not (options.yes or found.loaded.simulated):
             refuse_without_terminal()
             voice = Terminal()
-        return _carried_out(options, found, Asked(voice, numbers), present)
+        return _carried_out(options, found, Asked(voice, numbers, present.asking), present)
 
 
 def _carried_out(options: Namespace, found: "Configured", operator: "Asked", present: "Present") -> int:
@@ -86,17 +86,21 @@ def _carried_out(options: Namespace, found: "Configured", operator: "Asked", pre
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
-    station = Station(operator.attended, said.operator, said.work_order, (present,))
+    same = going_on(options, folder)
+    station = Station(operator.attended, said.operator, said.work_order, (present,), same)
     try:
         with _beating(config, present), bench(found, folder, station) as at:
             try:
                 Work(journal, config.station, operator, at, present.batch).all_parts()
-            except KeyboardInterrupt:
-                if present.now.state != "stopped":  # no run was there to say so
-                    present.event(Interrupted("between two parts"))
-                raise
-    except (Fault, KeyboardInterrupt):
-        say(f"the batch is kept in {folder}; go on with: {going_on(options, folder)}", sys.stderr)
+            except KeyboardInterrupt as interrupt:
+                if present.now.state == "stopped":
+                    raise
+                why = str(interrupt) or "interrupted"  # no run was there to say so
+                text = f"{why} between two parts; the batch is kept in {folder}. Go on with: {same}"
+                present.event(Interrupted(text))
+                raise KeyboardInterrupt(text) from None
+    except Fault:
+        say(f"the batch is kept in {folder}; go on with: {same}", sys.stderr)
         raise
     batch = journal.batch
     if options.json:
@@ -124,18 +128,11 @@ def _beating(config: "RigConfig", present: "Present") -> Iterator[None]:
 @contextmanager
 def _page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
     """The station's page, on which the operator is asked."""
-    from rig.batch.on_page import OnPage
-    from rig.page.control import Control
-    from rig.page.sections import Sections
-    from rig.page.serving import Page, serving
+    from rig.batch.on_page import on_page
 
-    sections, control = Sections(), Control(may_answer=False)
-    voice = OnPage(sections, control)
-    with serving(sections, control, None, wanted.address(), Page("station.html", voice.routes)) as url:
+    with on_page(present, wanted.address()) as (voice, url):
         say(f"page: {url}", sys.stderr)
-        present.hears = (*present.hears, voice.hear)
-        with control.stoppable():
-            yield voice
+        yield voice
 
 
 def going_on(options: Namespace, folder: Path) -> str:

@@ -130,6 +130,8 @@ def _tell(found: _Found) -> None:
         clock = "the signer's own clock" if each.time_server is None else f"the time server {each.time_server}"
         say(f"  signed by {each.signer}, {when} by {clock}")
         say(f"  its certificate has SHA-256 {each.certificate_sha256}; {_TRUSTED[each.trusted]}")
+        if each.long_term:
+            say("  its certificate was not revoked at that time, by the authorities' lists in the file")
         say(f"  reason: {each.reason.text}")
     if found.attached_to is not None:
         say(f"  attached to {found.attached_to}, which is signed")
@@ -158,6 +160,7 @@ def _entry(found: _Found) -> dict[str, Any]:
                 "time_server": each.time_server,
                 "reason": each.reason.text,
                 "trusted": each.trusted,
+                "long_term": each.long_term,
             }
             for each in found.signatures
         ],

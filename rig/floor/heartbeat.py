@@ -7,10 +7,9 @@ import platform
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rig.batch.now import Now
+from rig.batch.now import Now, last
 from rig.history import stations
 from rig.history.place import Place
 from rig.history.store import open_history
@@ -45,7 +44,7 @@ class Heartbeat:
 
     def close(self) -> None:
         """Tell the last state, and end."""
-        self._now = replace(self._now, over=True)
+        self._now = last(self._now)
         self._over.set()
         self._changed.set()
         self._thread.join(LAST_BEAT_S)

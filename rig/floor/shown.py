@@ -13,13 +13,12 @@ from rig.history.stations import Told
 from rig.history.store import Past
 
 DEAD_S = 3.5  # without a heartbeat, which comes every second
-ENDINGS = ("fault", "stopped")  # of a station whose last word says why it ended
 RECALLED_AHEAD = timedelta(days=30)
 MOST = 200  # rows of a table
 
 
 def rigs(told: Iterable[Told]) -> list[dict[str, Any]]:
-    """Each rig as it is now; one that is silent without a last word is dead, whatever it said before.
+    """Each rig as it is now, named as the history names it; one that is silent without a last word is dead.
 
     What a station of another version, or somebody else, wrote there is `unread` if it is nothing a station says here.
     """
@@ -27,11 +26,10 @@ def rigs(told: Iterable[Told]) -> list[dict[str, Any]]:
     for each in told:
         said = _read(each.told)
         state = str(said.get("state", "unread"))
-        if said.get("over"):
-            state = state if state in ENDINGS else "ended"
-        elif each.age_s > DEAD_S:
+        if not said.get("over") and each.age_s > DEAD_S:
             state = "dead"
-        shown.append({**said, "rig": each.rig, "computer": each.computer, "state": state, "age_s": round(each.age_s)})
+        named = {"rig": said.get("rig") or each.rig, "at": each.rig, "computer": each.computer}
+        shown.append({**said, **named, "state": state, "age_s": round(each.age_s)})
     return shown
 
 

@@ -86,9 +86,9 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
     return _next(f"Look for the cause (rig show {folder} --checks), then measure again", f"rig run {config}")
 
 
-def after_fault(folder: Path, *, repeats: bool) -> Row:
+def after_fault(command: str, *, repeats: bool) -> Row:
     """What to do after a fault, in words and as a command."""
-    return _next("Repeat the refused sweeps" if repeats else "When it is mended, go on", resuming(folder))
+    return _next("Repeat the refused sweeps" if repeats else "When it is mended, go on", command)
 
 
 def _next(words: str, command: str) -> Row:

@@ -247,8 +247,8 @@ class Shown:
                 self._state("stopped", text)
             case Crashed(traceback):
                 self._state("fault", f"A defect of the program: {traceback.strip().splitlines()[-1]}")
-            case Advice(folder, repeats):
-                self.put("next", after_fault(folder, repeats=repeats))
+            case Advice(_, command, repeats):
+                self.put("next", after_fault(command, repeats=repeats))
         if isinstance(event, ENDINGS):
             self.ended = True
             self.put("hand", None)

@@ -78,9 +78,14 @@ class _Connection:
         if not well:
             self.close()
             return None
+        stack.callback(self._let_go)
         stack.push(self._context)
         self._on_state = on_state
         return self._turner
+
+    def _let_go(self) -> None:
+        """Of the run: this refers to itself by way of its turner, and all that the run has read would stay with it."""
+        self._on_state, self._turner = _forget, None
 
     def close(self) -> None:
         """Let it go."""

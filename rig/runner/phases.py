@@ -52,6 +52,7 @@ class Run:
     """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase.
 
     `memory` is what is known of its sensors from before; the turner is connected by `connecting` where that is given.
+    `again` is the command that goes on with it, where that is not `rig resume`.
     """
 
     folder: Path
@@ -60,6 +61,7 @@ class Run:
     station: Station
     memory: Memory = field(default_factory=Memory)
     connecting: Connecting | None = None
+    again: str = ""
 
     def carry_out(self, phase: Phase) -> Outcome:
         """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
@@ -192,11 +194,15 @@ class Run:
 
     @property
     def _mended(self) -> Advice:
-        return Advice(self.folder, repeats=False)
+        return Advice(self.folder, self._going_on, repeats=False)
 
     @property
     def _repeating(self) -> Advice:
-        return Advice(self.folder, repeats=True)
+        return Advice(self.folder, self._going_on, repeats=True)
+
+    @property
+    def _going_on(self) -> str:
+        return self.again or resuming(self.folder)
 
     @contextmanager
     def reported(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
@@ -215,7 +221,7 @@ class Run:
             self._ended(Failed(fault), advice)
             raise fault from error
         except OSError as error:
-            remedy = f"Mend that, then go on with: {resuming(self.folder)}"
+            remedy = f"Mend that, then go on with: {self._going_on}"
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
             self._ended(Failed(fault))
             raise fault from error
@@ -227,7 +233,7 @@ class Run:
             raise fault from ended
         except KeyboardInterrupt as interrupt:
             stopped = _with_notes(str(interrupt) or "interrupted", interrupt)
-            text = f"{stopped}; the data are kept in {self.folder}. Go on with: {resuming(self.folder)}"
+            text = f"{stopped}; the data are kept in {self.folder}. Go on with: {self._going_on}"
             self._ended(Interrupted(text))
             raise KeyboardInterrupt(text) from None
         except Exception:

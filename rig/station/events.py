@@ -326,9 +326,10 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do after a failure: the data are in `folder`, from which the run goes on, or `repeats` refused sweeps."""
+    """What to do after a failure: the data are in `folder`; `command` goes on there, or `repeats` refused sweeps."""
 
     folder: Path
+    command: str
     repeats: bool
 
 

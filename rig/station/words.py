@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from traceback import format_exception
 
 from firmware_host.installation import install_command
-from rig.data.run_folder import resuming
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
 from rig.motion.doubts import doubts
 from rig.station.by_hand_words import by_hand_line
@@ -109,9 +108,9 @@ def _of_the_outcome(event: RunEvent) -> str | None:
             text = f"not entered in the history, which does not matter to the run ({why}); later: {later}"
         case RunFolderWritten(folder):
             text = f"written: {folder}"
-        case Advice(folder, repeats):
+        case Advice(folder, command, repeats):
             to_do = "to repeat refused sweeps" if repeats else "when it is mended, go on with"
-            text = f"the data are kept in {folder}; {to_do}: {resuming(folder)}"
+            text = f"the data are kept in {folder}; {to_do}: {command}"
         case ListenerDropped(listener, error):
             text = f"{listener} hears nothing more of this run: it failed ({error})"
         case _:

@@ -1,6 +1,7 @@
 """What a batch's entries amount to, what is doubted, and what it leaves: without a rig."""
 
 import csv
+import gc
 import os
 import pty
 import shlex
@@ -10,6 +11,7 @@ from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
+from weakref import ReferenceType, ref
 
 import pytest
 
@@ -19,11 +21,15 @@ from rig.batch.label import Label, files_of, zpl
 from rig.batch.operators import Asked, Question, Terminal
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
-from rig.batch.work import Bench, Work
+from rig.batch.work import Bench, Desk, Work
 from rig.commands import station
+from rig.config.load import Loaded
 from rig.config.station_section import StationSection
 from rig.errors import Refused
+from rig.plans.script_file import ScriptFile
+from rig.runner.phases import Run
 from rig.station.events import Prompt
+from rig.station.station import Stations, always_yes
 
 AT = "2026-11-25T08:00:00+00:00"
 BEGUN = Begun("A. Person", "W-17", AT)
@@ -176,6 +182,31 @@ def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path:
     assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
 
 
+def test_between_two_parts_nothing_of_a_run_is_left_in_memory(tmp_path: Path) -> None:
+    """What refers to itself, as a run and its listeners do, is let go at once: twenty parts need the memory of one."""
+
+    class OfARun:
+        itself: object = None
+
+    left = list[ReferenceType[OfARun]]()
+
+    def run(part: Part, folder: Path, desk: Desk) -> PartEnded:
+        assert [each() for each in left] == [None] * len(left)
+        data = OfARun()
+        data.itself = data
+        left.append(ref(data))
+        return PartEnded("fail", AT)
+
+    bench = cast(Bench, SimpleNamespace(simulated=True, today=lambda serial: None, fit=lambda serial: None, run=run))
+    numbers = ["G-001", "G-002", "G-003"]
+    gc.disable()
+    try:
+        Work(opened(tmp_path / "batch", tmp_path, BEGUN), SECTION, Asked(None, numbers), bench).all_parts()
+    finally:
+        gc.enable()
+    assert len(left) == len(numbers)
+
+
 def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Path) -> None:
     parser = ArgumentParser()
     station.add(parser)
@@ -184,6 +215,14 @@ def test_the_command_that_goes_on_shows_the_same_page_and_no_token(tmp_path: Pat
     said = shlex.split(station.going_on(parser.parse_args([*begun, "--page-token", "secret"]), tmp_path))
     assert said[:2] == ["rig", "station"] and "secret" not in said
     assert parser.parse_args(said[2:]) == parser.parse_args([*begun, "--out", str(tmp_path)])
+
+
+def test_an_interrupted_part_is_gone_on_with_by_the_stations_own_command(tmp_path: Path) -> None:
+    going_on = "rig station a.yaml --out batch"
+    nowhere = cast(Loaded, None), cast(ScriptFile, None), Stations((), always_yes)
+    run = Run(tmp_path, *nowhere, again=going_on)
+    with pytest.raises(KeyboardInterrupt, match=f"Go on with: {going_on}$"), run.reported():
+        raise KeyboardInterrupt
 
 
 def test_the_table_says_what_became_of_each(tmp_path: Path) -> None:

@@ -7,33 +7,24 @@ from queue import SimpleQueue
 
 import pytest
 from selenium.common.exceptions import StaleElementReferenceException
-from selenium.webdriver import Chrome, Keys
+from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
+from rig.batch.batch import Part
 from rig.batch.now import Now, Present
-from rig.batch.on_page import OnPage
+from rig.batch.on_page import on_page
 from rig.batch.operators import Asked
-from rig.page.control import Control
-from rig.page.sections import Sections
-from rig.page.serving import Address, Page, serving
-from support.browser import legible, needs_browser, picture, screen, text, until
+from rig.page.control import STOPPED
+from rig.page.serving import Address
+from rig.station.events import Interrupted
+from support.browser import legible, needs_browser, picture, screen, text, typed, until
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
 TRAY = (("G-001", "pass"), ("G-002", "fail"), ("<b>G-003</b>", "open"))
 NOW = Now("checking", "<b>G-003</b>", "", None, "A. Person", "W-17", True, {"pass": 1, "fail": 1}, TRAY)
 WORDS = ("The arm at 127.0.0.2 will move for 29 s.", "Nobody and nothing may be within its reach.")
-
-
-@contextmanager
-def page(present: Present) -> Iterator[tuple[Asked, str]]:
-    sections, control = Sections(), Control(may_answer=False)
-    voice = OnPage(sections, control)
-    present.hears = (voice.hear,)
-    voice.hear(present.now)
-    with serving(sections, control, None, Address(port=0), Page("station.html", voice.routes)) as url:
-        yield Asked(voice), url
 
 
 @contextmanager
@@ -51,11 +42,6 @@ def answered(asked: Asked, *questions: str) -> Iterator["SimpleQueue[object]"]:
     thread.join(30)
 
 
-def typed(driver: Chrome, words: str) -> None:
-    """Typed as a scanner does, wherever the cursor is."""
-    driver.switch_to.active_element.send_keys(words, Keys.ENTER)
-
-
 def replaced(button: WebElement) -> bool:
     """Whether the next question has taken the place of the one that the button belongs to."""
     try:
@@ -66,7 +52,8 @@ def replaced(button: WebElement) -> bool:
 
 
 def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
-    with page(Present(NOW)) as (asked, url), answered(asked, "number", "go", "go") as answers:
+    questions = "number", "go", "go"
+    with on_page(Present(NOW), Address(port=0)) as (voice, url), answered(Asked(voice), *questions) as answers:
         driver.get(url)
         until(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
@@ -92,3 +79,22 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
         driver.find_element(By.CSS_SELECTOR, "#buttons .go").click()
         assert answers.get(timeout=30) is True
         until(lambda: not driver.find_element(By.ID, "ask").is_displayed(), "that nothing is asked")
+
+
+def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: Chrome) -> None:
+    present = Present(NOW)
+    with pytest.raises(KeyboardInterrupt), on_page(present, Address(port=0)) as (voice, url):
+        driver.get(url)
+        until(lambda: "checks" in text(driver, "state"), "what the station does")
+        stop = driver.find_element(By.ID, "halt")
+        try:
+            threading.Timer(0, stop.click).start()
+            Asked(voice, asking=present.asking).mounted(Part(1, "G-003", "01-G-003", "2026-11-25T08:00:00+00:00"))
+        except KeyboardInterrupt as interrupt:
+            present.event(Interrupted(f"{interrupt} between two parts"))
+            raise
+    until(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
+    assert text(driver, "state") == "■ stopped" and text(driver, "doing") == f"{STOPPED} between two parts"
+    shown = [each for each in ("stale", "halt", "ask") if driver.find_element(By.ID, each).is_displayed()]
+    assert not shown
+    picture(driver, "station-stopped")

@@ -1,51 +1,19 @@
 """Parts in a row at a terminal, by a script in place of the scanner, with troubles that are planted."""
 
 import csv
-import json
 import os
-import socket
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
-import yaml
 
 from support.commands import configuration
 from support.scanner import Scanner, station
+from support.station_laboratory import Laboratory
 
 NEXT_S, FIRST_MOTION_S = 3.0, 2.0
-GROWTH = 0.1  # of twenty parts 0.1 % and 4.4 % were measured: a leak of every run's data would be 15 %
-WRIST_3, TURNING_RAD_S = 5, 0.2
+GROWTH = 0.02
 pytestmark = [pytest.mark.slow, pytest.mark.proof]
-
-
-class Laboratory:
-    """The control channel of the station's laboratory."""
-
-    def __init__(self, config: Path) -> None:
-        self._address = yaml.safe_load(config.read_text(encoding="utf-8"))["arm"]["host"], 7322
-
-    def __call__(self, do: str, **said: Any) -> dict[str, Any]:
-        with socket.create_connection(self._address, 30) as channel:
-            channel.sendall(json.dumps({"do": do, **said}).encode() + b"\n")
-            reply: dict[str, Any] = json.loads(channel.makefile("rb").readline())
-        assert reply["ok"], reply
-        return reply
-
-    def disturb(self) -> None:
-        """In the first turn that begins from now on, the sensor is held fast a while: it feels the beginning longer."""
-        self("pace", time_scale=1)
-        while abs(self("state")["qd_rad_s"][WRIST_3]) > TURNING_RAD_S:
-            time.sleep(0.005)
-        while abs(self("state")["qd_rad_s"][WRIST_3]) < TURNING_RAD_S:
-            time.sleep(0.005)
-        self("hold")
-        self("sensor_fault", sensor="gyro", fault="stuck")
-        self("advance", duration_s=0.9)
-        self("sensor_fault", sensor="gyro", fault=None)
-        self("pace", time_scale=12)
-        self("run")
 
 
 def goes(at: Scanner, laboratory: Laboratory) -> float:

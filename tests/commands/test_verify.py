@@ -24,7 +24,7 @@ from support.certified import result
 from support.dcc_rules import schema_faults
 from support.kept_rows import forge
 from support.paths import CONFIGS
-from support.signing import PASSPHRASE, Holder, Key, holder, issued, time_server
+from support.signing import PASSPHRASE, Holder, Key, holder, issued, revocation_list, time_server
 
 DS = "{http://www.w3.org/2000/09/xmldsig#}"
 # WeasyPrint does not close its colour profile.
@@ -148,6 +148,22 @@ def test_other_programs_find_the_signatures_valid(lab: Laboratory) -> None:
         )  # fmt: skip
         assert (ended.returncode != 0) == bool(status), ended.stderr
     assert schema_faults(lab.read(XML)) == []
+
+
+def test_with_revocation_lists_it_can_be_checked_long_after(
+    lab: Laboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RIG_SIGNING_PASSPHRASE", PASSPHRASE)
+    authority, out = holder("Authority"), tmp_path / "long"
+    (tmp_path / "authority.pem").write_bytes(revocation_list(authority) + authority.certificates())
+    key = holder("Laboratory", authority).p12(tmp_path / "key.p12")
+    command = ["report", str(lab.folder), "--pdf", "--sign", str(key), "--history", "off", "--out", str(out)]
+    command += ["--long-term", str(tmp_path / "authority.pem")]
+    assert main(command) == 2 and "bad_option" in capsys.readouterr().err and not out.exists()
+    with time_server(time_server_of(authority)) as url:
+        assert main([*command, "--time-server", url]) == 0
+    assert main(["verify", str(out / PDF), "--trust", str(tmp_path / "authority.pem")]) == 0
+    assert "was not revoked at that time" in capsys.readouterr().out
 
 
 def replaced(old: bytes, new: bytes) -> Callable[[bytes], bytes]:

@@ -1,23 +1,20 @@
 """What the floor shows of stations and of a history, and who may ask for it."""
 
 import http.client
-import json
-import os
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack
 from datetime import date, timedelta
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import cast
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
 from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
-from rig.batch.now import Now, after, of_batch
+from rig.batch.now import Now, Present, after, last, of_batch
 from rig.errors import Fault, Refused
 from rig.floor import shown
 from rig.floor.feed import looking
@@ -25,11 +22,14 @@ from rig.history import stations
 from rig.history.place import place
 from rig.history.stations import Told
 from rig.history.store import open_history
+from rig.motion.state import Report
 from rig.page.control import Control
 from rig.page.feed import frame_of
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
-from rig.station.events import Failed, Prompt, SamplingStarted
+from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
+from support.beating_station import beating
+from support.floor_seen import sections, until
 from support.past_runs import FIRST, finished
 from support.postgres import postgresql
 
@@ -58,11 +58,29 @@ def test_a_station_tells_its_batch_and_its_run() -> None:
     assert after(now, Failed(Refused("no_port", "it is not there", "Plug it in"))).state == "refused"
 
 
+def test_while_the_operator_is_asked_between_two_runs_the_station_says_so() -> None:
+    told_of = list[Now]()
+    present = Present(Now("fault", "G-1", "board_link_lost: …"), (told_of.append,))
+    with present.asking("to mount the part"):
+        pass
+    assert [(each.state, each.doing) for each in told_of] == [("asking", "to mount the part"), ("checking", "")]
+
+
+@pytest.mark.parametrize(("named", "shown_as"), [("", "20235599999"), ("bench 1", "bench 1")])
+def test_a_rig_has_the_name_that_the_history_gives_it(named: str, shown_as: str) -> None:
+    """Without `history.rig` that is the serial number of its arm, which is known once it is connected."""
+    report = cast(Report, SimpleNamespace(serial_number="20235599999"))
+    connected = after(Now(rig=named), ArmConnected(report))
+    (card,) = shown.rigs([Told(named or "192.0.2.7", "lab-1", connected.json(), 0.4)])
+    assert (card["rig"], card["at"]) == (shown_as, named or "192.0.2.7")
+    assert shown.rigs([Told("192.0.2.7", "lab-1", Now().json(), 0.4)])[0]["rig"] == "192.0.2.7"
+
+
 def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> None:
-    running, ended = Now(state="running"), Now(state="running", over=True)
-    fault = Now(state="fault", doing="board_link_lost: …", over=True)
-    assert [state(running), state(running, 60), state(ended, 60), state(fault, 60)] == [
-        "running", "dead", "ended", "fault",
+    running, ended = Now(state="running"), last(Now(state="ended"))
+    fault = last(Now(state="fault", doing="board_link_lost: …"))
+    assert [state(running), state(running, 60), state(last(running), 60), state(ended, 60), state(fault, 60)] == [
+        "running", "dead", "stopped", "ended", "fault",
     ]  # fmt: skip
     assert shown.rigs([Told("bench 1", "lab-1", "no JSON", 60)])[0]["state"] == "dead"
 
@@ -70,7 +88,7 @@ def test_a_rig_without_a_sign_of_life_is_dead_unless_it_said_its_last_word() -> 
 @pytest.mark.parametrize("said", ["no JSON", '{"parts": 5}', '{"state": "flies"}', "[" * 20_000])
 def test_what_is_nothing_a_station_says_is_shown_as_that_and_hides_no_other_rig(said: str) -> None:
     odd, running = shown.rigs([Told("bench 0", "lab-0", said, 0.4), told(Now(state="running"))])
-    assert odd == {"rig": "bench 0", "computer": "lab-0", "state": "unread", "age_s": 0}
+    assert odd == {"rig": "bench 0", "at": "bench 0", "computer": "lab-0", "state": "unread", "age_s": 0}
     assert running["state"] == "running"
     (half_a_character,) = shown.rigs([Told("bench 0", "lab-0", '{"doing": "\\ud800"}', 0.4)])
     assert b'"doing":"?"' in frame_of("all", {"rigs": [half_a_character]})
@@ -124,8 +142,8 @@ def test_five_rigs_on_one_history_one_killed_one_unplugged(url: str) -> None:
         assert of_4["doing"].startswith("board_link_lost") and of_4["part"] == "4-001"
         ended = stations_there["1"].stdin
         assert ended is not None
-        ended.close()  # it ends as a station does, and says so
-        until(feed, lambda states: states == {**wanted, "1": "ended"}, within_s=LATEST_S)
+        ended.close()  # it ends in the middle of its batch, and says so
+        until(feed, lambda states: states == {**wanted, "1": "stopped"}, within_s=LATEST_S)
 
 
 @pytest.mark.slow
@@ -163,28 +181,3 @@ def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tm
         for path in ("/stop", "/answer", "/certificate.html"):
             assert asked("POST", path)[0] == 404
         assert asked("POST", "/")[0] == 405
-
-
-@contextmanager
-def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
-    command = [sys.executable, "-m", "support.beating_station", url, rig]
-    found = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with subprocess.Popen(command, env=found, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def sections(feed: Sections) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(feed.whole().split(b"data: ", 1)[1])
-    return found
-
-
-def until(feed: Sections, so: Callable[[dict[str, str]], bool], within_s: float) -> None:
-    deadline_s = time.monotonic() + within_s
-    states: dict[str, str] = {}
-    while not so(states):
-        assert time.monotonic() < deadline_s, states
-        time.sleep(0.1)
-        states = {each["rig"]: each["state"] for each in sections(feed).get("rigs", ())}

@@ -1,7 +1,6 @@
 """What the first screen after a run says: numbers as they are printed, what was before, what to do next."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -59,4 +58,4 @@ def test_a_calibration_is_to_be_stored_where_a_board_keeps_it_and_has_not_done_s
 
 
 def test_after_a_fault_the_run_goes_on_in_its_folder() -> None:
-    assert after_fault(Path("a run"), repeats=False)["command"] == "rig resume 'a run'"
+    assert after_fault("rig resume 'a run'", repeats=False)["command"] == "rig resume 'a run'"

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from rig.cli import guarded
 from rig.data.result_file import ResultDocument
+from rig.data.run_folder import resuming
 from rig.errors import Fault, Problem, refuse
 from rig.report.table import print_kept
 from rig.station.events import Advice
@@ -40,7 +41,7 @@ def stopped(names: Sequence[str]) -> Callable[[], int]:
     """As the phases of a run tell it: where the data are, then the fault."""
 
     def command() -> int:
-        PlainView().event(Advice(RUN, repeats=False))
+        PlainView().event(Advice(RUN, resuming(RUN), repeats=False))
         raise Fault(
             "no_samples",
             f"no sample from {', '.join(names)} within 2 s of the start",

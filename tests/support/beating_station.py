@@ -3,7 +3,11 @@
 A line on its standard input is the name of an error that ends its run.
 """
 
+import os
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from rig.batch.batch import Begun, PartBegun, state_of
 from rig.batch.now import Now, Present
@@ -11,6 +15,18 @@ from rig.errors import Fault
 from rig.floor.heartbeat import heartbeat
 from rig.history.place import place
 from rig.station.events import Failed, SamplingStarted
+
+
+@contextmanager
+def beating(url: str, rig: str) -> Iterator["subprocess.Popen[str]"]:
+    """The process of one, for the length of the `with` block."""
+    command = [sys.executable, "-m", "support.beating_station", url, rig]
+    found = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, env=found, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def main(url: str, rig: str) -> None:

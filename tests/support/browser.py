@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from selenium.webdriver import Chrome, ChromeOptions
+from selenium.webdriver import Chrome, ChromeOptions, Keys
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
@@ -118,6 +118,11 @@ def legible(driver: Chrome) -> None:
 def text(driver: Chrome, element: str) -> str:
     """What is to be read of the element of that id."""
     return driver.find_element(By.ID, element).text
+
+
+def typed(driver: Chrome, words: str) -> None:
+    """A line and Enter, as a keyboard or a scanner types them, wherever the cursor is."""
+    driver.switch_to.active_element.send_keys(words, Keys.ENTER)
 
 
 def kind(driver: Chrome) -> str:

@@ -80,6 +80,16 @@ def issued(
     return Holder(key, (certificate, *(() if above is None else above.chain)))
 
 
+def revocation_list(by: Holder, *revoked: Holder, days: tuple[int, int] = (-1, 7)) -> bytes:
+    """The list of an authority, PEM, of those days from now: it has revoked these an hour before now."""
+    begin, end = (datetime.now(UTC) + timedelta(days=each) for each in days)
+    made = x509.CertificateRevocationListBuilder(by.chain[0].subject, last_update=begin, next_update=end)
+    for each in revoked:
+        entry = x509.RevokedCertificateBuilder(each.chain[0].serial_number, datetime.now(UTC) - timedelta(hours=1))
+        made = made.add_revoked_certificate(entry.build())
+    return made.sign(by.key, hashes.SHA256()).public_bytes(Encoding.PEM)
+
+
 @contextmanager
 def time_server(by: Holder, said: Sequence[bytes] = ()) -> Iterator[str]:
     """A server of RFC 3161 on loopback, its key RSA, by its URL; `said`, where there is any, is all it answers."""

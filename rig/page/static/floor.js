@@ -1,15 +1,9 @@
 // The floor: several rigs, as a shared history tells of them. It decides nothing.
 
-import { live, silent, up } from "./live.js";
+import { live, SIGNS, silent, up, WORDS } from "./live.js";
 
 const $ = (id) => document.getElementById(id);
 const shown = {};
-const WORDS = {
-  waiting: "◌ waits for a part", checking: "? checks", asking: "? asks the operator", running: "◉ runs", solving: "Σ solves",
-  refused: "⊘ refused", fault: "⚠ fault", stopped: "■ stopped", ended: "■ ended", dead: "⚠ no sign of life",
-  unread: "? says what this page cannot read",
-};
-const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };
 
 const element = (name, text, data = {}) => {
@@ -42,7 +36,7 @@ function rig(of) {
   const doing = element("p", `${of.doing ?? ""}${left}`);
   doing.className = "doing";
   const counts = Object.entries(of.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
-  const who = [of.operator, of.work_order && `order ${of.work_order}`, of.computer, of.simulated && "simulated"].filter(Boolean).join(" · ");
+  const who = [of.operator, of.work_order && `order ${of.work_order}`, of.computer, of.at !== of.rig && `at ${of.at}`, of.simulated && "simulated"].filter(Boolean).join(" · ");
   const age = of.state === "dead" ? `last heard ${of.age_s} s ago · ` : "";
   const tray = element("ul");
   tray.className = "tray";

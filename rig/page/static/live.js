@@ -1,4 +1,5 @@
-// What the pages of a station and of the floor have in common: sections as they come, and whether the line brings any.
+// What the pages of a station and of the floor have in common: words and signs, sections as they come, and whether the line
+// brings any.
 
 import { follow } from "./stream.js";
 
@@ -6,6 +7,11 @@ const STALE_MS = 3000; // the server says something every second
 const by = (id) => document.getElementById(id);
 let heard = performance.now();
 
+export const WORDS = {
+  waiting: "◌ waits for a part", checking: "◌ checks", asking: "? asks", running: "◉ runs", solving: "Σ solves", refused: "⊘ refused",
+  fault: "⚠ fault", stopped: "■ stopped", ended: "■ the batch has ended", dead: "⚠ no sign of life", unread: "? says what this page cannot read",
+};
+export const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
 export let up = false;
 export const silent = () => performance.now() - heard > STALE_MS;
 
@@ -18,8 +24,8 @@ export function live(take, tell, over) {
     },
     (is, why) => {
       up = is;
-      by("link").dataset.up = is ? "yes" : "no";
-      by("link-words").textContent = is ? "connected" : why ?? "not connected";
+      by("link").dataset.up = is ? "yes" : over() ? "over" : "no";
+      by("link-words").textContent = is ? "connected" : over() ? "the page has ended" : why ?? "not connected";
       tell();
     },
     () => { heard = performance.now(); tell(); },

@@ -1,14 +1,9 @@
 // A station: the part in hand, the tray, and the question of the moment, which a scanner or a keyboard answers.
 
-import { live, silent, up } from "./live.js";
+import { live, SIGNS, silent, up, WORDS } from "./live.js";
 import { act, token } from "./stream.js";
 
 const $ = (id) => document.getElementById(id);
-const SIGNS = { pass: "✓", fail: "✗", fault: "⚠", refused: "⊘", open: "◉" };
-const STATES = {
-  waiting: "◌ waits", checking: "◌ checks", asking: "? asks", running: "◉ runs", solving: "Σ solves", refused: "⊘ refused", fault: "⚠ fault",
-  stopped: "■ stopped", ended: "■ the batch has ended",
-};
 // What may be typed, beside the buttons that type it. A number that is scanned too early is no answer to any of these.
 const ANSWERS = {
   mount: [["", "It is mounted"], ["no", "Put it aside"]],
@@ -17,15 +12,16 @@ const ANSWERS = {
   again: [["yes", "Again"], ["no", "Put it aside"]],
 };
 let asked = null;
-let over = false; // the batch has ended, and with it the page's server
+let over = false; // the station has ended, and with it the page's server
 
 const element = (name, text, set = {}) => Object.assign(document.createElement(name), { textContent: text ?? "" }, set);
 
 function now(of) {
   $("present").dataset.state = of.state;
-  over = of.state === "ended";
+  over = of.over;
+  $("halt").hidden = over || !token;
   $("part").textContent = of.part || "–";
-  $("state").textContent = STATES[of.state] ?? of.state;
+  $("state").textContent = WORDS[of.state] ?? of.state;
   $("doing").textContent = [of.doing, typeof of.left_s === "number" && `${Math.round(of.left_s)} s left`].filter(Boolean).join(", ");
   $("who").textContent = [of.operator, of.work_order && `order ${of.work_order}`].filter(Boolean).join(" · ");
   $("tags").replaceChildren(...(of.simulated ? [element("span", "simulated", { className: "tag" })] : []));
@@ -96,7 +92,7 @@ window.addEventListener("focus", focus);
 $("halt").hidden = !token;
 $("halt").addEventListener("click", async () => {
   const why = await act("stop");
-  if (why) $("doing").textContent = why;
+  if (why && !over) $("doing").textContent = why;
 });
 
 const SHOW = { now, asked: ask };

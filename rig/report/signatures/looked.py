@@ -4,9 +4,13 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from rig.errors import Refused
 from rig.report.signatures.reason import Reason
+
+if TYPE_CHECKING:
+    from asn1crypto.crl import CertificateList
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +18,7 @@ class Seen:
     """One signature: `signer` the name in its certificate, and `certificate_sha256` what tells that from others.
 
     `when` is by the clock of `time_server` or, where that is None, what the signer's own says. `trusted` is None where
-    nobody said whom to trust.
+    nobody said whom to trust. `long_term`: its certificate was not revoked then, by the authorities' lists inside.
     """
 
     signer: str
@@ -23,6 +27,7 @@ class Seen:
     time_server: str | None
     reason: Reason
     trusted: bool | None
+    long_term: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +55,13 @@ def not_as_signed(name: str, why: str) -> Refused:
     )
 
 
-def untrusted(chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime) -> str:
-    """Why the first of a `chain` of certificates (DER) leads to none of those trusted then; empty if it does."""
+def untrusted(
+    chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime, lists: "Sequence[CertificateList]" = ()
+) -> str:
+    """Why the first of a `chain` of certificates (DER) leads to none of those trusted then; empty if it does.
+
+    Where there are `lists` of revoked certificates, they have to clear all of the way.
+    """
     from asn1crypto.x509 import Certificate
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
     from pyhanko_certvalidator.errors import PathError, ValidationError
@@ -61,7 +71,12 @@ def untrusted(chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime) 
     if not begin <= moment <= end:  # one that is trusted itself is not asked this below
         return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, and not on {moment:%Y-%m-%d}"
     context = ValidationContext(
-        trust_roots=list(map(Certificate.load, trust)), other_certs=others, moment=moment, allow_fetching=False
+        trust_roots=list(map(Certificate.load, trust)),
+        other_certs=others,
+        moment=moment,
+        crls=list(lists),
+        revocation_mode="require" if lists else "soft-fail",
+        allow_fetching=False,
     )
     try:
         asyncio.run(CertificateValidator(own, validation_context=context).async_validate_usage(set()))

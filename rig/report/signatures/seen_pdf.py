@@ -8,6 +8,7 @@ from hashlib import sha256
 from typing import Any
 
 from asn1crypto import parser
+from asn1crypto.crl import CertificateList
 from asn1crypto.x509 import Certificate
 from cryptography.x509 import load_der_x509_certificate
 from pyhanko.pdf_utils.reader import PdfFileReader
@@ -34,7 +35,7 @@ def seen_pdf(name: str, content: bytes, trust: Sequence[bytes]) -> Looked:
     for each in signatures:
         status = _status(each, trust)
         problems += [not_as_signed(name, why) for why in _wrong(each, status, content, last=each is signatures[-1])]
-        seen, why = _seen(each, status, trust)
+        seen, why = _seen(each, status, trust, _lists(reader))
         found.append(seen)
         if why:
             problems.append(signer_not_trusted(name, seen.signer, why))
@@ -69,12 +70,13 @@ def _wrong(signature: Any, status: Any, content: bytes, *, last: bool) -> Iterat
         yield "behind its signature there is something else"
 
 
-def _seen(signature: Any, status: Any, trust: Sequence[bytes]) -> tuple[Seen, str]:
+def _seen(signature: Any, status: Any, trust: Sequence[bytes], lists: Sequence[CertificateList]) -> tuple[Seen, str]:
     """The signature, and why its signer is not trusted, or nothing."""
     stamp = status.timestamp_validity
     stamped = stamp is not None and stamp.intact and stamp.valid and stamp.trusted
     chain = [each.dump() for each in (signature.signer_cert, *signature.other_embedded_certs)]
-    why = untrusted(chain, trust, stamp.timestamp if stamped else datetime.now(UTC)) if trust else ""
+    lists = lists if stamped else ()  # without a time that is certain they clear nothing
+    why = untrusted(chain, trust, stamp.timestamp if stamped else datetime.now(UTC), lists) if trust else ""
     seen = Seen(
         signer=_name(chain[0]),
         certificate_sha256=sha256(chain[0]).hexdigest(),
@@ -82,12 +84,22 @@ def _seen(signature: Any, status: Any, trust: Sequence[bytes]) -> tuple[Seen, st
         time_server=_name(stamp.signing_cert.dump()) if stamped else None,
         reason=Reason(str(signature.sig_object.get("/Reason", ""))),
         trusted=not why if trust else None,
+        long_term=bool(lists and trust) and not why and chain[0] not in trust,  # who is trusted himself is not asked
     )
     return seen, why
 
 
 def _name(certificate: bytes) -> str:
     return load_der_x509_certificate(certificate).subject.rfc4514_string()
+
+
+def _lists(reader: PdfFileReader) -> list[CertificateList]:
+    """The authorities' lists of revoked certificates in the document, which its signature covers as all else."""
+    try:
+        found = reader.root["/DSS"]["/CRLs"]
+    except KeyError:
+        return []
+    return [CertificateList.load(found[number].data) for number in range(len(found))]
 
 
 def _attached(reader: PdfFileReader) -> Iterator[tuple[str, bytes]]:

@@ -1,26 +1,35 @@
 """A certificate signed: the PDF by PAdES (ETSI EN 319 142-1), the digital certificate by XAdES (ETSI EN 319 132-1)."""
 
 import io
+import logging
 from dataclasses import dataclass
 from typing import Any, cast
 
 from rig.errors import Refused
+from rig.report.signatures.long_term import Authorities, unfit
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signatory import DIGEST, Signatory
 
 FIELD = "Laboratory"  # of the form, as readers show it
 
 
-def signed_pdf(pdf: bytes, by: Signatory, reason: Reason, time_server: str | None = None) -> bytes:
+def signed_pdf(
+    pdf: bytes, by: Signatory, reason: Reason, time_server: str | None = None, authorities: Authorities | None = None
+) -> bytes:
     """The PDF with a certification signature, after which no change is permitted: B-B, or B-T by a time server's URL.
 
-    Raises Refused `time_server` where that gives no time stamp.
+    With `authorities` it is B-LT: their lists are in the same revision, under the signature. Raises Refused
+    `time_server` where that gives no time stamp, `revocation_list` where the lists do not clear every certificate.
     """
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.fields import MDPPerm, SigSeedSubFilter
+    from pyhanko.sign.general import SigningError
     from pyhanko.sign.signers import PdfSignatureMetadata, sign_pdf
+    from pyhanko.sign.signers.pdf_signer import DSSContentSettings, SigDSSPlacementPreference
     from pyhanko.sign.timestamps import HTTPTimeStamper, TimestampRequestError
+    from pyhanko_certvalidator.errors import PathError, ValidationError
 
+    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)  # what it refuses is said here, by name
     about = PdfSignatureMetadata(
         field_name=FIELD,
         md_algorithm=DIGEST,
@@ -28,10 +37,17 @@ def signed_pdf(pdf: bytes, by: Signatory, reason: Reason, time_server: str | Non
         subfilter=SigSeedSubFilter.PADES,
         certify=True,
         docmdp_permissions=MDPPerm.NO_CHANGES,
+        embed_validation_info=authorities is not None,
+        validation_context=None if authorities is None else authorities.context(by),
+        dss_settings=DSSContentSettings(include_vri=False, placement=SigDSSPlacementPreference.TOGETHER_WITH_SIGNATURE),
     )
     stamper = None if time_server is None else HTTPTimeStamper(time_server)
     try:
         made = sign_pdf(IncrementalPdfFileWriter(io.BytesIO(pdf)), about, by.signer, timestamper=stamper)
+    except (SigningError, PathError, ValidationError) as error:
+        if authorities is None:
+            raise
+        raise unfit(" ".join(str(error).split())) from error
     except (TimestampRequestError, OSError, ValueError) as error:
         if time_server is None:
             raise

@@ -1,0 +1,70 @@
+"""What makes a signature checkable long after (PAdES B-LT): lists of revoked certificates, from the authorities."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.errors import Refused
+from rig.report.signatures.signatory import SIZE_MAX_BYTES, Signatory
+
+if TYPE_CHECKING:
+    from pyhanko_certvalidator import ValidationContext
+
+LIST_MAX_BYTES = 16 * SIZE_MAX_BYTES  # an authority may have revoked many
+_LIST = re.compile(rb"-----BEGIN X509 CRL-----.*?-----END X509 CRL-----", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Authorities:
+    """Certificates of authorities, and their lists of what they have revoked (CRL, RFC 5280), in DER."""
+
+    roots: tuple[bytes, ...]
+    lists: tuple[bytes, ...]
+
+    def context(self, by: Signatory) -> "ValidationContext":
+        """In it these authorities alone are trusted, and what no list of today clears is not."""
+        from asn1crypto.crl import CertificateList
+        from asn1crypto.x509 import Certificate
+        from cryptography.hazmat.primitives.serialization import Encoding
+        from pyhanko_certvalidator import ValidationContext
+
+        return ValidationContext(
+            trust_roots=list(map(Certificate.load, self.roots)),
+            other_certs=[Certificate.load(each.public_bytes(Encoding.DER)) for each in by.certificates],
+            crls=list(map(CertificateList.load, self.lists)),
+            revocation_mode="require",
+            allow_fetching=False,
+        )
+
+
+def authorities_in(files: Sequence[Path]) -> Authorities:
+    """The certificates and lists in these files: PEM, or a list alone as DER. Raises Refused `revocation_list`."""
+    from cryptography.hazmat.primitives.serialization import Encoding
+    from cryptography.x509 import load_der_x509_crl, load_pem_x509_certificates, load_pem_x509_crl
+
+    roots, lists = list[bytes](), list[bytes]()
+    for file in files:
+        try:
+            content = read_regular_file(file, LIST_MAX_BYTES)
+            pem = b"-----BEGIN" in content
+            certificates = load_pem_x509_certificates(content) if b"-----BEGIN CERTIFICATE" in content else []
+            found = list(map(load_pem_x509_crl, _LIST.findall(content))) if pem else [load_der_x509_crl(content)]
+        except (UnfitFile, OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or str(error)
+            raise unfit(f"{file} cannot be read as one: {why}") from None
+        roots += [each.public_bytes(Encoding.DER) for each in certificates]
+        lists += [each.public_bytes(Encoding.DER) for each in found]
+    return Authorities(tuple(roots), tuple(lists))
+
+
+def unfit(why: str) -> Refused:
+    """The refusal of a signature whose certificates nobody could check later."""
+    return Refused(
+        "revocation_list",
+        f"the revocation lists do not do: {why}",
+        "Give with --long-term the newest list and the certificate of each authority, of the key and of the time "
+        "server, or leave it out",
+    )
