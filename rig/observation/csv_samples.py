@@ -56,6 +56,6 @@ def samples_in(table: Columns, where: str) -> Samples:
     if not given:
         known = ", or ".join(" ".join(each.columns) for each in quantities().values())
         raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
-    check_times(table[TIME])
+    check_times(table[TIME], where)
     readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}
     return Samples(table[TIME], readings, table.get(TEMPERATURE.columns[0]))
