@@ -78,6 +78,7 @@ FAULT, INTERRUPTED = Fault.exit_status, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `rig`; returns the exit status docs/architecture.md promises (0, 1, 2, 3 or 130)."""
+    keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["history"]:
         from rig.commands.history import with_usual_command
@@ -85,14 +86,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         words = with_usual_command(words)
     meant = next((word for word in words if not word.startswith("-")), None)
     if not words:
-        print(FIRST_STEPS)
-        return 0
+        return guarded(_first_steps)
     parser = _parser(meant)
     options, not_understood = parser.parse_known_args(words)
     if not_understood:
         hint = "--set takes one word without blanks, as in --set procedure.speed_deg_s=30; " if "--set" in words else ""
         parser.error(f"{hint}unrecognized arguments: {' '.join(not_understood)}")
     return guarded(lambda: _begun(meant, options.command, options))
+
+
+def _first_steps() -> int:
+    print(FIRST_STEPS)
+    return 0
 
 
 def _begun(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:

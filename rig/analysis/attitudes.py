@@ -26,6 +26,7 @@ from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
+from rig.observation.csv_windows import check_reads
 from rig.observation.fixes import Turning
 from rig.observation.mean import Mean
 from rig.observation.placements import Placements
@@ -37,6 +38,7 @@ CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 SEEN = 3.0  # standard deviations that the largest second-order term must have
 TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
 NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
+ROUNDING = 1e-9  # of a mean: all readings of it were the same
 
 
 def known_size(site: Site, quantity: Quantity) -> KnownNorm:
@@ -99,6 +101,7 @@ def solve_placed(
     any_mounting, exact_rates = asked.any_mounting, asked.exact_rates
 
     def of_rate(turning: Turning) -> Result:
+        check_reads(turning.readings_rad_s, RATE)
         chosen = method or ("maximum_likelihood" if exact_rates else "increments")
         if chosen != "increments":
             return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
@@ -107,6 +110,8 @@ def solve_placed(
     solvers = {kind.quantity: kind.solve for kind in installed_kinds()}
 
     def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
+        if not isinstance(placements, Fault):
+            _check_noisy(placements, quantity)
         if quantity in solvers and not isinstance(placements, Fault):
             of_kind: OfKind = solvers[quantity](name, placements, site)
             return of_kind
@@ -124,6 +129,20 @@ def solve_placed(
         elif placed.placements is not None:
             found[quantity] = or_fault(partial(of_reference, quantity, placed.placements))
     return found
+
+
+def _check_noisy(placements: Placements, quantity: Quantity) -> None:
+    """Raises Fault `stuck_sensor` where a placement's readings of an axis are all the same."""
+    read = placements.read
+    nothing = read.variances[quantity] <= (ROUNDING * read.means[quantity]) ** 2
+    for row, axis in np.argwhere(nothing)[:1]:
+        window, reads = read.windows[row], read.means[quantity][row, axis]
+        raise Fault(
+            "stuck_sensor",
+            f"from {window.start_s:.4g} to {window.end_s:.4g} s the {quantity.sensor} reads {reads:g} {quantity.unit} "
+            f"on {quantity.axes[axis]} always: stuck, at the end of its range, or too coarse to show its noise",
+            "Check its supply, its bus wires and its range; record with all digits",
+        )
 
 
 def known_method(name: str | None) -> Chosen | None:

@@ -9,6 +9,7 @@ from rig.errors import Fault
 from rig.estimation.by_hand import HandSolution, Told, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.csv_samples import Samples
+from rig.observation.csv_windows import check_reads
 from rig.observation.handled import handled
 
 NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give sweeps in six directions")
@@ -17,8 +18,9 @@ NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give s
 def solved_by_hand(item: Item, samples: Samples, told: Columns) -> SensorResult:
     """The gyroscope of readings, by what somebody `told` of the session (`told_of`).
 
-    Raises Fault and Refused as `rig.estimation.by_hand.solve_by_hand`.
+    Raises Fault and Refused as `rig.estimation.by_hand.solve_by_hand`, and `stuck_sensor`.
     """
+    check_reads(samples.readings[RATE], RATE)
     session = handled(samples.time_s, samples.readings[RATE], samples.readings.get(ACCELERATION))
     solution = solve_by_hand(session, told_of(told))
     return result_by_hand(item, solution, matrix_correction(solution.turned))

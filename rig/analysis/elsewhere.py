@@ -15,6 +15,7 @@ from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
 from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
+from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.analysis.verdict import fitness
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
@@ -42,6 +43,7 @@ from rig.observation.turns import TurnedData
 BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_READINGS = "scatter of the readings"
+SWEEPS, FROM_RESIDUALS = "sweeps", "what the sweeps contradict each other by"
 OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # of a bias: m = F ω + b there, g = K (m + b) of gyroscopes
 NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
@@ -116,7 +118,11 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
     if reference_c is not None:
         data, polynomials = files_to_reference(data, reference_c)
     solution = solve_swept(data, chosen)
-    vector = solution if isinstance(solution, VectorSolution | TurnedSolution) else or_fault(lambda: _vector(data))
+    vector = (
+        solution
+        if isinstance(solution, VectorSolution | TurnedSolution)
+        else or_fault(lambda: counted(_vector(data), data))
+    )
     gyroscope = SensorResult(
         sensor=read.item,
         solution=solution,
@@ -149,7 +155,9 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
     if estimator != "increments":
-        return solve_observations(data.sweeps, estimator, data.rests)
+        found = _vector(data)
+        check_agree(found, data)
+        return counted(found, data) if estimator == "vector" else solve_observations(data.sweeps, estimator, data.rests)
     if data.turned is None:
         raise Fault(
             "no_turns",
@@ -163,8 +171,13 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     """What its covariance is made of: of means nothing but their scatter."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
-        freedom = _noise_freedom(solution, data)
-        return Budget((Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, solution.covariance),))
+        freedom, whole = _noise_freedom(solution, data), solution.covariance
+        more = contradiction(solution, data) if isinstance(solution, VectorSolution) else 1.0
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, whole / more**2)
+        if more == 1 or not isinstance(solution, VectorSolution):
+            return Budget((noise,))
+        beyond, left = whole - noise.covariance, float(solution.residuals_rad_s.size - 12)
+        return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, left, beyond)))
     known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
     lines = solution.budget.contributors
     return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))

@@ -91,7 +91,7 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
     means = found.at_reference(seen.means, seen.temperature_c)
     moved = [_average(each, mean, reference_c) for each, mean in zip(averages, means, strict=True)]
     sweeps = tuple(replace(each, average=average) for each, average in zip(data.sweeps, moved, strict=False))
-    return ExternalData(sweeps, tuple(moved[len(sweeps) :])), found
+    return ExternalData(sweeps, tuple(moved[len(sweeps) :]), at_reference=True), found
 
 
 def with_rate_polynomials(result: SensorResult, found: OverTemperature) -> tuple[SensorResult, OverTemperature]:

@@ -14,6 +14,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 
 MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
+STUCK = 0.01  # of the axis that reads most
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
 CONFUSED = (  # ratios of reading over what is felt that a wrong unit gives
     (180 / np.pi, "the readings look like degrees per second given as rad/s"),
@@ -111,6 +112,18 @@ def check_duplicates(means: Array) -> None:
             "duplicated_observation",
             f"observations {earlier} and {again} hold the same readings",
             "Give each recording once; a second sweep in one direction cannot replace the other direction",
+        )
+
+
+def check_reads(matrix: Array) -> None:
+    """Raises Fault `stuck_sensor` where an axis, a row of F (3, 3), reads next to nothing of what the others do."""
+    sizes = np.linalg.norm(matrix, axis=1)
+    least = int(np.argmin(sizes))
+    if sizes[least] < STUCK * sizes.max():
+        raise Fault(
+            "stuck_sensor",
+            f"the {'xyz'[least]} axis reads the same however the sensor is moved",
+            "Check that axis' column, the sensor's supply and its bus wires, then repeat the recording",
         )
 
 

@@ -26,6 +26,7 @@ from rig.estimation.refusals import (
     check_count,
     check_duplicates,
     check_finite,
+    check_reads,
     check_signal,
     check_unit,
     check_variances,
@@ -135,6 +136,7 @@ def solve_vector_model(
     raw = _raw_covariance(inverse, variances, speed_noise, shared)
 
     matrix = coefficients[:3].T
+    check_reads(matrix)
     axes = SensorAxes.of(matrix)
     check_unit(axes.scale)
     check_axes(axes.axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))

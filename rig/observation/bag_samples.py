@@ -14,7 +14,7 @@ import numpy as np
 
 from rig.data.motion_file import TIME
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.errors import Refused
+from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
@@ -75,7 +75,7 @@ def bag_attitudes(path: Path, topic: str | None) -> dict[str, Array]:
 def _opened(path: Path) -> Iterator[Any]:
     """The bag's reader. Raises Refused `no_file`, `missing_extra`."""
     try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise missing_extra(error, "ros2") from error
@@ -83,8 +83,15 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             yield reader
-    except (AnyReaderError, OSError) as error:
-        raise Refused("no_file", f"{path} is no bag that can be read: {error}", "Name the folder of the bag") from error
+    except RigError:
+        raise
+    except Exception as error:  # of a damaged bag it raises whatever its parser ends in
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise Refused(
+            "no_file",
+            f"{path} is no bag that can be read: {why}",
+            "Name the folder of the bag, with its metadata.yaml; `ros2 bag reindex FOLDER` writes one",
+        ) from error
 
 
 def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:

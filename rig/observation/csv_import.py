@@ -28,7 +28,7 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import average_of, check_complete, check_times, inside, overlapping
+from rig.observation.csv_windows import average_of, check_complete, check_reads, check_times, inside, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window
@@ -42,11 +42,15 @@ SWEEPS_MB = 1  # some ten thousand sweeps
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was."""
+    """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was.
+
+    `at_reference`: taken to one temperature by polynomials, which count what repeats contradict each other by.
+    """
 
     sweeps: tuple[Observation, ...]
     rests: tuple[Average, ...]
     turned: TurnedData | None = None
+    at_reference: bool = False
 
 
 def read_sweeps(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
@@ -57,8 +61,9 @@ def read_sweeps(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
 def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
     """Samples, a gyroscope's among them, averaged over sweeps, given by the columns of their file.
 
-    Raises Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does.
+    Raises Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does, `stuck_sensor`.
     """
+    check_reads(samples.readings[RATE], RATE)
     found = average(
         np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),

@@ -51,11 +51,21 @@ def read_samples(path: Path, needed: Sequence[Quantity] = (), mapped: Mapped | N
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """The readings of columns (n,), said to stand `where`. Raises Refused `wrong_columns`, `time_not_increasing`."""
+    """The readings of columns (n,), said to stand `where`.
+
+    Raises Refused `wrong_columns`, `not_a_number`, `time_not_increasing`.
+    """
     given = [each for each in quantities().values() if each.columns[0] in table]
     if not given:
         known = ", or ".join(" ".join(each.columns) for each in quantities().values())
         raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
-    check_times(table[TIME])
+    for name, column in table.items():
+        if len(wrong := np.flatnonzero(~np.isfinite(column))):
+            raise Refused(
+                "not_a_number",
+                f"{where} has {len(wrong)} samples whose {name} is not a number, the first is sample {wrong[0] + 1}",
+                "Leave out what was not measured, or record again",
+            )
+    check_times(table[TIME], where)
     readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}
     return Samples(table[TIME], readings, table.get(TEMPERATURE.columns[0]))

@@ -1,12 +1,16 @@
 """Columns of numbers from a CSV file that somebody else wrote: within bounds, or refused by name."""
 
+import codecs
 import csv
+import zlib
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from gzip import GzipFile
 from io import TextIOWrapper
 from itertools import chain, islice
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -17,6 +21,8 @@ from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
 
 LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
+GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+MARKS = ";\t"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +40,21 @@ def read_columns(path: Path, header: Header, largest_mb: int, mapped: Mapped | N
     """The columns of a file by name, those of its header; of each group of optional ones all, or none.
 
     The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, or
-    by tabs, all rows do. Of a `mapped` file the columns that are named so or as here, whatever others it has.
+    by tabs, all rows do; empty rows are none. Of a `mapped` file the columns that are named so or as here, whatever
+    others it has. A file that gzip has packed is read as what it holds.
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = _rows(path, largest_mb, skipped)
     headings = [name.strip() for name in next(rows, [])]
+    _check_headings(path, headings)
     named = dict(enumerate(headings)) if mapped is None else _picked(path, headings, header, mapped)
     names, places = [*named.values()], [*named]
     _check_columns(path, names, header.needed, header.one_of, header.optional)
     values = array("d")
     for line, row in enumerate(rows, start=skipped + 2):
+        if not row:
+            continue
         cells = row if mapped is None else [row[place] for place in places if place < len(row)]
         numbers = _numbers(cells)
         if len(numbers) != len(names):
@@ -79,32 +89,73 @@ def _picked(path: Path, headings: Sequence[str], header: Header, mapped: Mapped)
 def _rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
     """The rows of a regular file that is not too large, after so many lines of it."""
     try:
-        with (
-            open_regular_file(path, largest_mb * 1_000_000) as file,
-            TextIOWrapper(file, encoding="utf-8-sig", newline="") as text,
-        ):
-            lines = _lines(text)
+        with open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
+            lines = _lines(text, largest_mb * 1_000_000)
             first = next(islice(lines, skipped, None), "")
-            delimiter = next((mark for mark in ";\t" if mark in first and "," not in first), None)
-            if delimiter is not None:
-                for row in csv.reader(chain([first], lines), delimiter=delimiter):
-                    yield [cell.replace(",", ".") for cell in row]
-            else:
-                yield from csv.reader(chain([first], lines))
-    except (UnfitFile, OSError, ValueError, csv.Error) as error:
+            second = next(lines, "")
+            delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
+            rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
+            yield from islice(rows, 1)
+            for row in rows:
+                yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
+    except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
         raise _unreadable(path, str(error)) from error
 
 
-def _lines(text: TextIOWrapper) -> Iterator[str]:
-    """The lines, none of which is endless."""
+def _text(file: BinaryIO) -> TextIOWrapper:
+    """What stands in a file, packed or not, in the encoding its beginning shows. Raises UnfitFile where it is no text.
+
+    Windows' own encoding is that of most loggers' headings that are not in UTF-8: "°/s", "µT".
+    """
+    if _beginning(file).startswith(GZIP):
+        file = GzipFile(fileobj=file)  # type: ignore[assignment]
+    begin = _beginning(file)
+    if begin.startswith(UTF_16):
+        return TextIOWrapper(file, encoding="utf-16", newline="")
+    if b"\0" in begin:
+        raise UnfitFile("it is no text, but a spreadsheet, an archive or another program's own file")
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(begin)
+    except UnicodeDecodeError:
+        return TextIOWrapper(file, encoding="cp1252", errors="replace", newline="")
+    return TextIOWrapper(file, encoding="utf-8-sig", newline="")
+
+
+def _beginning(file: BinaryIO) -> bytes:
+    begin = file.read(LONGEST_LINE)
+    file.seek(0)
+    return begin
+
+
+def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
+    """The lines, none of which is endless, nor all of them: a packed file may hold a thousand times its size."""
     while line := text.readline(LONGEST_LINE):
+        most -= len(line)
         if len(line) == LONGEST_LINE:
             raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
+        if most < 0:
+            raise UnfitFile("what is packed in it is too long")
         yield line
 
 
 def _unreadable(path: Path, why: str) -> Refused:
     return Refused("no_file", f"{path} cannot be read: {why}", "Give a CSV file")
+
+
+def _check_headings(path: Path, headings: Sequence[str]) -> None:
+    """Raises Refused `wrong_columns` for a first row that cannot be one of names."""
+    what = None
+    if len(headings) == 1 and len(headings[0].split()) > 1:
+        what = f"divides its columns neither by commas nor by semicolons nor by tabs: {shorten(headings[0])}"
+    elif headings and _numbers(headings):
+        what = f"has numbers in its first row and no names of columns: {shorten(', '.join(headings))}"
+    if what is not None:
+        raise Refused(
+            "wrong_columns",
+            f"{path} {what}",
+            "Write the columns' names into the first row, divided as all rows are, by commas, semicolons or tabs; "
+            "or say with --columns how many lines stand before it",
+        )
 
 
 def _numbers(row: Sequence[str]) -> list[float]:
@@ -131,7 +182,7 @@ def _check_columns(
             raise Refused(
                 "wrong_unit",
                 f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
-                f"Convert it to the unit in the name {' or '.join(meant)}",
+                f"Convert it to the unit in the name {' or '.join(meant)}, or say its unit with --columns",
             )
     needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
     problems = [f"lacks {name}" for name in needed if name not in names]
@@ -139,13 +190,16 @@ def _check_columns(
     given = [name for name in names if name in alternatives]
     if alternatives and len(set(given)) != 1:
         problems.append(f"has {' and '.join(given) or 'none'} of {', '.join(alternatives)}")
-    unknown = ", ".join(name for name in names if name not in known)
+    if "" in names:
+        problems.append("has a column without a name")
+    unknown = ", ".join(name for name in names if name and name not in known)
     if unknown:
         problems.append(f"has the unknown {shorten(unknown)}")
     if problems:
         wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
         more = "".join(f"; {', '.join(group)} may stand there too" for group in optional)
-        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", f"Its first row must name {wanted}{more}")
+        remedy = f"Its first row must name {wanted}{more}; or say with --columns which of its columns is what"
+        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", remedy)
 
 
 def _quantity(name: str) -> str:

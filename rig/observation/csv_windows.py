@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.data.quantity import Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
@@ -15,13 +16,33 @@ MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
 
 
-def check_times(time_s: Array) -> None:
-    """Raises Refused `time_not_increasing`."""
-    if len(time_s) < MIN_SAMPLES or not (np.diff(time_s) > 0).all():
+def check_times(time_s: Array, where: str = "the samples") -> None:
+    """Raises Refused `time_not_increasing`, which says `where`."""
+    what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
+    back = np.flatnonzero(~(np.diff(time_s) > 0))
+    if len(back):
+        first = int(back[0])
+        what = (
+            f"{where} has time_s {time_s[first + 1]:.9g} after {time_s[first]:.9g}, in sample {first + 2}, and "
+            f"{len(back)} such steps in all: time_s must increase from row to row"
+        )
+    if what is not None:
         raise Refused(
             "time_not_increasing",
-            "the samples are too few, or their time_s does not increase from row to row",
-            "Give every sample once, in the order of time, on one clock",
+            what,
+            "Give every sample once, in the order of time, on one clock, with all digits of its time",
+        )
+
+
+def check_reads(readings: Array, quantity: Quantity) -> None:
+    """Raises Fault `stuck_sensor` where an axis of readings (n, 3) has one and the same value in all of them."""
+    stuck = np.flatnonzero(np.ptp(readings, axis=0) == 0) if len(readings) else []
+    if len(stuck):
+        axes = " and ".join(quantity.axes[axis] for axis in stuck)
+        raise Fault(
+            "stuck_sensor",
+            f"the {quantity.sensor} reads {readings[0, stuck[0]]:g} {quantity.unit} on {axes} in every sample",
+            "Check which columns hold its axes, its supply and its bus wires, then record again",
         )
 
 
@@ -70,8 +91,11 @@ def check_complete(count: int, window: Window, interval_s: float, where: str, le
     """Raises Fault `lost_samples` where fewer samples are in a window than belong there."""
     expected = (window.end_s - window.start_s) / interval_s
     if count < least or count < (1 - MAX_LOST_FRACTION) * expected - 1:
+        wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
+        if expected < least:
+            wanted = f"{least} are the least; it lasts {window.end_s - window.start_s:.3g} s at {1 / interval_s:.3g} Hz"
         raise Fault(
             "lost_samples",
-            f"{where} has {count} samples, but {expected:.0f} are expected",
+            f"{where} has {count} samples, but {wanted}",
             "Check that both files use one clock in seconds, and that no samples are missing",
         )

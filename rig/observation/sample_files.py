@@ -12,6 +12,7 @@ from pathlib import Path
 from rig.data.motion_file import Columns
 from rig.data.result_file import FileEntry
 from rig.errors import Refused
+from rig.errors.quoting import printable
 from rig.observation.bag_samples import bag_attitudes, bag_readings, is_bag
 from rig.observation.ulog_samples import is_ulog, ulog_readings
 
@@ -71,7 +72,8 @@ def entry_of(path: Path) -> FileEntry:
         with each.open("rb") as file:
             while piece := file.read(1 << 20):
                 found.update(piece)
-    return FileEntry(name=path.name if INSIDE not in str(path) else there.name, sha256=found.hexdigest())
+    name = path.name if INSIDE not in str(path) else there.name
+    return FileEntry(name=printable(name), sha256=found.hexdigest())  # a name may be no UTF-8, which no document takes
 
 
 def _format(path: Path) -> Format | None:

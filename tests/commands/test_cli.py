@@ -35,6 +35,27 @@ def test_a_reader_that_is_not_there_is_no_error(command: str) -> None:
     assert done.returncode == 0 and done.stderr == "", done
 
 
+@pytest.mark.parametrize("command", ["", "--help", "solve --help"])
+def test_help_without_a_reader_or_a_known_degree_sign_is_no_traceback(command: str) -> None:
+    ascii_only = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
+    rig = f"{sys.executable} -m rig {command}"
+    for end in ("| head -c 1", ">&-", "> /dev/null"):
+        done = shell(f"{rig} {end}", **ascii_only)
+        assert done.returncode == 0 and done.stderr == "", (end, done)
+    assert "Traceback" not in shell(f"{rig} > /dev/full").stderr
+
+
+def test_the_help_of_every_command_is_shown_on_a_terminal_of_plain_ascii() -> None:
+    code = (
+        "from rig.cli import _COMMANDS, main\n"
+        "for name in _COMMANDS:\n"
+        "    try: main([name, '--help'])\n"
+        "    except SystemExit as ended: assert ended.code == 0\n"
+    )
+    done = shell(f'{sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")
+    assert done.returncode == 0 and "usage: rig world" in done.stdout, done.stderr
+
+
 @pytest.mark.slow
 def test_results_that_cannot_be_written_are_a_named_error() -> None:
     done = shell(f"{PLAN} > /dev/full")

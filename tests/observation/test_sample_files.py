@@ -1,5 +1,6 @@
 """The same session by CSV, in a ROS 2 bag and in PX4's log solves to the same numbers."""
 
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.from_files import Files, recorded_in_files
+from rig.observation.sample_files import entry_of
 from rig.report.document import document_of
 from support.paths import DOCS
 from support.ulog_writer import write_ulog
@@ -139,3 +141,50 @@ def test_what_is_not_in_a_file_is_said_with_what_is(tmp_path: Path) -> None:
     (tmp_path / "bag" / "metadata.yaml").write_text("none", encoding="utf-8")
     with pytest.raises(Refused, match="no_file"):
         read_samples(tmp_path / "bag")
+
+
+def mcap(path: Path, *, not_measured: float = 0.0) -> Path:
+    """A bag in one MCAP file with a hundred readings, one of which has that value."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types, kind = store.types, "sensor_msgs/msg/Imu"
+    none, level = np.zeros(9), types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        imu = bag.add_connection("/imu", kind, typestore=store)
+        for number in range(100):
+            stamp = types["builtin_interfaces/msg/Time"](sec=number, nanosec=0)
+            header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="imu")
+            z = not_measured if number == 40 else 0.1
+            read = types["geometry_msgs/msg/Vector3"](x=0.1 * number, y=0.0, z=z)
+            message = types[kind](header, level, none, read, none, read, none)
+            bag.write(imu, number * 10**9, store.serialize_cdr(message, kind))
+    return path
+
+
+def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: Path) -> None:
+    bag, damage = mcap(tmp_path / "bag"), np.random.default_rng(1)
+    (file,) = bag.glob("*.mcap")
+    whole = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    refused = 0
+    for _ in range(12):
+        content = whole.copy()
+        content[damage.integers(len(content), size=60)] = damage.integers(256, size=60)
+        file.write_bytes(content.tobytes())
+        try:
+            read_samples(bag)
+        except Refused:
+            refused += 1
+    assert refused > 6
+
+
+def test_a_reading_that_was_not_measured_is_named_in_a_bag_too(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match=r"not_a_number: .*bag has 1 samples whose z_rad_s .*the first is sample 41"):
+        read_samples(mcap(tmp_path / "bag", not_measured=float("nan")))
+
+
+def test_a_name_that_is_no_utf_8_is_recorded_as_it_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"imu\xff\x1b[31m.csv")
+    path.write_text("time_s\n", encoding="utf-8")
+    assert entry_of(path).name == "imu\\udcff\\x1b[31m.csv"

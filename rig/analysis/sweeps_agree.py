@@ -1,0 +1,75 @@
+"""Whether the sweeps of somebody else's file agree with each other, and what it costs where they do not."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.estimation.vector_model import VectorSolution, design_matrix
+from rig.observation.csv_import import ExternalData
+
+WRONG = 0.1  # of a sweep's rate, by which the others put it elsewhere: no table is that far off, a wrong row is
+BEYOND_NOISE = 6.0  # standard deviations of its mean
+TOLD = 0.05  # of a row that the others tell at least: else nothing can contradict it
+CHANCE = 4.5  # standard deviations that one of some dozens of means may be off by chance
+
+
+def check_agree(found: VectorSolution, data: ExternalData) -> None:
+    """Every sweep is where all others, solved without it, put it.
+
+    Raises Refused `bad_sweep` for the one that is farthest off: half a turn given as a whole one, a wrong axis.
+    """
+    means, variances, design = _equations(data)
+    toward = np.linalg.pinv(design)
+    told = np.maximum(1 - np.einsum("ij,ji->i", design, toward), TOLD)[:, None]
+    apart = (means - design @ (toward @ means)) / told
+    off = np.linalg.norm(apart @ np.linalg.inv(found.matrix).T, axis=1)
+    noise = np.linalg.norm(np.sqrt(variances) / told, axis=1)
+    sweeps = slice(len(data.sweeps))
+    share = np.where(off > BEYOND_NOISE * noise, off, 0.0)[sweeps] / np.linalg.norm(design[sweeps, :3], axis=1)
+    worst = int(np.argmax(share))
+    if share[worst] > WRONG:
+        raise Refused(
+            "bad_sweep",
+            f"sweep {data.sweeps[worst].sweep} contradicts the others by {100 * share[worst]:.0f} % of its rate",
+            "Look at its angle or speed, its start and end, and the direction of its axis; or leave its row out",
+        )
+
+
+def contradiction(found: VectorSolution, data: ExternalData) -> float:
+    """How many times its noise the worst of the means contradicts the others by; 1 where chance may explain it.
+
+    Not their mean square: one wrong row among twelve is hidden in that, and is all that two sweeps of an axis tell.
+    """
+    if data.at_reference:
+        return 1.0
+    _, variances, design = _equations(data)
+    worst = 1.0
+    for left, variance in zip(found.residuals_rad_s.T, variances.T, strict=True):
+        weighted = design / np.sqrt(variance)[:, None]
+        told = 1 - np.einsum("ij,ji->i", weighted, np.linalg.pinv(weighted))
+        worst = max(worst, float((np.abs(left) / np.sqrt(variance * np.maximum(told, TOLD))).max()))
+    return worst if worst > CHANCE else 1.0
+
+
+def counted(found: VectorSolution, data: ExternalData) -> VectorSolution:
+    """The solution with what the sweeps contradict each other by in its covariances."""
+    more = contradiction(found, data) ** 2
+    return replace(
+        found,
+        covariance=more * found.covariance,
+        matrix_covariance=more * found.matrix_covariance,
+        angles_covariance_rad2=more * found.angles_covariance_rad2,
+    )
+
+
+def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
+    """Of sweeps, then of rests: mean readings (N, 3), their variances (N, 3), and the design (N, 4), [ω 1]."""
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    rates = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
+    return (
+        np.array([each.mean_rad_s for each in averages]),
+        np.array([each.variance_rad2_s2 for each in averages]),
+        design_matrix(np.array([*rates, *np.zeros((len(data.rests), 3))]), None),
+    )

@@ -1,0 +1,84 @@
+"""Files of others whose rows contradict each other, or of sensors that feel nothing: refused by name, or a wider U."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.attitudes import solve_placed
+from rig.analysis.elsewhere import budget_of, solve_swept
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.settings import Elsewhere, Site
+from rig.errors import Fault, Refused
+from rig.observation.attitude_import import placed_by, read_attitudes
+from rig.observation.csv_import import ExternalData, averaged, read_sweeps
+from rig.observation.csv_samples import Samples, read_samples
+from support.paths import DOCS
+
+EXAMPLES = DOCS / "examples"
+SCALE = np.array([1.1771, 1.1554, 1.1440])  # what the example was made with
+SITE = Site(up=(0, 0, -1.0), gravity_m_s2=9.80061, earth_rate_rad_s=None)
+ASKED = Elsewhere(any_mounting=False, find_clock=False, exact_rates=False)
+
+
+def swept(row: int, factor: float) -> ExternalData:
+    """The example's sweeps, one of whose rows states another angle."""
+    sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
+    sweeps["angle_rad"][row - 1] *= factor
+    return averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row(factor: float) -> None:
+    with pytest.raises(Refused, match=r"bad_sweep: sweep 1 contradicts the others by \d+ % of its rate"):
+        solve_swept(swept(1, factor), None)
+    with pytest.raises(Refused, match="bad_sweep: sweep 1 "):
+        solve_swept(swept(1, factor), "newton")
+
+
+def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
+    sound, contradicting = (solve_swept(swept(1, factor), None) for factor in (1.0, 1.03))
+    std = np.sqrt(np.diag(contradicting.covariance))[:3]
+    assert (std > 3 * np.sqrt(np.diag(sound.covariance))[:3]).all()
+    assert (np.abs(contradicting.scale - SCALE) < 3 * std).all()
+    budget = budget_of(contradicting, swept(1, 1.03))
+    assert [line.name for line in budget.contributors] == ["noise", "sweeps"]
+    assert sum(line.covariance for line in budget.contributors) == pytest.approx(contradicting.covariance)
+    assert [line.name for line in budget_of(sound, swept(1, 1.0)).contributors] == ["noise"]
+
+
+def constant(samples: Samples, quantity: object, value: float) -> Samples:
+    """The z axis of a sensor has one value throughout."""
+    readings = {each: column.copy() for each, column in samples.readings.items()}
+    readings[quantity][:, 2] = value  # type: ignore[index]
+    return replace(samples, readings=readings)
+
+
+def by_sweeps(samples: Samples) -> object:
+    return averaged(samples, read_sweeps(EXAMPLES / "sweeps.csv"))
+
+
+def by_attitudes(samples: Samples) -> object:
+    placed = placed_by(samples, read_attitudes(EXAMPLES / "swinging_attitudes.csv"))
+    found = solve_placed("imu", placed, SITE, ASKED, None, second_order=False)[RATE]
+    assert isinstance(found, Fault)
+    raise found
+
+
+@pytest.mark.parametrize("value", [0.0, 0.01])
+@pytest.mark.parametrize(("file", "solve"), [("samples.csv", by_sweeps), ("swinging_samples.csv", by_attitudes)])
+def test_an_axis_that_reads_the_same_throughout_is_named(
+    file: str, solve: Callable[[Samples], object], value: float
+) -> None:
+    stuck = constant(read_samples(EXAMPLES / file, [RATE]), RATE, value)
+    with pytest.raises(Fault, match=f"stuck_sensor: the gyroscope reads {value:g} rad/s on z in every sample"):
+        solve(stuck)
+
+
+def test_a_rest_whose_readings_are_all_the_same_is_named() -> None:
+    samples = constant(read_samples(EXAMPLES / "still_samples.csv"), ACCELERATION, 9.3)
+    placed = placed_by(samples, read_attitudes(EXAMPLES / "still_attitudes.csv"))
+    found = solve_placed("imu", placed, SITE, ASKED, None, second_order=False)[ACCELERATION]
+    assert isinstance(found, Fault) and found.name == "stuck_sensor"
+    assert "the accelerometer reads 9.3 m/s² on z" in str(found) and "at the end of its range" in str(found)
