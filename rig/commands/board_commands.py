@@ -188,12 +188,12 @@ def _corrected_from(calibration: Calibration) -> str:
     if calibration.polynomials is None:
         return ""
     low, high = calibration.polynomials.range_c
-    return f" at {calibration.temperature_c:g} °C, corrected by temperature from {low:.1f} to {high:.1f} °C"
+    return f", at {calibration.temperature_c:g} °C, corrected by temperature from {low:.1f} to {high:.1f} °C"
 
 
 def _in_words(stored: StoredCalibration) -> str:
     calibration = stored.calibration
     return (
         f"record {stored.sequence} of {calibration.written_utc:%Y-%m-%d %H:%M} UTC for {stored.part} "
-        f"{calibration.serial_number} at {stored.range_deg_s:g} °/s"
+        f"{calibration.serial_number} at {stored.range_deg_s:g} °/s{_corrected_from(calibration)}"
     )

@@ -157,14 +157,13 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
 
 def _print_polynomials(console: Console, found: StoredPolynomials) -> None:
     low, high = found.range_c
-    console.print(
-        f"corrected by temperature from {low:.1f} to {high:.1f} °C, beyond as there; for each power of kelvins:"
-    )
+    words = "for each power of kelvins, as a share of the scale, and rad/s"
+    console.print(f"corrected by temperature from {low:.1f} to {high:.1f} °C; {words}:", soft_wrap=True)
     table = Table(box=SIMPLE)
-    for heading in ("power", "scale x", "scale y", "scale z", "bias x rad/s", "bias y rad/s", "bias z rad/s"):
+    for heading in ("power", "scale x", "scale y", "scale z", "bias x", "bias y", "bias z"):
         table.add_column(heading, justify="right")
     for power, rows in enumerate(zip(found.scale_change, found.bias_change_rad_s, strict=True), start=1):
-        table.add_row(str(power), *(f"{each:+.3e}" for row in rows for each in row))
+        table.add_row(str(power), *(f"{each:+.2e}" for row in rows for each in row))
     console.print(table)
 
 

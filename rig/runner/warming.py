@@ -158,7 +158,7 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """By when the board read its thermometer: when this program hears of it is another thing on a busy computer."""
+        """Raise `too_fast` by when the board read it: a busy computer hears of it at another time."""
         seen = self._seen.setdefault(name, deque())
         if seen and read_s <= seen[-1][0]:
             return

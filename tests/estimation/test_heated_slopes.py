@@ -48,5 +48,5 @@ def test_slopes_of_forty_heated_runs_lie_within_u() -> None:
         f"within U {within:.3f}; RMS over u of kx ky kz bx by bz {np.round(rms, 2)}; of the hysteresis {of_loops:.2f}"
     )
 
-    assert 0.93 <= within <= 0.985
+    assert 0.93 <= within <= 0.995, "the gradient that is assumed is up to twice what this board's heater makes"
     assert of_loops < 1.2

@@ -124,6 +124,56 @@ def test_its_result_has_what_the_world_makes_of_the_sensor(heated: Path) -> None
     assert (expanded < np.abs(true) / 4).all(), "a sensor without slopes would not be told from this one"
 
 
+FORCE_BIAS_PER_K, FORCE_SCALE_PER_K = np.array([2e-3, -1e-3, 3e-3]), np.array([1e-4, -1e-4, 5e-5])
+FELT = merge(
+    LABORATORY,
+    {
+        "sensors": {"gyro": {"acceleration": {"range_g": 2}}},
+        "limits": {
+            "acceleration_scale_deviation": 0.1,
+            "acceleration_scale_std": 0.1,
+            "acceleration_bias_m_s2": 1,
+            "acceleration_bias_std_m_s2": 1,
+            "acceleration_verification_m_s2": 1,
+        },
+        "world": {
+            "time_scale": 4,
+            "sensors": {
+                "gyro": {
+                    "accelerometer": {
+                        "scale": [1.012, 0.991, 1.006],
+                        "bias_m_s2": [0.12, -0.2, 0.25],
+                        "noise_m_s2": 0.01,
+                        "bias_m_s2_per_k": FORCE_BIAS_PER_K.tolist(),
+                        "scale_per_k": FORCE_SCALE_PER_K.tolist(),
+                    }
+                }
+            },
+        },
+    },
+)
+IN_ATTITUDES = {"with_attitudes": True, "attitudes": "faces", "dwell_s": 1, "to_c": 40, "gap_k": 5}
+
+
+@pytest.mark.proof
+@pytest.mark.timeout(3000)
+def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(tmp_path: Path) -> None:
+    quick = {"speed_deg_s": 170, "acceleration_deg_s2": 700, "most_rate_k_per_min": 40}
+    config, out = configuration(tmp_path, FELT, {**PROCEDURE, **IN_ATTITUDES, **quick}), tmp_path / "run"
+    ended = rig("run", config, "--out", out, "--yes", timeout_s=2900)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    sets = of_events(read_run(out / "run.h5"), SetMeasured)
+    assert len(sets) >= 4 and all(each.end - each.first == 6 + 12 for each in sets)
+    found = read_result(out).over_temperature["gyro"]
+    force_scale = np.array([1.012, 0.991, 1.006]) * FORCE_SCALE_PER_K
+    true = {"rate": (SCALE * SCALE_PER_K, BIAS_PER_K), "acceleration": (force_scale, FORCE_BIAS_PER_K)}
+    for quantity, (scale, bias) in true.items():
+        std = np.sqrt(np.diag(found[quantity].covariance)).reshape(2, 4, 3)
+        assert (np.abs(np.array(found[quantity].scale[1]) - scale) < 4 * std[0, 1]).all(), quantity
+        assert (np.abs(np.array(found[quantity].bias[1]) - bias) < 4 * std[1, 1]).all(), quantity
+        assert (4 * std[1, 1] < np.abs(bias)).all(), "a bias without slopes would not be told from this one"
+
+
 @pytest.mark.parametrize(
     ("procedure", "body", "name"),
     [

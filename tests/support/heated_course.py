@@ -56,20 +56,21 @@ def warmed() -> Warmed:
     course.begin(BOARD.start_c)
     began: int | None = None
     while course.missing() is not None:
-        time_s = (len(rows) + 1) * TICK_S
-        body.advance(time_s, duty, powered=True)
-        now_c = part.thermometer_c(time_s)
-        rows.append(np.array([time_s, now_c, part.temperature_c(time_s), part.branch(time_s)]))
+        now_s = (len(rows) + 1) * TICK_S
+        body.advance(now_s, duty, powered=True)
+        now_c = part.thermometer_c(now_s)
+        rows.append(np.array([now_s, now_c, part.temperature_c(now_s), part.branch(now_s)]))
         if len(rows) % round(LOOK_S / TICK_S) == 0:
-            duty = ramp.power(time_s, now_c, TO_C + 1 if course.warming else FROM_C - 1)
+            duty = ramp.power(now_s, now_c, TO_C + 1 if course.warming else FROM_C - 1)
         if began is None and course.is_due({"gyro": now_c}):
             began = len(rows)
-            starts.append(time_s)
-        elif began is not None and time_s >= starts[-1] + SET_S:
+            starts.append(now_s)
+        elif began is not None and now_s >= starts[-1] + SET_S:
             mean_c = float(np.mean([row[1] for row in rows[began:]]))
             course.measured(SetMeasured(6 * len(starts) - 6, 6 * len(starts), bool(course.warming), {"gyro": mean_c}))
             began = None
-    return Warmed(*np.array(rows).T, starts_s=tuple(starts))
+    time_s, thermometer_c, element_c, branch = np.array(rows).T
+    return Warmed(time_s, thermometer_c, element_c, branch, tuple(starts))
 
 
 def seen(of: Warmed, seed: int) -> Repeated:
