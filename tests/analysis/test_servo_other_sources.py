@@ -10,11 +10,12 @@ from support.servo_other_sources import by_autopilot, by_lines
 
 SOURCES = {"lines": by_lines, "autopilot": by_autopilot}
 NOISE_RAD_S = 0.01
+QUICK = ("turner.state_rate_hz=100", "procedure.speed_deg_s=150", "procedure.rest_s=1.5")
 
 
 def off(source: Source, seed: int) -> Array:
     """(6,) errors of scale and bias by their combined u, of a run whose checks are passed."""
-    drawn = drawn_servo(seed, ("turner.state_rate_hz=100",), noise_rad_s=NOISE_RAD_S, source=source)
+    drawn = drawn_servo(seed, QUICK, noise_rad_s=NOISE_RAD_S, source=source)
     outcome = calibrated(drawn.runs, "newton")
     assert not [check.name for check in outcome.checks if not check.passed]
     result = outcome.results["gyro"]

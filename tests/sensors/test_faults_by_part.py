@@ -99,7 +99,7 @@ def of_mavlink(fault: str, patience: Patience) -> Iterator[Bench]:
             spoil.get(fault, lambda: None)()
             time.sleep(0.05)  # what was under way before
         port = NO_PORT if fault == "no such port" else wire.port
-        changes = {"baud": 57600, "rate_hz": 20} if fault == "wrong baud rate" else {}
+        changes: dict[str, Any] = {"baud": 57600, "rate_hz": 20} if fault == "wrong baud rate" else {}
         sections = {"imu": autopilots.section(port, **changes)}
         yield mavlink(sections, lambda *_: None, patience=patience), spoil.get(fault, lambda: None)
 

@@ -25,6 +25,7 @@ STILL_S = BEGINS_S - 0.9  # it stands from then on, before it is told to turn
 RATE_HZ = 200.0
 CHUNK_S = 0.05
 PACE = 8.0
+DRAINED_S = 1.0  # after so long nothing is on its way any more
 Model = tuple[Array, Array]
 
 
@@ -69,7 +70,7 @@ def by_lines(
         with lines("gyro", at_port, taken) as source:
             source.start()
             listening.set()
-            return source.sensors["gyro"], taken.all_of(source, ended.is_set)
+            return source.sensors["gyro"], taken.all_of(source, lambda: ended.is_set() and taken.quiet_s > DRAINED_S)
 
 
 def by_autopilot(
@@ -92,7 +93,9 @@ def by_autopilot(
         with mavlink(sections, taken) as source:
             source.start()
             begun_s.append(wire.time_s + 1.0)
-            return source.sensors["gyro"], taken.all_of(source, lambda: wire.time_s > begun_s[0] + end_s - STILL_S)
+            return source.sensors["gyro"], taken.all_of(
+                source, lambda: wire.time_s > begun_s[0] + end_s - STILL_S + DRAINED_S * PACE
+            )
 
 
 class _Taken:
@@ -100,18 +103,21 @@ class _Taken:
 
     def __init__(self) -> None:
         self._parts: list[np.ndarray] = []
+        self._last_s = time.monotonic()
 
     def __call__(self, sensor: str, samples: np.ndarray) -> None:
         self._parts.append(samples)
+        self._last_s = time.monotonic()
+
+    @property
+    def quiet_s(self) -> float:
+        """How long nothing has come."""
+        return time.monotonic() - self._last_s
 
     def all_of(self, source: SampleSource, ended: Callable[[], bool]) -> np.ndarray:
-        """All samples, once it has ended and a second has passed in which none came."""
-        parts, since_s = 0, time.monotonic()
-        while not ended() or time.monotonic() - since_s < 1.0:
-            if not ended():
-                source.check()
-            if len(self._parts) > parts:
-                parts, since_s = len(self._parts), time.monotonic()
+        """All samples, once it has ended."""
+        while not ended():
+            source.check()
             time.sleep(0.01)
         return np.concatenate(self._parts)
 
