@@ -114,8 +114,8 @@ def _print_steps(planned: Planned, console: Console) -> None:
         box=SIMPLE,
     )
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
-        left, long = heading in ("step", "joints °"), heading == "joints °"  # where a stage's instruction stands too
-        table.add_column(heading, justify="left" if left else "right", no_wrap=not long)
+        left, folds = heading in ("step", "joints °"), heading == "joints °"  # where a stage's instruction stands too
+        table.add_column(heading, justify="left" if left else "right", no_wrap=not folds)
     at_s = 0.0
     begins = {stage.begins: (number, stage) for number, stage in enumerate(plan.stages, start=1)}
     for place, step in enumerate(plan.steps):
