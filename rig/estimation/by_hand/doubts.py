@@ -87,7 +87,7 @@ def _without(fit: Fit, name: str, at: int) -> tuple[list[Factor], int]:
 
 
 def _less(fit: Fit, name: str, at: int) -> float:
-    """By how much less is left without what is doubted, beyond what leaves with as many equations."""
+    """The chi square that goes with what is doubted, beyond what goes with as many equations."""
     rows, freed = _without(fit, name, at)
     try:
         return _left_of(fit.factors) - _least(rows) - A_ROW * freed if freed else 0.0
@@ -96,7 +96,7 @@ def _less(fit: Fit, name: str, at: int) -> float:
 
 
 def _less_anew(fit: Fit, name: str, at: int) -> float:
-    """The same by the sizes that are found without what is doubted; 0 where none of them is much smaller."""
+    """The chi square that goes, by the sizes without what is doubted; 0 where none of these is much smaller."""
     rows, freed = _without(fit, name, at)
     try:
         rows, sizes = sized_anew(rows, fit.sizes)
