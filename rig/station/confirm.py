@@ -41,6 +41,6 @@ def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool)
 
 
 def refuse_unless_answerable(assume_yes: bool) -> None:
-    """For what takes long and asks at its end. Raises Refused `not_confirmed` where nobody could agree."""
+    """Look for a terminal before what takes long and asks at its end. Raises Refused `not_confirmed` where none is."""
     if not assume_yes and not sys.stdin.isatty():
         raise Refused("not_confirmed", "there is no terminal at which somebody could agree to the change", NOT_AGREED)

@@ -87,22 +87,22 @@ def _without(fit: Fit, name: str, at: int) -> tuple[list[Factor], int]:
 
 
 def _less(fit: Fit, name: str, at: int) -> float:
-    """By how much less is left without what is doubted, beyond what leaves with as many equations."""
+    """The chi square that goes with what is doubted, beyond what goes with as many equations."""
     rows, freed = _without(fit, name, at)
     try:
-        return _chi_square(fit.factors) - _chi_square(rows) - A_ROW * freed if freed else 0.0
+        return _left_of(fit.factors) - _least(rows) - A_ROW * freed if freed else 0.0
     except np.linalg.LinAlgError:
         return 0.0
 
 
 def _less_anew(fit: Fit, name: str, at: int) -> float:
-    """The same by the sizes that are found without what is doubted; 0 where none of them is much smaller."""
+    """The chi square that goes, by the sizes without what is doubted; 0 where none of these is much smaller."""
     rows, freed = _without(fit, name, at)
     try:
         rows, sizes = sized_anew(rows, fit.sizes)
         if not freed or not _much_larger(fit.sizes, sizes):
             return 0.0
-        return _chi_square(resized(fit.factors, fit.sizes, sizes)) - _chi_square(rows) - A_ROW * freed
+        return _least(resized(fit.factors, fit.sizes, sizes)) - _least(rows) - A_ROW * freed
     except np.linalg.LinAlgError:
         return 0.0
 
@@ -128,10 +128,14 @@ def _much_larger(sizes: Sizes, than: Sizes) -> bool:
     return any(getattr(sizes, each) > OF_ONE * getattr(than, each) for each in HIDING)
 
 
-def _chi_square(rows: Sequence[Factor]) -> float:
+def _least(rows: Sequence[Factor]) -> float:
     """What is left of the rows where it is least."""
     step, _ = solved(rows)
-    return sum(float(np.sum(((row.missed + row.design @ step) / row.std) ** 2)) for row in rows)
+    return _left_of([replace(row, missed=row.missed + row.design @ step) for row in rows])
+
+
+def _left_of(rows: Sequence[Factor]) -> float:
+    return sum(float(np.sum((row.missed / row.std) ** 2)) for row in rows)
 
 
 def named(fit: Fit, doubt: Doubt) -> Fault:
