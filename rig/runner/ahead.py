@@ -84,7 +84,7 @@ class _Connection:
         return self._turner
 
     def _let_go(self) -> None:
-        """Of the run: this refers to itself by way of its turner, and all that the run has read would stay with it."""
+        """Forget the run: this refers to itself by its turner, and all that the run has read would stay with it."""
         self._on_state, self._turner = _forget, None
 
     def close(self) -> None:

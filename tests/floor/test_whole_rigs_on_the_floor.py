@@ -28,12 +28,15 @@ pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough]
 def whole(folder: Path, url: str, rig: str) -> Iterator[tuple["subprocess.Popen[bytes]", Path]]:
     """A station at work on three parts without questions, and its configuration."""
     folder.mkdir()
-    config = configuration(folder, {"history": {"url": url, "rig": rig}, "world": {"time_scale": 1}})
+    config = configuration(folder, {"history": {"rig": rig}, "world": {"time_scale": 1}})
     parts = folder / "parts.csv"
     parts.write_text("".join(f"{rig}-{number}\n" for number in (1, 2, 3)), encoding="utf-8")
     words = "station", config, "--series", parts, "--out", folder / "batch"
-    command = [sys.executable, "-m", "rig", *map(str, words)]
-    with (folder / "told.txt").open("wb") as told, subprocess.Popen(command, stdout=told, stderr=told) as process:
+    command, env = [sys.executable, "-m", "rig", *map(str, words)], {**os.environ, "RIG_HISTORY": url}
+    with (
+        (folder / "told.txt").open("wb") as told,
+        subprocess.Popen(command, stdout=told, stderr=told, env=env) as process,
+    ):
         try:
             yield process, config
         finally:

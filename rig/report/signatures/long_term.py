@@ -25,7 +25,7 @@ class Authorities:
     lists: tuple[bytes, ...]
 
     def context(self, by: Signatory) -> "ValidationContext":
-        """In it these authorities alone are trusted, and what no list of today clears is not."""
+        """The context of a check that trusts these authorities alone, and nothing that no list clears."""
         from asn1crypto.crl import CertificateList
         from asn1crypto.x509 import Certificate
         from cryptography.hazmat.primitives.serialization import Encoding
