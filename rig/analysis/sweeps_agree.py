@@ -65,7 +65,7 @@ def counted(found: VectorSolution, data: ExternalData) -> VectorSolution:
 
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
-    """Of sweeps, then of rests: mean readings (N, 3), their variances (N, 3), and the design (N, 4), [ω 1]."""
+    """Mean readings (N, 3) of sweeps, then of rests, their variances (N, 3), and the design (N, 4), [ω 1]."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     rates = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
     return (
