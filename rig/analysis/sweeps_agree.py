@@ -33,7 +33,8 @@ def check_agree(found: VectorSolution, data: ExternalData) -> None:
         raise Refused(
             "bad_sweep",
             f"sweep {data.sweeps[worst].sweep} contradicts the others by {100 * share[worst]:.0f} % of its rate",
-            "Look at its angle or speed, its start and end, and the direction of its axis; or leave its row out",
+            "Look at its row and those of other sweeps about its axis: angle or speed, start and end, direction of the "
+            "axis; correct the wrong one, or leave it out",
         )
 
 
