@@ -33,7 +33,8 @@ def check_agree(found: VectorSolution, data: ExternalData) -> None:
         raise Refused(
             "bad_sweep",
             f"sweep {data.sweeps[worst].sweep} contradicts the others by {100 * share[worst]:.0f} % of its rate",
-            "Look at its angle or speed, its start and end, and the direction of its axis; or leave its row out",
+            "Look at its row and those of other sweeps about its axis: angle or speed, start and end, direction of the "
+            "axis; correct the wrong one, or leave it out",
         )
 
 
@@ -65,7 +66,7 @@ def counted(found: VectorSolution, data: ExternalData) -> VectorSolution:
 
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
-    """Of sweeps, then of rests: mean readings (N, 3), their variances (N, 3), and the design (N, 4), [ω 1]."""
+    """Mean readings (N, 3) of sweeps, then of rests, their variances (N, 3), and the design (N, 4), [ω 1]."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     rates = [sweep.speed_rad_s * sweep.axis_flange for sweep in data.sweeps]
     return (

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from rig.config.section import RATIO, Positive
+from rig.config.section import RATIO, Positive, no_number_is_true
 
 Kind = Literal["conformity", "fitness"]
 Parameter = Literal["scale", "bias", "bias_drift"]
@@ -132,3 +132,5 @@ def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, fl
 
 class LimitsSection(Limits, extra="forbid"):
     """The limits of the verdict, for every sensor that is calibrated. They have no defaults: state them all."""
+
+    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))

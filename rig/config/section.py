@@ -1,9 +1,9 @@
 """What all sections of a configuration file share: how they are checked, and what their values may be."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator
 
 from rig.config.ranges import JOINT_RANGE_DEG
 
@@ -21,10 +21,27 @@ SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
 RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
 
 
+def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
+    """YAML reads yes and on as true, which would pass for the number 1: a limit that is "on" limits nothing."""
+    field = cls.model_fields.get(info.field_name or "")
+    if isinstance(value, bool) and field is not None:
+        kinds = _kinds(field.annotation)
+        if kinds & {int, float} and bool not in kinds:
+            raise ValueError("must be a number; YAML reads yes, no, on and off as true and false")
+    return value
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    """The types that a field's annotation is made of."""
+    return {annotation}.union(*map(_kinds, get_args(annotation))) if get_args(annotation) else {annotation}
+
+
 class Section(BaseModel):
     """A part of the file: unknown keys are refused, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 
 
 def checked_host(name: str) -> str:

@@ -304,3 +304,11 @@ def test_another_file_given_for_a_configuration_is_named_as_what_it_is(tmp_path:
     (tmp_path / name).write_bytes(b"\x89HDF" * 50_000)
     with pytest.raises(ConfigurationRefused, match=told):
         load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "key", ["limits.scale_std", "procedure.rest_s", "sensors.gyro.rate_hz", "world.arm.vibration_hz"]
+)
+def test_yes_and_on_are_no_numbers(key: str) -> None:
+    (found,) = problems_of(demo_text(), f"{key}=on")
+    assert key in found and "must be a number; YAML reads yes, no, on and off as true and false" in found

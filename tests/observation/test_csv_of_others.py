@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.data.motion_file import Header
 from rig.data.quantity import RATE
 from rig.errors import Refused
-from rig.observation import csv_table
 from rig.observation.csv_samples import read_samples
-from rig.observation.csv_table import Mapped
+from rig.observation.csv_table import Mapped, read_columns
 
 HEAD = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
 ROWS = [f"{n / 10},0.{n},-1.5,{n}" for n in range(30)]
@@ -77,4 +77,4 @@ def test_a_packed_file_is_as_long_as_what_it_holds(tmp_path: Path) -> None:
     packed = gzip.compress((PLAIN + "3,0,0,0\n" * 200_000).encode())
     assert len(packed) < 10_000
     with pytest.raises(Refused, match=r"no_file: .*what is packed in it is too long"):
-        csv_table.read_columns(written(tmp_path, packed), csv_table.Header(tuple(HEAD)), 1)
+        read_columns(written(tmp_path, packed), Header(tuple(HEAD)), 1)
