@@ -36,8 +36,9 @@ def check_times(time_s: Array, where: str = "the samples") -> None:
 
 def check_reads(readings: Array, quantity: Quantity) -> None:
     """Raises Fault `stuck_sensor` where an axis of readings (n, 3) has one and the same value in all of them."""
-    stuck = np.flatnonzero(np.ptp(readings, axis=0) == 0) if len(readings) else np.empty(0, dtype=np.intp)
-    if len(stuck):
+    still = np.ptp(readings, axis=0) == 0 if len(readings) else np.zeros(3, bool)
+    stuck = [int(axis) for axis in np.flatnonzero(still)]
+    if stuck:
         axes = " and ".join(quantity.axes[axis] for axis in stuck)
         raise Fault(
             "stuck_sensor",

@@ -71,13 +71,13 @@ class Session:
 
 def sheet_of(part: str) -> Sheet:
     """What is known of an accelerometer of that kind."""
-    known = PARTS[part].accelerometer
+    known = PARTS[part]
     return Sheet(
-        known.nonlinearity_percent,
-        known.nonlinear_over_g or RANGES_G[part],
-        known.bias_mg_k,
-        known.scale_ppm_k,
-        known.bias_instability_ug,
+        known.acceleration_nonlinearity_percent,
+        known.acceleration_nonlinear_over_g or RANGES_G[part],
+        known.acceleration_bias_mg_k,
+        known.acceleration_scale_ppm_k,
+        known.acceleration_bias_instability_ug,
     )
 
 
