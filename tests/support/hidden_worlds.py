@@ -314,12 +314,15 @@ def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
 
 
 def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict[str, Any]:
-    """What bends it and what a degree changes are half-widths of its data sheet.acceleration_"""
+    """What bends it and what a degree changes are half-widths of its data sheet."""
     part = section["part"]
     (scale, bias_m_s2), sheet = ACCELEROMETERS[part], PARTS[part]
     over_g = sheet.acceleration_nonlinear_over_g or section["acceleration"]["range_g"]
     bent_s2_m = 2 * sheet.acceleration_nonlinearity_percent / 100 / (over_g * STANDARD_GRAVITY_M_S2)
-    bias_m_s2_k, scale_per_k = 1e-3 * sheet.acceleration_bias_mg_k * STANDARD_GRAVITY_M_S2, 1e-6 * sheet.acceleration_scale_ppm_k
+    bias_m_s2_k, scale_per_k = (
+        1e-3 * sheet.acceleration_bias_mg_k * STANDARD_GRAVITY_M_S2,
+        1e-6 * sheet.acceleration_scale_ppm_k,
+    )
     flicker_m_s2 = 1e-6 * sheet.acceleration_bias_instability_ug * STANDARD_GRAVITY_M_S2
     return {
         "scale": rng.uniform(1 - scale, 1 + scale, 3).tolist(),
