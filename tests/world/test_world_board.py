@@ -120,6 +120,10 @@ CALIBRATION = {
     "temperature_c": 22.0,
     "matrix": ((1.25, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.75)),
     "bias_rad_s": (0.5, 0.25, 0.125),
+    "lowest_c": 22.0,
+    "highest_c": 22.0,
+    "scale_change": ((0.0, 0.0, 0.0),) * 3,
+    "bias_change_rad_s": ((0.0, 0.0, 0.0),) * 3,
 }
 
 
