@@ -25,6 +25,7 @@ def off(source: Source, seed: int) -> Array:
     return in_u
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("source", SOURCES)

@@ -201,6 +201,7 @@ def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypat
     assert remember(FIXTURES / "verified", HistorySection(off=True)) == (None, ())
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The last calibration of the same simulated sensor was half a year ago, and another, on another board."""

@@ -80,6 +80,7 @@ def without_sweeps(run: RunData) -> RunData:
     return replace(run, events=())
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_ends_when_what_is_wanted_is_reached(tmp_path: Path) -> None:
     changes = {"procedure": {"repeats": REPEATS, "wanted_scale_u": 0.05, "wanted_bias_u_rad_s": 0.5}}

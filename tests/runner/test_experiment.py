@@ -56,7 +56,6 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world
 
 
-@pytest.mark.thorough
 def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     """SIX, Tables II and III: below 1e-3 in scale; the bias, as it was on the average of the run, within 2 U."""
     out, result, turntable = finished

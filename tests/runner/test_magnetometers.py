@@ -173,6 +173,7 @@ def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
     assert refused.returncode == 2 and "mounting_not_turned" in refused.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "world",
     [

@@ -67,6 +67,7 @@ def off(source: str, entry: dict[str, Any]) -> np.ndarray:
     return found
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("source", SOURCES)

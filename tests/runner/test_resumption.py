@@ -96,6 +96,7 @@ def part(run: RunData, from_s: float, to_s: float) -> RunData:
     return replace(run, events=tuple(inside))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path) -> None:
     """Something moved the bench during sweep 4: the recording shows it, and the verdict named it."""

@@ -215,6 +215,7 @@ def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
     assert rig.end()[0] == 3
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("fault", "name"),
     [

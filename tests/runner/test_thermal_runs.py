@@ -155,6 +155,7 @@ FELT = merge(
 IN_ATTITUDES = {"with_attitudes": True, "attitudes": "faces", "dwell_s": 1, "to_c": 40, "gap_k": 5}
 
 
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(tmp_path: Path) -> None:
@@ -174,6 +175,7 @@ def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(
         assert (4 * std[1, 1] < np.abs(bias)).all(), "a bias without slopes would not be told from this one"
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("procedure", "body", "name"),
     [
@@ -194,6 +196,7 @@ def test_what_is_not_as_it_should_be_ends_by_name(
     assert max(abs(rate) for rate in run.states["qd_rad_s"][-1]) < 1e-6, "the arm has stopped"
 
 
+@pytest.mark.thorough
 def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> None:
     procedure = {"order": None, "directions": None, **PROCEDURE, "heater_power": 0}
     slow = {"world": {"thermal": {"capacity_j_k": 15}}}  # a set takes a part of a gap
@@ -208,6 +211,7 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     assert not any(each.heated for each in of_events(read_run(out / "run.h5"), TemperatureWanted))
 
 
+@pytest.mark.thorough
 def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
