@@ -8,7 +8,6 @@ from support.full_rate import CASES, stream
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("case", "simulated_s"),
     [("three sensors", 4.0), ("one at 952 Hz", 4.0), ("all at their highest rates, calibrated", 2.0)],
@@ -20,7 +19,6 @@ def test_no_conversion_is_lost_at_full_rate(case: str, simulated_s: float) -> No
     assert all(account.samples > 0.94 * simulated_s * account.rate_hz for account in result.accounts.values())
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     "rates_hz",
     [

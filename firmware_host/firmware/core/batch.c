@@ -6,7 +6,7 @@ _Static_assert(sizeof(struct samples_payload) == sizeof(struct imu_samples_paylo
 _Static_assert(sizeof(struct samples_payload) == sizeof(struct field_samples_payload), "all batches begin alike");
 _Static_assert(sizeof(struct samples_payload) == sizeof(struct rates_payload), "all batches begin alike");
 
-static void write_samples(const struct sample *sample, uint32_t delta_us, const struct correction *none, uint8_t *bytes)
+static void write_samples(const struct sample *sample, uint32_t delta_us, struct correction *none, uint8_t *bytes)
 {
     const struct reading *reading = &sample->reading;
     struct samples_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
@@ -15,7 +15,7 @@ static void write_samples(const struct sample *sample, uint32_t delta_us, const 
     memcpy(bytes, &item, sizeof item);
 }
 
-static void write_imu_samples(const struct sample *sample, uint32_t delta_us, const struct correction *none, uint8_t *bytes)
+static void write_imu_samples(const struct sample *sample, uint32_t delta_us, struct correction *none, uint8_t *bytes)
 {
     const struct reading *reading = &sample->reading;
     struct imu_samples_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
@@ -25,7 +25,7 @@ static void write_imu_samples(const struct sample *sample, uint32_t delta_us, co
     memcpy(bytes, &item, sizeof item);
 }
 
-static void write_field_samples(const struct sample *sample, uint32_t delta_us, const struct correction *none, uint8_t *bytes)
+static void write_field_samples(const struct sample *sample, uint32_t delta_us, struct correction *none, uint8_t *bytes)
 {
     struct field_samples_item item = {.delta_us = delta_us};
     (void)none;
@@ -33,7 +33,7 @@ static void write_field_samples(const struct sample *sample, uint32_t delta_us, 
     memcpy(bytes, &item, sizeof item);
 }
 
-static void write_rates(const struct sample *sample, uint32_t delta_us, const struct correction *correction, uint8_t *bytes)
+static void write_rates(const struct sample *sample, uint32_t delta_us, struct correction *correction, uint8_t *bytes)
 {
     const struct reading *reading = &sample->reading;
     struct rates_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};

@@ -19,7 +19,7 @@ struct batch_layout {
     uint8_t item_size;
 
     /* Writes one item. Only calibrated rates look at the correction. */
-    void (*write)(const struct sample *sample, uint32_t delta_us, const struct correction *correction, uint8_t *item);
+    void (*write)(const struct sample *sample, uint32_t delta_us, struct correction *correction, uint8_t *item);
 };
 
 extern const struct batch_layout batch_samples, batch_imu_samples, batch_field_samples, batch_rates;

@@ -6,6 +6,23 @@
 
 #define LARGEST 2147483520.0f /* the largest float below 2³¹ */
 
+static float polynomial(const float change[3][3], unsigned axis, float warmer)
+{
+    return warmer * (change[0][axis] + warmer * (change[1][axis] + warmer * change[2][axis]));
+}
+
+static void work_out(struct correction *correction, float warmer)
+{
+    correction->warmer_k = warmer;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        float share = 1.0f + polynomial(correction->scale_change, axis, warmer);
+        for (unsigned row = 0; row < 3; row++)
+            correction->gain_there_urad_s[row][axis] = correction->gain_urad_s[row][axis] * share;
+        correction->offset_there_counts[axis] =
+            correction->offset_counts[axis] + polynomial(correction->offset_change_counts, axis, warmer);
+    }
+}
+
 struct correction correction_of(const struct calibration_payload *record, const struct setup_payload *setup)
 {
     float matrix[3][3], bias_rad_s[3], bias_change_rad_s[3][3];
@@ -29,6 +46,7 @@ struct correction correction_of(const struct calibration_payload *record, const 
             correction.offset_change_counts[row][axis] = bias_change_rad_s[row][axis] / sensitivity_rad_s;
         }
     }
+    work_out(&correction, 0.0f);
     return correction;
 }
 
@@ -50,20 +68,15 @@ static float warmer_k(const struct correction *correction, int16_t temperature_c
     return correction->least_k;
 }
 
-static float polynomial(const float change[3][3], unsigned axis, float warmer)
-{
-    return warmer * (change[0][axis] + warmer * (change[1][axis] + warmer * change[2][axis]));
-}
-
-void correction_apply(const struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3])
+void correction_apply(struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3])
 {
     float warmer = warmer_k(correction, reading->temperature_counts), counts[3];
-    for (unsigned axis = 0; axis < 3; axis++) {
-        float offset = correction->offset_counts[axis] + polynomial(correction->offset_change_counts, axis, warmer);
-        counts[axis] = (1.0f + polynomial(correction->scale_change, axis, warmer)) * (reading->counts[axis] + offset);
-    }
+    if (warmer != correction->warmer_k)
+        work_out(correction, warmer);
+    for (unsigned axis = 0; axis < 3; axis++)
+        counts[axis] = reading->counts[axis] + correction->offset_there_counts[axis];
     for (unsigned row = 0; row < 3; row++) {
-        const float *gain_urad_s = correction->gain_urad_s[row];
+        const float *gain_urad_s = correction->gain_there_urad_s[row];
         rate_urad_s[row] =
             rounded(counts[0] * gain_urad_s[0] + counts[1] * gain_urad_s[1] + counts[2] * gain_urad_s[2]);
     }

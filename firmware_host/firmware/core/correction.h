@@ -13,6 +13,8 @@ struct correction {
     float kelvin_per_count, kelvin_at_zero; /* the thermometer's, from where matrix and bias hold */
     float least_k, most_k;                  /* the polynomials' range */
     float scale_change[3][3], offset_change_counts[3][3]; /* per K, K², K³, by axis */
+    /* Worked out for the temperature of the last reading: most readings have the temperature of the one before. */
+    float warmer_k, gain_there_urad_s[3][3], offset_there_counts[3];
 };
 
 /* For a part that is set up so. */
@@ -22,6 +24,6 @@ struct correction correction_of(const struct calibration_payload *record, const 
    what it is multiplied by four times, its product once and each sum once: beside half a microradian per second the error
    is at most 8 · 2⁻²⁴ of the sum of the magnitudes without polynomials, which is 3 µrad/s at 245 °/s, where a count is 153.
    Polynomials add 8 · 2⁻²⁴ of it for the share, and 8 · 2⁻²⁴ of the sum of their terms' magnitudes. */
-void correction_apply(const struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3]);
+void correction_apply(struct correction *correction, const struct reading *reading, int32_t rate_urad_s[3]);
 
 #endif
