@@ -110,7 +110,12 @@ static const struct batch_layout *layout_of(const struct setup_payload *setup)
     return setup->range_m_s2 > 0.0 ? &batch_imu_samples : &batch_samples;
 }
 
-bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
+struct correction *acquisition_correction(unsigned sensor)
+{
+    return &streams[sensor].correction;
+}
+
+bool acquisition_start(uint8_t calibrated)
 {
     uint8_t configured = 0;
     for (unsigned i = 0; i < SENSOR_COUNT; i++)
@@ -121,10 +126,8 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
         stream->layout = layout_of(setups_of(i));
-        if (is_named(calibrated, i)) {
+        if (is_named(calibrated, i))
             stream->layout = &batch_rates;
-            stream->correction = corrections[i];
-        }
         stream->distrust = 0;
         stream->overtaken = false;
         stream->silence_reported = stream->bad_reads_reported = false;

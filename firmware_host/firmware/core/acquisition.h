@@ -16,9 +16,12 @@ void acquisition_data_ready(unsigned sensor, uint32_t captured_us);
 /* Sensor has just been configured to this rate; 0 takes it out of the stream. */
 void acquisition_set_rate(unsigned sensor, double rate_hz);
 
+/* Where the correction of a sensor's rates is kept: to be filled in before a start that names it. */
+struct correction *acquisition_correction(unsigned sensor);
+
 /* Starts counting at sequence 0 with the first conversion of a settled part; false when no sensor is configured. Those with
    their bit in `calibrated` send rates by their correction, the others raw samples. */
-bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT]);
+bool acquisition_start(uint8_t calibrated);
 void acquisition_stop(void);
 bool acquisition_is_running(void);
 

@@ -44,7 +44,6 @@ static uint8_t gyroscope(void)
 
 static void begin(void)
 {
-    struct correction corrections[SENSOR_COUNT];
     struct port_health health;
     port_health(&health);
     uint8_t sensor = health.clock_locked ? gyroscope() : NONE; /* no reading shows that a clock without its crystal is wrong */
@@ -53,7 +52,7 @@ static void begin(void)
     if (!acquisition_is_running()) {
         acquisition_set_rate(sensor, setups_of(sensor)->rate_hz);
         calibrating_forget(sensor);
-        acquisition_start(0, corrections);
+        acquisition_start(0);
     }
     hand_begin(sensor, MOVES, SCALE_STD);
 }

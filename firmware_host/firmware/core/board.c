@@ -93,14 +93,13 @@ static void on_configure(const struct frame *request)
 static void start(const struct frame *request, uint8_t mask)
 {
     uint8_t sensor;
-    struct correction corrections[SENSOR_COUNT];
     enum error_code error = setups_check_mask(mask, &sensor);
     for (uint8_t i = 0; i < SENSOR_COUNT && !error; i++)
         if (is_named(mask, i)) {
             sensor = i;
-            error = stored_correction(i, &corrections[i]);
+            error = stored_correction(i, acquisition_correction(i));
         }
-    if (!error && !acquisition_start(mask, corrections)) {
+    if (!error && !acquisition_start(mask)) {
         sensor = 0;
         error = ERROR_NOT_CONFIGURED;
     }
