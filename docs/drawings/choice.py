@@ -1,4 +1,4 @@
-"""Which way of using the rig fits a sensor that somebody has: six questions, six answers."""
+"""Which way of using the rig fits a sensor that somebody has: seven questions, seven answers."""
 
 from svg import Drawing
 
@@ -18,6 +18,12 @@ WAYS = (  # question, answer if yes in two lines, the page
     ),
     ("Is it a KVH 1775,", "and do you have the arm?", "its own serial port", "kvh1775.md"),
     (
+        "Is it one of these,",
+        "and do you have a Dynamixel servomotor?",
+        "turned by a servo",
+        "how-to/servo.md",
+    ),
+    (
         "Does something measure or set its attitude:",
         "a rate table, cameras, the faces of a cube?",
         "readings + attitudes as CSV",
@@ -25,7 +31,7 @@ WAYS = (  # question, answer if yes in two lines, the page
     ),
     (
         "Can you turn it by known angles: a turntable,",
-        "a servo, by hand against a stop?",
+        "another servo, by hand against a stop?",
         "readings + sweeps as CSV",
         "how-to/data-recorded-elsewhere.md",
     ),
@@ -35,7 +41,7 @@ WAYS = (  # question, answer if yes in two lines, the page
 
 def choice() -> Drawing:
     """The questions one below the other; yes goes right, no goes down."""
-    drawing = Drawing(900, 770, "I have my own IMU: which way?")
+    drawing = Drawing(900, 875, "I have my own IMU: which way?")
     drawing.words((450, 30), "I have my own IMU: which way?", size=18, anchor="middle", bold=True)
     for number, (first, second, answer, page) in enumerate(WAYS):
         y = 60.0 + 105 * number
@@ -49,7 +55,7 @@ def choice() -> Drawing:
         drawing.words((700, y + 48), page, "#555555", 13, "middle")
         drawing.arrow((240, y + 66), (240, y + 105), "#222222")
         drawing.words((252, y + 90), "no", bold=True)
-    drawing.box(40, 690, 400, 56, "#fbeee0", colour="#c25e00")
-    drawing.words((240, 714), "a new driver: new-sensor.md (on the board)", anchor="middle")
-    drawing.words((240, 734), "or other-hardware.md (a port of its own)", anchor="middle")
+    drawing.box(40, 795, 400, 56, "#fbeee0", colour="#c25e00")
+    drawing.words((240, 819), "a new driver: new-sensor.md (on the board)", anchor="middle")
+    drawing.words((240, 839), "or other-hardware.md (a port of its own)", anchor="middle")
     return drawing
