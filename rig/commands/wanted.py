@@ -1,6 +1,7 @@
 """`rig plan CONFIG --wanted …`: the shortest run for an uncertainty, and the configuration of it."""
 
 import json
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from math import inf, isfinite
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import Refused
+from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.analysis.shortest import Planned, Wanted
@@ -34,6 +36,7 @@ def print_shortest_run(options: Namespace) -> int:
 
     Raises Refused `bad_option`, `configuration_not_written`, `not_foretold`, and as `configured`.
     """
+    say("rig plan: looking for the shortest run …", file=sys.stderr)
     from rig.commands.configured import configured
     from rig.plans.shortest import shortest_run
     from rig.report.shortest_words import print_shortest
