@@ -34,7 +34,7 @@ def texts_replaced(value: Any, keys: frozenset[str]) -> None:
 
 @pytest.mark.slow
 def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    keys = frozenset({"part", "serial_number", "name", "unit", "model", "estimator", "source", "rig_version", "by"})
+    keys = frozenset({"serial_number", "rig_version", "arm_model", "what", "source", "reference"})
     folder = forged("rig.settings-7/imu", lambda document: texts_replaced(document, keys), tmp_path)
     assert main(["show", "--all", str(folder)]) == 0
     assert main(["report", str(folder)]) == 0
