@@ -12,13 +12,15 @@ from rig.observation.csv_import import ExternalData
 WRONG = 0.1  # of a sweep's rate, by which the others put it elsewhere: no table is that far off, a wrong row is
 BEYOND_NOISE = 6.0  # standard deviations of its mean
 TOLD = 0.05  # of a row that the others tell at least: else nothing can contradict it
+SAME_AXIS = 0.9  # cosine of two rows' axes, either way
 CHANCE = 4.5  # standard deviations that one of some dozens of means may be off by chance
 
 
 def check_agree(found: VectorSolution, data: ExternalData) -> None:
     """Every sweep is where all others, solved without it, put it.
 
-    Raises Refused `bad_sweep` for the one that is farthest off: half a turn given as a whole one, a wrong axis.
+    Raises Refused `bad_sweep` for the one that is farthest off: half a turn given as a whole one, a wrong axis. Of two
+    about an axis, both: what is between them does not tell which of them is wrong.
     """
     means, variances, design = _equations(data)
     toward = np.linalg.pinv(design)
@@ -32,10 +34,19 @@ def check_agree(found: VectorSolution, data: ExternalData) -> None:
     if share[worst] > WRONG:
         raise Refused(
             "bad_sweep",
-            f"sweep {data.sweeps[worst].sweep} contradicts the others by {100 * share[worst]:.0f} % of its rate",
+            f"{_named(worst, data)} by {100 * share[worst]:.0f} % of its rate",
             "Look at its row and those of other sweeps about its axis: angle or speed, start and end, direction of the "
             "axis; correct the wrong one, or leave it out",
         )
+
+
+def _named(worst: int, data: ExternalData) -> str:
+    """Which sweep contradicts which, by their rows."""
+    axis = data.sweeps[worst].axis_flange
+    about = [each.sweep for each in data.sweeps if abs(each.axis_flange @ axis) > SAME_AXIS]
+    if len(about) == 2:
+        return f"of sweeps {about[0]} and {about[1]}, alone about their axis, one contradicts the other"
+    return f"sweep {data.sweeps[worst].sweep} contradicts the others"
 
 
 def contradiction(found: VectorSolution, data: ExternalData) -> float:

@@ -1,6 +1,6 @@
 """What `result.json` says of a gyroscope whose motion a file tells, in sweeps or in attitudes."""
 
-from rig.data.result_types import Entry, ErrorEntry, PositiveVector3, Vector3
+from rig.data.result_types import Covariance, Entry, ErrorEntry, PositiveVector3, Vector3
 
 
 class LeftOutEntry(Entry):
@@ -70,5 +70,5 @@ class InAttitudesRatesEntry(Entry):
     earth_rate_error: str | None
     followed: FollowedEntry | None
     beside: dict[str, BesideEntry | ErrorEntry]
-    covariance: tuple[tuple[float, ...], ...]
+    covariance: Covariance
     covariance_order: tuple[str, ...]

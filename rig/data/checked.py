@@ -1,5 +1,7 @@
 """Plain values, as JSON has them, into what they mean: each of the type and in the range its annotation says."""
 
+import json
+import re
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -7,7 +9,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
-from rig.errors.quoting import quote
+from rig.errors.quoting import printable, quote
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -15,6 +17,8 @@ Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
 MOST_VALUES = 200_000  # the largest of a run has 3,000; every wrong one of them costs a thousand bytes to tell
 SEPARATORS = (b",", b"[", b"{")  # in JSON, before each value but the first
+LARGEST_NUMBER = 1e100  # in SI units: what is beyond that overflows where it is squared, and nothing measured is
+UNSEEN = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
@@ -35,7 +39,8 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         content = read_regular_file(file, limit_bytes)
         if sum(map(content.count, SEPARATORS)) > MOST_VALUES:
             raise Refused("not_a_result", f"{file} is no result of {what}: it holds over {MOST_VALUES} values", remedy)
-        return kind.model_validate_json(content)
+        document = json.loads(content, parse_float=_measured, parse_int=_measured, parse_constant=_measured)
+        return kind.model_validate(_seen(document))
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
@@ -44,6 +49,30 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         where = ".".join(map(str, first["loc"]))
         why = f"{where}{': ' if where else ''}{first['msg']}"
         raise Refused("not_a_result", f"{file} is no result of {what}: {why}", remedy) from error
+    except (ValueError, RecursionError) as error:
+        raise Refused("not_a_result", f"{file} is no result of {what}: {error}", remedy) from error
+
+
+def _measured(text: str) -> int | float:
+    """A number of a JSON file. Raises ValueError for one that nothing could have found."""
+    value = float(text)
+    if not abs(value) <= LARGEST_NUMBER:
+        raise ValueError(f"{quote(text)} is no number that can be measured")
+    return value if set(text) & set(".eE") else int(text)
+
+
+def _seen(value: Any) -> Any:
+    """A JSON value in whose texts nothing is hidden: a terminal, a certificate and a C header show all there is.
+
+    Raises RecursionError.
+    """
+    if isinstance(value, str):
+        return UNSEEN.sub(lambda found: printable(found[0]), value)
+    if isinstance(value, list):
+        return [_seen(each) for each in value]
+    if isinstance(value, dict):
+        return {_seen(key): _seen(each) for key, each in value.items()}
+    return value
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:

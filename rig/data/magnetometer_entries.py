@@ -18,6 +18,7 @@ from rig.data.result_types import (
     Method,
     PositiveVector3,
     ToldFromEntry,
+    Utc,
     Vector3,
     WhenEntry,
 )
@@ -137,7 +138,7 @@ class AsMountedEntry(Entry):
     """One run of a reversal: how the sensor was mounted, and the bias found so, with the arm's field in it."""
 
     run: str
-    started_utc: str
+    started_utc: Utc
     mounting: Matrix3
     bias_t: Vector3
     bias_std_t: Vector3

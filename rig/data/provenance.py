@@ -15,6 +15,7 @@ from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.checked import checked
 from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
+from rig.data.result_types import Utc
 from rig.data.run_folder import ScriptIdentity
 from rig.motion.geometry import DenavitHartenberg, Pose
 from rig.motion.state import Made, Report
@@ -40,7 +41,7 @@ class Provenance:
     those of readings recorded elsewhere, with no arm and no board.
     """
 
-    started_utc: str
+    started_utc: Utc
     rig_version: str
     python_version: str
     package_versions: Mapping[str, str]

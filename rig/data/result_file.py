@@ -5,9 +5,9 @@ SI units, the unit in every name; vectors and matrices are lists, rows first. Ke
 
 import json
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, ConfigDict, Field, JsonValue, model_validator
 
 from rig.config.limits import Kind, Parameter
 from rig.config.section import SensorName
@@ -19,6 +19,7 @@ from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.hand_entries import ByHandEntry
+from rig.data.installed_kinds import quantities
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.meaning import Meaning, meaning_by_name
 from rig.data.result_types import (
@@ -31,10 +32,12 @@ from rig.data.result_types import (
     PositiveVector3,
     Role,
     ToldFromEntry,
+    Utc,
     Vector2,
     Vector3,
     Vector6,
     WhenEntry,
+    covariance,
 )
 from rig.data.run_folder import RESULT
 from rig.data.temperature_entries import OverTemperatureEntry
@@ -43,6 +46,15 @@ from rig.motion.geometry import OfJoints
 
 SCHEMA: Final = "rig.result/1"
 SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,000
+
+
+def _known(quantity: str) -> str:
+    if quantity not in quantities():
+        raise ValueError(f"is no quantity that the rig or a package installed here knows: {', '.join(quantities())}")
+    return quantity
+
+
+QuantityName = Annotated[str, AfterValidator(_known)]
 
 
 class CheckEntry(Entry):
@@ -134,7 +146,7 @@ class ProvenanceEntry(Entry):
     model_config = ConfigDict(frozen=True, extra="allow")
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
 
-    started_utc: str
+    started_utc: Utc
     rig_version: str
     python_version: str
     package_versions: dict[str, str]
@@ -145,9 +157,9 @@ class ProvenanceEntry(Entry):
     firmware_version: str
     sensor_serial_numbers: dict[str, str]
     stored_calibrations: dict[str, StoredCalibrationEntry]
-    resumed_utc: tuple[str, ...]
-    verified_utc: tuple[str, ...]
-    solved_utc: str
+    resumed_utc: tuple[Utc, ...]
+    verified_utc: tuple[Utc, ...]
+    solved_utc: Utc
     arm_kinematics: KinematicsEntry | None = None
     tcp_offset: Vector6 | None = None
     arm_maker: str | None = None
@@ -188,7 +200,7 @@ class VectorEntry(Entry):
     rank: int
     condition: float
     matrix: Matrix3
-    matrix_covariance: tuple[tuple[float, ...], ...]
+    matrix_covariance: Annotated[tuple[tuple[float, ...], ...], Field(min_length=9), AfterValidator(covariance)]
     matrix_covariance_order: tuple[str, ...]
     non_orthogonality_rad: Vector3
     non_orthogonality_std_rad: Vector3
@@ -390,6 +402,12 @@ class ComparisonEntry(Entry):
     delay_s: tuple[float, ...]
     delay_std_s: tuple[float, ...]
 
+    @model_validator(mode="after")
+    def _one_each(self) -> Self:
+        if len(self.delay_s) != len(self.delay_std_s):
+            raise ValueError("delay_s and delay_std_s must be as many")
+        return self
+
 
 class VerificationEntry(Entry):
     """A sensor against its reference, in the sensor's frame; `before` is null where only calibrated readings exist."""
@@ -436,8 +454,8 @@ class ResultDocument(Entry):
     verification: dict[SensorName, VerificationEntry]
     accelerometers: dict[SensorName, AccelerometerEntry] = Field(default_factory=dict)
     magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
-    bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
-    over_temperature: dict[SensorName, dict[str, OverTemperatureEntry]] = Field(default_factory=dict)
+    bias_drift: dict[SensorName, dict[QuantityName, DriftEntry]] = Field(default_factory=dict)
+    over_temperature: dict[SensorName, dict[QuantityName, OverTemperatureEntry]] = Field(default_factory=dict)
     unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
     others: dict[str, dict[SensorName, JsonValue]] = Field(default_factory=dict)
     mounts: tuple[MountEntry, ...] = ()

@@ -11,7 +11,25 @@ Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
-Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
+
+
+def covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    """Such rows, unless they are no square or hold a negative variance: ValueError."""
+    if any(len(row) != len(rows) for row in rows):
+        raise ValueError("must have as many columns as rows")
+    if any(row[i] < 0 for i, row in enumerate(rows)):
+        raise ValueError("holds a variance below 0")
+    return rows
+
+
+def _iso(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+Utc = Annotated[str, AfterValidator(_iso)]
+Covariance = Annotated[tuple[tuple[float, ...], ...], AfterValidator(covariance)]
+Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6), AfterValidator(covariance)]
 # Degrees of freedom; infinite ones are null.
 Freedom = float | None
 Freedom3 = tuple[Freedom, Freedom, Freedom]
@@ -24,14 +42,6 @@ class Entry(BaseModel):
 
     # What a later version has added is ignored when it is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-
-def _iso(text: str) -> str:
-    datetime.fromisoformat(text)
-    return text
-
-
-Utc = Annotated[str, AfterValidator(_iso)]
 
 
 class WhenEntry(Entry):
@@ -60,7 +70,7 @@ class LaidDownEntry(Entry):
     placement_uncertainty: float | None
     rests_elsewhere: int
     rows_left_out: int
-    covariance: tuple[tuple[float, ...], ...]
+    covariance: Covariance
     covariance_order: tuple[str, ...]
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rig.data.result_types import Entry, Freedom, Vector2, Vector3, Vector6
+from rig.data.result_types import Covariance, Entry, Freedom, Vector2, Vector3, Vector6
 
 Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
 
@@ -49,7 +49,7 @@ class OverTemperatureEntry(Entry):
     orders: tuple[int, int]
     scale: Cubic
     bias: Cubic
-    covariance: tuple[tuple[float, ...], ...]
+    covariance: Covariance
     contributors: tuple[TemperatureLineEntry, ...]
     table: tuple[AtTemperatureEntry, ...]
     lag_s: float

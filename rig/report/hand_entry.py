@@ -45,7 +45,9 @@ def by_hand_lines(found: ByHandEntry) -> Iterator[str]:
     there = {size.name: size for size in found.sizes}
     used = {"closure_rad": any(move.closure_rad is not None for move in found.moves)}
     said = [
-        WORDS[name].format(UNITS.get(name, 1.0) * size.found) for name, size in there.items() if used.get(name, True)
+        WORDS[name].format(UNITS.get(name, 1.0) * there[name].found)
+        for name in WORDS  # what a later version may add has no words here
+        if name in there and used.get(name, True)
     ]
     yield f"as found (one standard deviation): {'; '.join(said)}"
     worst = max([*(each.pull for each in found.rests), *(each.pull for each in found.moves)], default=0.0)

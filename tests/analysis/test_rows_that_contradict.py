@@ -30,11 +30,22 @@ def swept(row: int, factor: float) -> ExternalData:
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row(factor: float) -> None:
-    with pytest.raises(Refused, match=r"bad_sweep: sweep 1 contradicts the others by \d+ % of its rate"):
-        solve_swept(swept(1, factor), None)
-    with pytest.raises(Refused, match="bad_sweep: sweep 1 "):
-        solve_swept(swept(1, factor), "newton")
+@pytest.mark.parametrize("row", [1, 3])
+def test_of_two_sweeps_about_an_axis_both_are_named_for_either_may_be_wrong(row: int, factor: float) -> None:
+    both = "bad_sweep: of sweeps 1 and 3, alone about their axis, one contradicts the other by "
+    with pytest.raises(Refused, match=both + r"\d+ % of its rate"):
+        solve_swept(swept(row, factor), None)
+    with pytest.raises(Refused, match=both):
+        solve_swept(swept(row, factor), "newton")
+
+
+def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tell() -> None:
+    whole = read_sweeps(EXAMPLES / "sweeps.csv")
+    sweeps = {name: np.concatenate([column[:1], column]) for name, column in whole.items()}
+    sweeps["end_s"][0] = sweeps["start_s"][1] = 4.0  # row 1 in two halves
+    sweeps["angle_rad"][:2] = [2 * np.pi, np.pi]
+    with pytest.raises(Refused, match="bad_sweep: sweep 1 contradicts the others by "):
+        solve_swept(averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
 
 
 def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
