@@ -134,11 +134,3 @@ class LimitsSection(Limits, extra="forbid"):
     """The limits of the verdict, for every sensor that is calibrated. They have no defaults: state them all."""
 
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
-
-    @field_validator("scale_deviation", "scale_std", "acceleration_scale_deviation", "acceleration_scale_std")
-    @classmethod
-    def _no_percentage(cls, value: float | None) -> float | None:
-        """The ratio. Raises ValueError for one that no sensor is beyond, such as 30 where 30 % is meant."""
-        if value is not None and value >= 1:
-            raise ValueError("must be below 1, or it limits nothing: it is a ratio, and 3 % is 0.03")
-        return value
