@@ -5,6 +5,8 @@ either. So a file is read where it can be ended from outside, and only what prov
 (schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, the turner's
 states, events, and the tables of readings from elsewhere.
 What is of another shape ends in one line on stderr and exit status 1, an output that takes no more in NO_ROOM.
+Rows are of plain numbers; whether of those that the texts describe is for whoever reads them to judge, for here only
+what this takes is imported.
 """
 
 import io
@@ -19,22 +21,12 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.layout import (
-    EVENTS_DTYPE,
-    SCHEMA,
-    SCHEMA_ELSEWHERE,
-    TABLES,
-    TEXTS,
-    recorded_sensor,
-    states_dtype,
-    states_name,
-    table_dtype,
-)
+from rig.data.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, states_name
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
 MAX_SENSORS = 64
-MAX_COLUMNS = 32
+MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
 MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
@@ -59,25 +51,18 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
         described = {name: _attributes(dataset) for name, dataset in samples.items()}
-        sensors = {name: recorded_sensor(schema, name, attributes) for name, attributes in described.items()}
-        states = states_name(schema)
-        rows = {
-            **{f"samples/{name}": (each, sensors[name].sample_dtype) for name, each in samples.items()},
-            states: (_member(file, states, h5py.Dataset), states_dtype(schema, texts)),
-            "events": (_member(file, "events", h5py.Dataset), EVENTS_DTYPE),
-        }
-        for name in TABLES if elsewhere else ():
-            table = _member(file, name, h5py.Dataset)
-            rows[name] = table, table_dtype((table.dtype.names or ())[:MAX_COLUMNS])
-        for name, (dataset, dtype) in rows.items():
-            _check(dataset, name, dtype)
-        _refuse_endless(path, sum(int(dataset.nbytes) for dataset, _ in rows.values()))
+        named = (states_name(schema), "events", *(TABLES if elsewhere else ()))
+        rows = {f"samples/{name}": each for name, each in samples.items()}
+        rows |= {name: _member(file, name, h5py.Dataset) for name in named}
+        for name, dataset in rows.items():
+            _check(dataset, name)
+        _refuse_endless(path, sum(int(dataset.nbytes) for dataset in rows.values()))
         yield {
             "schema": schema,
             "texts": texts,
             "described": described,
         }
-        for dataset, _ in rows.values():
+        for dataset in rows.values():
             yield dataset[:]
 
 
@@ -115,10 +100,11 @@ def _member(group: Any, name: str, kind: type) -> Any:
     return member
 
 
-def _check(dataset: Any, name: str, dtype: np.dtype[Any]) -> None:
-    """Raises ValueError unless it holds rows of that type, for which there is room in the file."""
-    if dataset.dtype != dtype or dataset.ndim != 1:
-        raise ValueError(f"{name} holds {dataset.dtype} in {dataset.ndim} dimensions, not rows of {dtype}")
+def _check(dataset: Any, name: str) -> None:
+    """Raises ValueError unless it holds rows of numbers, for which there is room in the file."""
+    columns = [dataset.dtype[each] for each in dataset.dtype.names or ()] or [dataset.dtype]
+    if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(each.base.kind not in "iuf" for each in columns):
+        raise ValueError(f"{name} holds {dataset.dtype!s:.200} in {dataset.ndim} dimensions, not rows of numbers")
     if dataset.external or dataset.is_virtual:
         raise ValueError(f"the rows of {name} lie somewhere else")
     stored = _stored_rows(dataset)

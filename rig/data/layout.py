@@ -24,21 +24,11 @@ from numpy.typing import NDArray
 from rig.config.written_file import PART
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recorded_turner import turner_of
+from rig.data.schema import EVENTS_DTYPE, SCHEMA, states_name
 from rig.data.sensor_of_run_2 import described_in_channels
 from rig.motion.state import ARM_STATE_DTYPE
 
-SCHEMA = "rig.run/4"
-SCHEMA_ELSEWHERE = "rig.files/1"
-TABLES = ("readings", "motion")
-TEXTS = {
-    SCHEMA: ("config", "settings", "provenance", "turner"),
-    SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
-    "rig.run/3": ("config", "settings", "provenance"),
-    "rig.run/2": ("config", "settings", "provenance"),
-    "rig.run/1": ("config", "provenance"),
-}
 IN_CHANNELS = (SCHEMA, "rig.run/3")
-EVENTS_DTYPE = np.dtype("u1")
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
 
@@ -69,11 +59,6 @@ def empty(schema: str, texts: Mapping[str, str], sensors: Mapping[str, RecordedS
     return Contents(schema, texts, described, samples, states, np.empty(0, EVENTS_DTYPE))
 
 
-def states_name(schema: str) -> str:
-    """The name of the dataset of states in a file of that schema."""
-    return "states" if schema == SCHEMA else "arm"
-
-
 def states_dtype(schema: str, texts: Mapping[str, str]) -> np.dtype[Any]:
     """The type of the rows of states in a file of that schema with these texts. Raises ValueError."""
     return turner_of(texts["turner"]).dtype if schema == SCHEMA else ARM_STATE_DTYPE
@@ -87,6 +72,18 @@ def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> Re
     if not isinstance(channels, str):
         raise ValueError(f"the channels of {name} are not a text")
     return sensor_of({**attributes, "channels": json.loads(channels)})
+
+
+def check_rows(contents: Contents) -> None:
+    """Raises ValueError where rows are not of the type that the texts and descriptions beside them say."""
+    schema, states = contents.schema, states_name(contents.schema)
+    sensors = {name: recorded_sensor(schema, name, each) for name, each in contents.described.items()}
+    rows = {f"samples/{name}": (contents.samples[name], sensor.sample_dtype) for name, sensor in sensors.items()}
+    rows |= {states: (contents.states, states_dtype(schema, contents.texts)), "events": (contents.events, EVENTS_DTYPE)}
+    rows |= {name: (table, table_dtype(table.dtype.names or ())) for name, table in contents.tables.items()}
+    for name, (found, meant) in rows.items():
+        if found.dtype != meant:
+            raise ValueError(f"{name} holds {found.dtype!s:.200}, not rows of {meant}")
 
 
 def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:

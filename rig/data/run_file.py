@@ -26,16 +26,12 @@ from rig.data.checked import checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
 from rig.data.layout import (
-    EVENTS_DTYPE,
-    SCHEMA,
-    SCHEMA_ELSEWHERE,
-    TABLES,
     Contents,
     append,
+    check_rows,
     empty,
     lay_out,
     recorded_sensor,
-    states_name,
     table_of,
 )
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
@@ -43,6 +39,7 @@ from rig.data.provenance import Provenance
 from rig.data.quantity import RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner, check_joints, turner_of
+from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.data.silence import Silence
@@ -293,7 +290,12 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         samples = {name: np.load(out) for name in header["described"]}
         states, events = np.load(out), np.load(out)
         tables = {name: np.load(out) for name in (TABLES if header["schema"] == SCHEMA_ELSEWHERE else ())}
-        return Contents(**header, samples=samples, states=states, events=events, tables=tables)
+    contents = Contents(**header, samples=samples, states=states, events=events, tables=tables)
+    try:
+        check_rows(contents)
+    except (ValueError, RecursionError) as error:
+        raise _not_a_run_file(path, str(error)) from None
+    return contents
 
 
 def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:

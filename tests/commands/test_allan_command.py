@@ -9,8 +9,9 @@ import pytest
 
 from rig.cli import main
 from rig.data.events import to_line
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
+from rig.data.layout import Contents, lay_out
 from rig.data.run_file import RunData
+from rig.data.schema import EVENTS_DTYPE, SCHEMA
 from support.commands import rig_here
 from support.real import unpacked
 from support.synthetic_run import UR, Setup, synthetic_run

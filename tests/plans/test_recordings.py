@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from rig.config.sensor_catalogue import has_own_port
-from rig.data.layout import TEXTS
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
+from rig.data.schema import TEXTS
 from rig.data.settings import SCHEMAS
 from rig.plans.recorded import RecordedRun, judged, open_run
 from rig.plans.registry import installed

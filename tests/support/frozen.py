@@ -12,8 +12,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from rig.data.layout import states_name
 from rig.data.run_folder import CONFIG, RESULT, recordings
+from rig.data.schema import states_name
 from support.paths import FIXTURES, ROOT
 
 RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"

@@ -30,11 +30,13 @@ class Part:
     noise_m_s2: float = 0.01
     walk_rad_s_sqrt_s: float = 5e-6
     g_sensitivity_deg_s: float = 0.03
+    nonlinearity: float = 1e-4  # of the rate at `FAST_RAD_S`, even and odd
     clock_ppm: float = 20.0
     range_rad_s: float | None = None
 
 
 LSM9DS1 = Part()
+FAST_RAD_S = np.radians(150)  # as fast as a hand turns
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ def handle(
     walk = part.walk_rad_s_sqrt_s / np.sqrt(part.rate_hz) * np.cumsum(rng.normal(size=(len(time_s), 3)), axis=0)
     sensitivity = np.radians(part.g_sensitivity_deg_s) / 9.81 * rng.normal(size=(3, 3))
     rates = felt.rate_rad_s @ matrix.T + felt.specific_force_m_s2 @ sensitivity.T + bias + walk + felt.gyro_bias_rad_s
+    rates += bent(felt.rate_rad_s, part.nonlinearity, seed)
     rates += part.noise_rad_s * rng.normal(size=rates.shape)
     if part.range_rad_s is not None:
         rates = np.clip(rates, -part.range_rad_s, part.range_rad_s)
@@ -75,6 +78,13 @@ def handle(
     stamped = time_s * (1 + 1e-6 * part.clock_ppm * rng.uniform(-1, 1))
     kept = ~felt.lost
     return Recorded(stamped[kept], rates[kept], force[kept], matrix, bias + walk[-1] + felt.gyro_bias_rad_s[-1])
+
+
+def bent(rates: Array, nonlinearity: float, seed: int) -> Array:
+    """(n, 3) deviations from a straight line: each axis has an even and an odd one, of sizes of its own."""
+    even, odd = nonlinearity * np.random.default_rng(seed + 2_000_000).normal(size=(2, 3))
+    deviations: Array = rates * (even * rates / FAST_RAD_S + odd * (rates / FAST_RAD_S) ** 2)
+    return deviations
 
 
 def write(path: Path, recorded: Recorded, *, level: bool = True) -> Path:

@@ -9,8 +9,9 @@ import numpy as np
 
 from rig.data.channel import Channel
 from rig.data.events import to_line
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
+from rig.data.layout import Contents, lay_out
 from rig.data.recorded_sensor import RecordedSensor
+from rig.data.schema import EVENTS_DTYPE, SCHEMA
 from rig.observation.observed_run import observe_run
 from rig.observation.windows import dwelt
 from rig.plans.recorded import open_run
