@@ -30,13 +30,13 @@ class Part:
     noise_m_s2: float = 0.01
     walk_rad_s_sqrt_s: float = 5e-6
     g_sensitivity_deg_s: float = 0.03
-    nonlinearity: float = 1e-4  # of the rate at `FAST_RAD_S`, even and odd
+    nonlinearity: float = 7e-5  # of the rate at `FAST_RAD_S`, even, and odd: of a move 1e-4
     clock_ppm: float = 20.0
     range_rad_s: float | None = None
 
 
 LSM9DS1 = Part()
-FAST_RAD_S = np.radians(150)  # as fast as a hand turns
+FAST_RAD_S = np.radians(150)  # as fast as a hand turns, half of the way
 
 
 @dataclass(frozen=True)
