@@ -75,6 +75,7 @@ FAULTS: dict[str, tuple[Act, int, str]] = {
 }
 MOMENTS = {"in the first turn": (1, 0.8), "in the second mounting": (2, 0.8), "as a turn begins": (2, 0.0),
            "braking": (3, 2.0), "in the last mounting": (3, 0.5)}  # fmt: skip
+UNANSWERED = ("servo_link_lost", "servo_replies_damaged")  # of an instruction: the servo does not hear
 KNOWN_S = {"shaft held fast": 2.0}  # an overload is known when it has lasted
 
 
@@ -90,7 +91,8 @@ def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on
     config, out = configured(tmp_path), tmp_path / "run"
     seen = carried_out("run", config, "--out", out, config=config, when=TURNS, times=times, act=act, after_s=after_s)
     said = "".join(seen.said)
-    assert seen.process.returncode == status and name in said, said
+    names = {name, "servo_does_not_hear"} if moment == "as a turn begins" and name in UNANSWERED else {name}
+    assert seen.process.returncode == status and any(each in said for each in names), said
     assert seen.at_rest_after_s < 1.5 + KNOWN_S.get(what, 0.0), seen.at_rest_after_s
     assert seen.stood
     last = read_run(sorted(out.glob("run*.h5"), key=lambda path: path.stat().st_mtime)[-1])

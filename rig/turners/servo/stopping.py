@@ -2,7 +2,8 @@
 
 1. Goal Position becomes Present Position, with a short profile: the shaft brakes and is held. Torque stays on: without
    it an unbalanced board would fall, and no gear of these servos locks.
-2. Where that is not acknowledged, nobody speaks to the servo any more, until its own watchdog has stopped it.
+2. Where that is not acknowledged, a last word sets its watchdog to the shortest time there is, and nobody speaks to
+   the servo any more: so it stops at once if it hears, and by the time it was given before if not.
 3. A *state* newer than the stop tells whether the shaft stands.
 
 None of this is a safety function. Only the switch of the servo's supply is sure.
@@ -11,6 +12,7 @@ None of this is a safety function. Only the switch of the servo's supply is sure
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from rig.turners.servo.bus import Bus, BusError
 from rig.turners.servo.instructions import brake
@@ -47,7 +49,9 @@ class Stop:
                     brake(bus)
                 told.set()
             except BusError:
-                pass  # the watchdog has it
+                with suppress(BusError):
+                    bus.write_unheard(WATCHDOG, 1)
+                self._link.keep_quiet(2 * self._watchdog_s)
 
         self._link.stop(tell)
         if not told.wait(TOLD_S):
