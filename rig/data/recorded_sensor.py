@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from rig.config.sensor_sections import MountingSection, mounting_matrix
 from rig.data.channel import MAX_CHANNELS, Channel, sample_dtype
 from rig.data.checked import Finite, Positive, checked
 from rig.data.installed_kinds import measured
@@ -79,11 +78,6 @@ class RecordedSensor:
         document = {name: value for name, value in asdict(self).items() if value is not None}
         channels = [{name: value for name, value in each.items() if value is not None} for each in document["channels"]]
         return {**document, "channels": json.dumps(channels)}
-
-
-def recorded_mounting(section: MountingSection) -> Mounting:
-    """The mounting that a configuration states, as it is recorded."""
-    return tuple(tuple(row) for row in mounting_matrix(section).tolist())
 
 
 def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:

@@ -1,7 +1,7 @@
 """What turned the sensors of a recording, as its run file describes it, and the rows its states are recorded in."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Annotated, Any
@@ -10,10 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from rig.data.checked import checked
-from rig.data.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
-from rig.data.settings import RunSettings
 from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
-from rig.motion.state import Joints, Made, StateField, state_dtype
+from rig.motion.state import Made, StateField, state_dtype
 
 MAX_FIELDS = 32
 ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
@@ -74,15 +72,3 @@ def described(document: Any) -> RecordedTurner:
 def turner_of(text: str) -> RecordedTurner:
     """What `RecordedTurner.to_json` wrote. Raises ValueError naming what is wrong."""
     return described(json.loads(text))
-
-
-def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[Recorded]) -> None:
-    """Raises ValueError where a pose of a recording has other joints than its turner."""
-    poses: list[Joints] = [settings.home_q_rad, *(each.q_rad for each in settings.planned_dwells)]
-    for event in (recorded.event for recorded in events):
-        if isinstance(event, SweepStarted | SweepFinished):
-            poses += [event.sweep.start_q_rad, event.sweep.end_q_rad]
-        if isinstance(event, DwellStarted | DwellFinished):
-            poses.append(event.dwell.q_rad)
-    if any(len(pose) != len(turner.joints) for pose in poses):
-        raise ValueError(f"its turner has {len(turner.joints)} joints, and one of its poses has another number")

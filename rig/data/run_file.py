@@ -39,10 +39,11 @@ from rig.data.layout import (
     table_of,
 )
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
+from rig.data.poses import check_joints
 from rig.data.provenance import Provenance
 from rig.data.quantity import RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.recorded_turner import RecordedTurner, check_joints, turner_of
+from rig.data.recorded_turner import RecordedTurner, turner_of
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.data.silence import Silence

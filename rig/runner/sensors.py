@@ -14,7 +14,8 @@ from rig.config.models import SensorsConfig
 from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_mounting import recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.source import OnSamples
 
 

@@ -12,7 +12,8 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_mounting import recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775

@@ -21,7 +21,8 @@ from rig.config.lines_section import (
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_mounting import recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError

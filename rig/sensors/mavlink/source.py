@@ -14,7 +14,8 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_mounting import recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals
