@@ -35,8 +35,8 @@ all-extras: $(VENV)/all.installed
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
-# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011.
-NUMERIC := -m "not slow and not proof" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
+# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011. Nothing waits there.
+NUMERIC := -n 2 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
   tests/history/test_store.py
 
 system:
@@ -49,15 +49,14 @@ check: system $(VENV)/dev.installed
 test: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint whole
 
-# What a test file is rewritten to for its assertions is made once here, not by each of the three.
-COLLECTED := $(BIN)/pytest --collect-only --quiet > build/collected.txt
+# What a test file is rewritten to for its assertions is kept. The first time it is made here, not by each of the three.
+build/collected.txt: | $(VENV)/dev.installed
+	mkdir -p build && $(BIN)/pytest --collect-only --quiet > $@
 
-fast: $(VENV)/dev.installed
-	mkdir -p build && $(COLLECTED)
+fast: build/collected.txt $(VENV)/dev.installed
 	$(PYTEST) -m "not slow"
 
-whole: $(VENV)/dev.installed
-	mkdir -p build && $(COLLECTED)
+whole: build/collected.txt $(VENV)/dev.installed
 	rm -rf build/coverage
 	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
 	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
@@ -116,7 +115,7 @@ $(TOOLS)/bin/uv $(TOOLS)/bin/cyclonedx-py: | $(BIN)/python
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check $(TOOL)
 
 clean:
-	rm -rf $(VENV) build/python build/tools build/wheels *.egg-info
+	rm -rf $(VENV) build/python build/tools build/wheels build/collected.txt *.egg-info
 
 $(BIN)/python:
 	requirements/environment.sh $(VENV)

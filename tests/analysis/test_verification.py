@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from firmware_host.installation import install_command
+from rig.analysis.calibration import SensorResult
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
@@ -18,7 +20,7 @@ from rig.data.events import SweepStarted
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.observed_run import observe_runs
+from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.windows import rested
 from rig.report.figures import draw_verifications
 from rig.report.kinds.verification import verification_entry, verification_lines, verification_table
@@ -34,14 +36,38 @@ KNOWN = Reference("reference", np.array(REFERENCE.scale), np.array(REFERENCE.bia
 QUIET = Setup(noise_rad_s=0.002)
 TURN_RATE = np.pi / 3
 
-MADE = recording(QUIET)  # the calibration's movement
-CALIBRATED = solve_runs([MADE])["gyro"]
-CALIBRATION = CALIBRATED.solution
-REPEATED = recording(
-    replace(QUIET, seed=2, boot_s=33.0), stored=Stored(CALIBRATION.scale, CALIBRATION.bias_rad_s), lag_s=0.004
-)
-SEEN_BEFORE, SEEN = observe_runs([MADE]), observe_runs([REPEATED])
-FOUND = verify("gyro", KNOWN, SEEN, SEEN_BEFORE, CALIBRATED)
+
+@cache
+def movement() -> RunData:
+    """The calibration's movement."""
+    return recording(QUIET)
+
+
+@cache
+def calibrated_gyro() -> SensorResult:
+    return solve_runs([movement()])["gyro"]
+
+
+@cache
+def repetition() -> RunData:
+    solution = calibrated_gyro().solution
+    setup = replace(QUIET, seed=2, boot_s=33.0)
+    return recording(setup, stored=Stored(solution.scale, solution.bias_rad_s), lag_s=0.004)
+
+
+@cache
+def seen_before() -> tuple[ObservedRun, ...]:
+    return observe_runs([movement()])
+
+
+@cache
+def seen_after() -> tuple[ObservedRun, ...]:
+    return observe_runs([repetition()])
+
+
+@cache
+def verified() -> Verification:
+    return verify("gyro", KNOWN, seen_after(), seen_before(), calibrated_gyro())
 
 
 def test_the_whole_matrix_leaves_no_error_where_the_axes_are_not_at_right_angles() -> None:
@@ -94,15 +120,15 @@ def test_how_the_two_sensors_sit_to_each_other_is_found_within_its_uncertainty()
 
 def test_the_rotation_is_told_by_the_calibration_where_there_is_one() -> None:
     """Its revolutions, corrected, fit the reference's to within their noise; nothing is taken from the repetition."""
-    assert np.all(np.abs(departure(FOUND.rotation.matrix)) < 4 * FOUND.rotation.std_rad)
-    assert np.abs(FOUND.rotation.residuals_rad_s).max() < 4e-4
-    assert not np.array_equal(FOUND.rotation.matrix, verify("gyro", KNOWN, SEEN).rotation.matrix)
+    assert np.all(np.abs(departure(verified().rotation.matrix)) < 4 * verified().rotation.std_rad)
+    assert np.abs(verified().rotation.residuals_rad_s).max() < 4e-4
+    assert not np.array_equal(verified().rotation.matrix, verify("gyro", KNOWN, seen_after()).rotation.matrix)
 
 
 def test_a_verification_without_its_calibration_has_no_before() -> None:
-    alone = verify("gyro", KNOWN, SEEN)
+    alone = verify("gyro", KNOWN, seen_after())
     assert alone.before is None
-    np.testing.assert_allclose(alone.after.movement.rms_rad_s, FOUND.after.movement.rms_rad_s, rtol=1e-3)
+    np.testing.assert_allclose(alone.after.movement.rms_rad_s, verified().after.movement.rms_rad_s, rtol=1e-3)
 
 
 def by_hand(scale: tuple[float, ...], bias_rad_s: tuple[float, ...]) -> Array:
@@ -151,7 +177,7 @@ def test_the_published_errors_are_mean_squares_in_degrees_brought_to_radians_onc
 
 
 def test_the_error_after_is_both_sensors_noise() -> None:
-    after = FOUND.after
+    after = verified().after
     assert after.noise_rad_s is not None
     spline = 0.9  # a spline through white noise has about this much of it between the points
     both = np.hypot(np.array(SCALE) * QUIET.noise_rad_s, spline * REFERENCE.noise_rad_s)
@@ -166,14 +192,14 @@ def test_the_error_after_is_both_sensors_noise() -> None:
 
 def test_over_whole_turns_the_noise_averages_out() -> None:
     """What is left is the calibration's own error."""
-    uncertain = np.sqrt(np.diag(CALIBRATION.covariance))
-    for turn in FOUND.after.revolutions:
-        calibrated = uncertain[:3] * TURN_RATE + uncertain[3:] * CALIBRATION.scale
+    uncertain = np.sqrt(np.diag(calibrated_gyro().solution.covariance))
+    for turn in verified().after.revolutions:
+        calibrated = uncertain[:3] * TURN_RATE + uncertain[3:] * calibrated_gyro().solution.scale
         assert np.all(np.abs(turn.error_rad_s) < 4 * np.hypot(turn.std_rad_s, calibrated))
         assert turn.std_rad_s.max() < 1e-4
-    assert FOUND.before is not None
-    assert [(turn.joint_name, turn.direction) for turn in FOUND.before.revolutions] == [
-        (turn.joint_name, turn.direction) for turn in FOUND.after.revolutions
+    assert verified().before is not None
+    assert [(turn.joint_name, turn.direction) for turn in verified().before.revolutions] == [
+        (turn.joint_name, turn.direction) for turn in verified().after.revolutions
     ]
 
 
@@ -189,11 +215,11 @@ def test_a_wrong_calibration_is_seen_axis_by_axis() -> None:
 
 
 def test_the_filters_delay_is_told_and_taken_out() -> None:
-    (delay_s,), (std_s,) = FOUND.after.delay_s, FOUND.after.delay_std_s
+    (delay_s,), (std_s,) = verified().after.delay_s, verified().after.delay_std_s
     assert delay_s == pytest.approx(0.004, abs=4 * std_s)
     assert std_s < 1e-4
-    assert FOUND.before is not None
-    assert abs(FOUND.before.delay_s[0]) < 4 * FOUND.before.delay_std_s[0]
+    assert verified().before is not None
+    assert abs(verified().before.delay_s[0]) < 4 * verified().before.delay_std_s[0]
 
 
 def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
@@ -211,19 +237,19 @@ def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
 def test_the_recordings_of_a_resumed_run_count_together() -> None:
     def part(sweeps: range) -> RunData:
         kept, current = [], 0
-        for recorded in MADE.events:  # a rest follows its sweep and carries no number
+        for recorded in movement().events:  # a rest follows its sweep and carries no number
             current = recorded.event.sweep.index if isinstance(recorded.event, SweepStarted) else current
             kept += [recorded] if current in sweeps else []
-        return replace(MADE, events=tuple(kept))
+        return replace(movement(), events=tuple(kept))
 
-    assert FOUND.before is not None
+    assert verified().before is not None
     parts = observe_runs([part(range(2)), part(range(0)), part(range(2, 6))])
-    resumed = verify("gyro", KNOWN, SEEN, parts, CALIBRATED)
+    resumed = verify("gyro", KNOWN, seen_after(), parts, calibrated_gyro())
     assert resumed.before is not None
     assert len(resumed.before.delay_s) == 2
-    assert resumed.before.movement.samples == FOUND.before.movement.samples
-    np.testing.assert_allclose(resumed.before.movement.rms_rad_s, FOUND.before.movement.rms_rad_s)
-    np.testing.assert_allclose(resumed.rotation.matrix, FOUND.rotation.matrix, atol=1e-6)
+    assert resumed.before.movement.samples == verified().before.movement.samples
+    np.testing.assert_allclose(resumed.before.movement.rms_rad_s, verified().before.movement.rms_rad_s)
+    np.testing.assert_allclose(resumed.rotation.matrix, verified().rotation.matrix, atol=1e-6)
 
 
 def reference_asleep_in_rests(run: RunData) -> RunData:
@@ -246,7 +272,7 @@ def one_wrist(run: RunData) -> RunData:
 
 
 REFUSALS: dict[str, tuple[str, Callable[[RunData], RunData]]] = {
-    "raw readings": ("wrong_mode", lambda run: MADE),
+    "raw readings": ("wrong_mode", lambda run: movement()),
     "a calibrated reference": (
         "wrong_mode",
         lambda run: replace(
@@ -265,17 +291,17 @@ REFUSALS: dict[str, tuple[str, Callable[[RunData], RunData]]] = {
 def test_recordings_that_cannot_be_compared_are_refused_by_name(name: str) -> None:
     error, spoil = REFUSALS[name]
     with pytest.raises(Fault, match=error):
-        verify("gyro", KNOWN, observe_runs([spoil(REPEATED)]))
+        verify("gyro", KNOWN, observe_runs([spoil(repetition())]))
 
 
 def test_one_wrist_does_not_tell_how_the_sensors_sit() -> None:
     with pytest.raises(Fault, match="rank_deficient"):
-        verify("gyro", KNOWN, SEEN, observe_runs([one_wrist(MADE)]), TRUTH)
+        verify("gyro", KNOWN, seen_after(), observe_runs([one_wrist(movement())]), TRUTH)
 
 
 def test_the_calibration_s_recording_must_be_raw() -> None:
     with pytest.raises(Fault, match="wrong_mode"):
-        verify("gyro", KNOWN, SEEN, SEEN, CALIBRATED)
+        verify("gyro", KNOWN, seen_after(), seen_after(), calibrated_gyro())
 
 
 def limits(rms: float | None, mean: float | None) -> Limits:
@@ -294,13 +320,13 @@ def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
     def judged(found: Verification | None, of: Limits) -> str:
         return verdict(verification_checks("gyro", found, of))
 
-    after = FOUND.after
+    after = verified().after
     rms = float(after.movement.rms_rad_s.max())
     mean = max(float(np.abs(turn.error_rad_s).max()) for turn in after.revolutions)
-    assert judged(FOUND, limits(1.01 * rms, 1.01 * mean)) == "pass"
-    assert judged(FOUND, limits(0.99 * rms, 1.01 * mean)) == "fail"
-    assert judged(FOUND, limits(1.01 * rms, 0.99 * mean)) == "fail"
-    assert judged(FOUND, limits(None, 1.0)) == "fail"
+    assert judged(verified(), limits(1.01 * rms, 1.01 * mean)) == "pass"
+    assert judged(verified(), limits(0.99 * rms, 1.01 * mean)) == "fail"
+    assert judged(verified(), limits(1.01 * rms, 0.99 * mean)) == "fail"
+    assert judged(verified(), limits(None, 1.0)) == "fail"
     assert judged(None, limits(1.0, 1.0)) == "fail"
 
 
@@ -312,14 +338,14 @@ def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
 def test_a_reference_that_misses_the_arm_is_blamed_itself(scale: float, bias_rad_s: float, error_rad_s: float) -> None:
     """A turntable's values mistyped, or a reference that has aged: the sensor differs from it, but not from the arm."""
     reference = Reference("reference", KNOWN.scale * scale, KNOWN.bias_rad_s + np.array([bias_rad_s, 0.0, 0.0]))
-    found = verify("gyro", reference, SEEN, SEEN_BEFORE, CALIBRATED)
+    found = verify("gyro", reference, seen_after(), seen_before(), calibrated_gyro())
     assert found.reference_error_rad_s == pytest.approx(error_rad_s, abs=5e-4)
     checks = {check.name: check.passed for check in verification_checks("gyro", found, limits(1.0, 0.01))}
     assert checks["gyro.verification_reference"] == (error_rad_s < 0.01)
 
 
 def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
-    entry = verification_entry(FOUND)
+    entry = verification_entry(verified())
     assert entry.before is not None
     for seen in (entry.before, entry.after):
         np.testing.assert_allclose(np.square(seen.movement.rms_rad_s), seen.movement.mse_rad2_s2)
@@ -328,18 +354,18 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     shown = console.export_text()
     assert f"{entry.before.movement.rms_rad_s[0]:.4f}" in shown
     assert "lags the reference by 4.0" in shown
-    alone = verification_entry(replace(FOUND, before=None, after=replace(FOUND.after, noise_rad_s=None)))
+    alone = verification_entry(replace(verified(), before=None, after=replace(verified().after, noise_rad_s=None)))
     console.print(verification_table("gyro", alone))
     assert "–" in console.export_text()
 
 
 def test_plots_of_before_and_after_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written = Plotted(("verification_gyro_before", "verification_gyro_after"))
-    assert draw_verifications([FOUND], tmp_path) == (written,)
+    assert draw_verifications([verified()], tmp_path) == (written,)
     for when in ("before", "after"):
         name = f"verification_gyro_{when}"
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (tmp_path / f"{name}.svg").stat().st_size < 500_000
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    (told,) = draw_verifications([FOUND], tmp_path)
+    (told,) = draw_verifications([verified()], tmp_path)
     assert install_command("study") in str(line(told))

@@ -55,6 +55,7 @@ def asks(driver: Chrome, question: str) -> None:
     until(lambda: question in text(driver, "text"), f"the question {question!r}", BUSY_S)
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(2400)
 def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
     driver: Chrome, tmp_path: Path, thorough: bool

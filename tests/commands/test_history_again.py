@@ -99,6 +99,7 @@ def test_moved_missing_and_damaged_are_named_counted_and_gone_on_with(history: H
     assert "2 of 4 are solved" in done.stderr and "4 results: 4 solved" in done.stdout and done.returncode == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_workers_of_a_cluster_give_the_same_numbers_as_one_by_one(history: History, tmp_path: Path) -> None:
     for i in range(3):

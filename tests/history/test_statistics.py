@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy import stats
-from statsmodels.stats.meta_analysis import combine_effects
 
 from rig.estimation.arrays import Array
 from rig.history.series import Change
@@ -29,6 +28,8 @@ def line(days: Array) -> Array:
 
 
 def test_the_mean_and_the_spread_are_those_of_statsmodels() -> None:
+    from statsmodels.stats.meta_analysis import combine_effects  # with pandas
+
     std = random(1).uniform(0.5, 1.5, 12)
     values = 3 + random(2).normal(size=12) * np.hypot(std, 2.0)
     found, other = fit(ones(12), values, std), combine_effects(values, std**2, method_re="dl", use_t=True)

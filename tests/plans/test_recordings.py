@@ -48,6 +48,8 @@ def named(folder: Path) -> str:
     return "/".join(folder.parts[-2:])
 
 
+@pytest.mark.slow
+@pytest.mark.kernels
 @pytest.mark.parametrize("folder", frozen(), ids=named)
 def test_a_frozen_recording_solves_to_its_numbers(folder: Path) -> None:
     found = document_of(judged(opened(folder)))
@@ -59,11 +61,13 @@ def test_every_schema_that_is_read_has_a_frozen_recording() -> None:
     assert {*TEXTS, *SCHEMAS} - kept == set(), FREEZE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_a_frozen_recording(kind: str) -> None:
     assert any(KINDS[kind](opened(folder)) for folder in frozen()), FREEZE
 
 
+@pytest.mark.slow
 def test_every_procedure_has_a_frozen_recording() -> None:
     kept = {run.settings.procedure for folder in frozen() for run in (*opened(folder).raw, *opened(folder).corrected)}
     assert installed().keys() - kept == set(), FREEZE

@@ -49,6 +49,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     yield out
 
 
+@pytest.mark.thorough
 def test_resuming_by_another_script_is_refused(interrupted: Path) -> None:
     kept = interrupted / "script.py"
     text = kept.read_text(encoding="utf-8")

@@ -86,6 +86,7 @@ def test_three_stages_tell_the_scale_of_one_run(tmp_path: Path) -> None:
     assert within >= WITHIN
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.timeout(5400)

@@ -4,7 +4,7 @@ import pytest
 
 from firmware_host.emulator.bus import Peripheral
 from support.emulated_session import Session
-from support.svd import PERIPHERALS, number
+from support.svd import number, peripherals
 
 MODELLED = {peripheral.name: peripheral for peripheral in Session().board.peripherals}
 MAKERS_NAMES = {"SysTick": "STK"}
@@ -23,9 +23,9 @@ RESET_VALUES = {
 
 def described(peripheral: Peripheral) -> dict[int, tuple[str, int]]:
     """Offset → name and value after reset, as the maker describes them."""
-    element = PERIPHERALS[MAKERS_NAMES.get(peripheral.name, peripheral.name)]
+    element = peripherals()[MAKERS_NAMES.get(peripheral.name, peripheral.name)]
     assert peripheral.base == number(element, "baseAddress")
-    element = PERIPHERALS[element.get("derivedFrom", element.findtext("name"))]
+    element = peripherals()[element.get("derivedFrom", element.findtext("name"))]
     return {
         number(r, "addressOffset"): (r.findtext("name", ""), int(r.findtext("resetValue", "0"), 0))
         for r in reversed(list(element.iter("register")))  # of one place with two names the first counts

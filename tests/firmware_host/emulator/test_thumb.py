@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from functools import cache
 
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import instructions, is_floating_point, word_accesses
@@ -12,6 +13,7 @@ FLASH = 0x08000000
 SEVERAL_WORDS = re.compile(r"(ldrd|strd|ldm|stm|vldr|vstr|vldm|vstm)")
 
 
+@cache
 def disassembly() -> dict[int, tuple[str, str]]:
     """Address → (mnemonic, operands) of every instruction of the image."""
     listing = subprocess.run(["arm-none-eabi-objdump", "-dz", ELF], check=True, capture_output=True, text=True).stdout
@@ -19,36 +21,42 @@ def disassembly() -> dict[int, tuple[str, str]]:
     return {int(address, 16): (name, operands) for address, name, operands in lines if not name.startswith(".")}
 
 
-EXPECTED = disassembly()
-SYMBOLS = Symbols(ELF.read_bytes())
-CODE = [(start, (IMAGE / "rig_l432.bin").read_bytes()[start - FLASH : end - FLASH]) for start, end in SYMBOLS.code()]
+@cache
+def symbols() -> Symbols:
+    return Symbols(ELF.read_bytes())
+
+
+def stretches() -> list[tuple[int, bytes]]:
+    """Where each stretch of instructions starts, and its bytes."""
+    image = (IMAGE / "rig_l432.bin").read_bytes()
+    return [(start, image[start - FLASH : end - FLASH]) for start, end in symbols().code()]
 
 
 def test_instructions_are_told_from_data_and_from_each_other() -> None:
     found = {}
-    for start, code in CODE:
+    for start, code in stretches():
         address = start
         for instruction in instructions(code):
             found[address] = instruction
             address += 4 if instruction > 0xFFFF else 2
-    assert set(found) == set(EXPECTED)
+    assert set(found) == set(disassembly())
     floating = {address for address, instruction in found.items() if is_floating_point(instruction)}
-    assert floating == {address for address, (name, _) in EXPECTED.items() if name.startswith("v")}
+    assert floating == {address for address, (name, _) in disassembly().items() if name.startswith("v")}
 
 
 def test_accesses_of_several_words_are_found_with_their_base_register() -> None:
     registers = [f"r{n}" for n in range(10)] + ["sl", "fp", "ip", "sp", "lr", "pc"]
     expected = {
         address: re.findall(r"\[?\b(r\d|sl|fp|ip|sp|lr|pc)\b", operands)
-        for address, (name, operands) in EXPECTED.items()
+        for address, (name, operands) in disassembly().items()
         if SEVERAL_WORDS.match(name)
     }
     bases = {
-        address: names[0] if EXPECTED[address][0].startswith(("ldm", "stm")) else names[-1]
+        address: names[0] if disassembly()[address][0].startswith(("ldm", "stm")) else names[-1]
         for address, names in expected.items()
     }
     aligned_by_the_core = ("sp", "pc")
-    found = {address: registers[base] for start, code in CODE for address, base in word_accesses(code, start)}
+    found = {address: registers[base] for start, code in stretches() for address, base in word_accesses(code, start)}
     assert len(found) > 10
     assert found == {address: base for address, base in bases.items() if base not in aligned_by_the_core}
 
@@ -57,6 +65,6 @@ def test_addresses_have_the_names_of_their_functions() -> None:
     listing = subprocess.run(["arm-none-eabi-nm", ELF], check=True, capture_output=True, text=True).stdout
     entry = {name: int(address, 16) for address, name in re.findall(r"^([0-9a-f]+) T (\w+)$", listing, re.MULTILINE)}
     for name in ("reset_handler", "main", "board_run", "exti9_5_handler"):
-        assert SYMBOLS.function(entry[name]) == SYMBOLS.function(entry[name] + 3) == name
-    assert SYMBOLS.where(entry["board_run"] + 1) == f"0x{entry['board_run']:08X} in function board_run"
-    assert SYMBOLS.where(0x60000000) == "0x60000000 outside every function of the image"
+        assert symbols().function(entry[name]) == symbols().function(entry[name] + 3) == name
+    assert symbols().where(entry["board_run"] + 1) == f"0x{entry['board_run']:08X} in function board_run"
+    assert symbols().where(0x60000000) == "0x60000000 outside every function of the image"

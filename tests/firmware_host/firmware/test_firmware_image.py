@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from support.paths import FIRMWARE
-from support.svd import INTERRUPTS, PERIPHERALS, number, register
+from support.svd import interrupts, number, peripherals, register
 
 IMAGE = FIRMWARE / "image"
 PORT = FIRMWARE / "port_l432"
@@ -82,7 +82,7 @@ DEFINES = re.findall(r"^#define (\w+(?:\(\w+\))?) (.+?)(?: /\*.*)?$", HEADER, re
 
 
 def check_base(name: str, value: str) -> None:
-    assert int(value.rstrip("u"), 16) == number(PERIPHERALS[name.removesuffix("_BASE")], "baseAddress")
+    assert int(value.rstrip("u"), 16) == number(peripherals()[name.removesuffix("_BASE")], "baseAddress")
 
 
 def check_register(name: str, value: str) -> None:
@@ -105,7 +105,7 @@ def check_field(name: str, value: str) -> None:
 
 
 def check_interrupt(name: str, value: str) -> None:
-    assert int(value.rstrip("u")) == INTERRUPTS[name.removesuffix("_IRQ")]
+    assert int(value.rstrip("u")) == interrupts()[name.removesuffix("_IRQ")]
 
 
 BASES = [name.removesuffix("_BASE") for name, _ in DEFINES if name.endswith("_BASE")]
