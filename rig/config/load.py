@@ -336,8 +336,12 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
             yield f"world.sensors.{name}.kvh1775: no such instrument; {where}"
         if world.sensors[name].autopilot is not None and config.sensors[name].mavlink is None:
             yield f"world.sensors.{name}.autopilot: no such instrument; {where}"
-        if world.sensors[name].lines is not None and config.sensors[name].part != "lines":
+        printed, printer = config.sensors[name].lines, world.sensors[name].lines
+        if printer is not None and printed is None:
             yield f"world.sensors.{name}.lines: no such device; the sensor is a {config.sensors[name].part}"
+        if printer is not None and printed is not None:
+            for scalar in sorted(printer.scalars.keys() - printed.scalars.keys()):
+                yield f"world.sensors.{name}.lines.scalars: sensors.{name}.lines.scalars has no {quote(scalar)}"
 
 
 def _is_loopback(host: str) -> bool:
