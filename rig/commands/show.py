@@ -29,7 +29,7 @@ def run(options: Namespace) -> int:
 
     from rig.data.result_file import read_result
     from rig.report.table import print_checks, print_kept, print_values, print_verdict
-    from rig.station.plain_text import plain
+    from rig.station.plain_text import say
 
     result, sensor = read_result(options.run), options.sensor
     console = Console(highlight=False)
@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
         if sensor not in scalars:
             known = ", ".join([*names, *scalars])
             raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {known}")
-        console.print(plain(scalars[sensor]))
+        say(scalars[sensor])
         return 0
     if options.budget or options.all or (sensor is not None and not options.checks):
         print_values(result, console, sensor)
@@ -65,7 +65,7 @@ def _scalars(run: Path) -> dict[str, str]:
     from rig.data.run_folder import recordings
 
     recorded = [read_run(path) for path in recordings(run, "raw")] if run.is_dir() else []
-    found = {}
+    found: dict[str, str] = {}
     for name, sensor in recorded[0].sensors.items() if recorded else ():
         for channel in () if sensor.has_axes else sensor.channels:
             of = channel.measures
