@@ -27,7 +27,7 @@ from rig.errors.quoting import printable, quote
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
 Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for those in stock
-# The kinds of turners that the laboratory can simulate; `arm` is the section of the first.
+# The kinds of turners in stock, each a room of `rig.turners` by its name; `arm` is the section of the first.
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
