@@ -6,8 +6,7 @@ The same driver talks to the instrument over RS-422 and to the simulated one: by
 import re
 from collections.abc import Callable
 from contextlib import suppress
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -27,7 +26,7 @@ OnMessages = Callable[[NDArray[Any], NDArray[Any], NDArray[Any], float], None]
 
 
 class Kvh1775:
-    """The instrument on a serial port or `socket://host:port`; a context manager. `on_messages` runs on its thread.
+    """The instrument on a serial port or `socket://host:port`, until `close`. `on_messages` runs on its thread.
 
     What goes wrong is a SensorError whose name begins with `kvh_`; all messages name `sensor`, as the configuration.
     """
@@ -66,14 +65,6 @@ class Kvh1775:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def port(self) -> str:

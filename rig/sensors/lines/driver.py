@@ -5,8 +5,6 @@ Nothing is sent to the device. It says nothing of itself, so that it is what the
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +62,7 @@ class Counts:
 
 
 class LinesDevice:
-    """A device on a serial port or `socket://host:port`; a context manager. `on_values` runs on its thread.
+    """A device on a serial port or `socket://host:port`, until `close`. `on_values` runs on its thread.
 
     What goes wrong is a SensorError whose name begins with `lines_`; all messages name `sensor`.
     """
@@ -101,14 +99,6 @@ class LinesDevice:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def where(self) -> str:

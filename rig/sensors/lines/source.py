@@ -1,7 +1,7 @@
 """A configured device that prints lines as a source of samples: its numbers made counts in SI units."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass, replace
 from math import radians
 
@@ -147,22 +147,17 @@ def stamp_std_s(lines: LinesSection, rate_hz: float) -> float | None:
     return None
 
 
-@contextmanager
 def lines(
     name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
-) -> Iterator[LinesSource]:
+) -> closing[LinesSource]:
     """The device for the length of the `with` block. Raises SensorError as `LinesSource`."""
-    source = LinesSource(name, section, on_samples, patience=patience)
-    try:
-        yield source
-    finally:
-        source.close()
+    return closing(LinesSource(name, section, on_samples, patience=patience))
 
 
 def look(name: str, section: SensorSection) -> Iterator[LookedAt]:
     """What there is, and what is wrong with it. Raises SensorError as `LinesDevice`."""
     line, told = _parts_of(section)
-    with LinesDevice(name, line, told, section.rate_hz) as device:
+    with closing(LinesDevice(name, line, told, section.rate_hz)) as device:
         counts = device.counts
         rate = "" if np.isnan(device.rate_hz) else f", {device.rate_hz:.4g} a second by its own time"
         yield f"lines at {line.port}: {counts.samples} samples{rate}"

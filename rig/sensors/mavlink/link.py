@@ -8,8 +8,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from rig.sensors.errors import SensorError, no_port
 from rig.sensors.mavlink.counting import LinkCounter
@@ -48,7 +47,7 @@ class Autopilot:
 
 
 class Link:
-    """An autopilot at a port; a context manager. `on_messages` gets what is in `wanted`, on the reader's thread.
+    """An autopilot at a port, until `close`. `on_messages` gets what is in `wanted`, on the reader's thread.
 
     What goes wrong is a SensorError; all messages name `sensor`, as the configuration does.
     """
@@ -94,14 +93,6 @@ class Link:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def known(self) -> Autopilot:
