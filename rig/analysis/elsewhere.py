@@ -14,7 +14,7 @@ from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
-from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
+from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference, with_rate_polynomials
 from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.analysis.verdict import fitness
 from rig.data.motion_file import Item, ReadElsewhere
@@ -44,7 +44,6 @@ BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_READINGS = "scatter of the readings"
 SWEEPS, FROM_RESIDUALS = "sweeps", "what the sweeps contradict each other by"
-OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # of a bias: m = F ω + b there, g = K (m + b) of gyroscopes
 NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
 
 

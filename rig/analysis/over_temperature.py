@@ -34,7 +34,7 @@ from rig.observation.observed_run import ObservedRun
 
 CONTRIBUTOR = "polynomials over temperature"
 ASSUMED_GRADIENT_K = 0.1  # half a width, where no configuration states it
-OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # b of g = K (m + b) is −c
+OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # b of a gyroscope's g = K (m + b) is −c of m = F ω + c
 NOT_RECORDED = Fault(
     "temperature_not_recorded",
     "a calibration over temperature is asked for, and the readings have no temperature",

@@ -3,7 +3,7 @@
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -193,6 +193,6 @@ def _connected(options: Namespace) -> Iterator[tuple["Link", Mapping[str, "Senso
         name, section = next(iter(sections.items()))
         stack.enter_context(claimed_sensor(name, port))
         stack.enter_context(raised_as(Refused))
-        link = stack.enter_context(Link(name, port, line_of(section).baud))
+        link = stack.enter_context(closing(Link(name, port, line_of(section).baud)))
         link.identify()
         yield link, sections

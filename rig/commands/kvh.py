@@ -2,7 +2,7 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -76,7 +76,7 @@ def _look(name: str, port: str, baud: int) -> "KvhInfo":
     with (
         raised_as(Refused),
         claimed_sensor(name, port),
-        Kvh1775(name, port, baud, lambda messages, numbers, times_us, host_time_s: seen.append(messages)) as kvh,
+        closing(Kvh1775(name, port, baud, lambda messages, *_: seen.append(messages))) as kvh,
     ):
         found = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))
         try:

@@ -29,11 +29,17 @@ def run(options: Namespace) -> int:
 
     from rig.data.result_file import read_result
     from rig.report.table import print_checks, print_kept, print_values, print_verdict
+    from rig.station.plain_text import say
 
     result, sensor = read_result(options.run), options.sensor
-    if sensor is not None and sensor not in (names := _sensors(result)):
-        raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {', '.join(names)}")
     console = Console(highlight=False)
+    if sensor is not None and sensor not in (names := _sensors(result)):
+        scalars = _scalars(options.run)
+        if sensor not in scalars:
+            known = ", ".join([*names, *scalars])
+            raise Refused("no_such_sensor", f"{options.run} has no sensor {sensor}", f"Choose one of: {known}")
+        say(scalars[sensor])
+        return 0
     if options.budget or options.all or (sensor is not None and not options.checks):
         print_values(result, console, sensor)
     if options.checks or options.all:
@@ -49,3 +55,22 @@ def _sensors(result: "ResultDocument") -> list[str]:
     from rig.report.kinds.registry import kinds
 
     return [*dict.fromkeys(found.sensor for kind in kinds() for found in kind.found(result))]
+
+
+def _scalars(run: Path) -> dict[str, str]:
+    """What the recording has without axes, in words by name: the result has none. Raises Refused as `read_run`."""
+    import numpy as np
+
+    from rig.data.run_file import read_run
+    from rig.data.run_folder import recordings
+
+    recorded = [read_run(path) for path in recordings(run, "raw")] if run.is_dir() else []
+    found: dict[str, str] = {}
+    for name, sensor in recorded[0].sensors.items() if recorded else ():
+        for channel in () if sensor.has_axes else sensor.channels:
+            of = channel.measures
+            values = np.concatenate([channel.values(each.samples[name]) for each in recorded]) / of.reading.size
+            about = f"mean {values.mean():.2f}, {values.min():.2f} to {values.max():.2f} {of.reading.name}, "
+            told = f"{of.name} {about if len(values) else ''}{len(values)} samples"
+            found[name] = f"{found[name]}; {told}" if name in found else f"{name}, {sensor.part}: {told}"
+    return found

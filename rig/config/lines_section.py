@@ -6,11 +6,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.section import Positive, Section
+from rig.errors.quoting import quote
 
-ColumnName = Literal[
-    "time", "sequence", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my", "mz", "temperature", "-"
-]  # fmt: skip
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
+COLUMNS = ("time", "sequence", *GYROSCOPE, *ACCELEROMETER, *MAGNETOMETER, "temperature", "-")
+# Units of what has no axes: of which of `rig.data.quantity.SCALARS`, and in its unit how large one is, and zero.
+SCALAR_UNITS = {
+    "Pa": ("pressure", 1.0, 0.0), "hPa": ("pressure", 100.0, 0.0), "kPa": ("pressure", 1e3, 0.0),
+    "degC": ("temperature", 1.0, 0.0), "K": ("temperature", 1.0, -273.15),
+}  # fmt: skip
 SEPARATORS = {"comma": b",", "semicolon": b";", "tab": b"\t", "space": b" "}
 SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "ns": 1e-9}
 GAP = "?"  # what `rig lines` writes where the readings do not tell it
@@ -109,14 +113,26 @@ class LineTemperatureSection(Section):
     )
 
 
+class LineScalarSection(Section):
+    """A column of what has no axes, such as the pressure of the air: recorded as the sensor `<sensor>_<name>`."""
+
+    unit: Literal["Pa", "hPa", "kPa", "degC", "K"] = Field(description="unit in which it is printed")
+    scale: Scale = 1.0
+
+
+ScalarName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=20)]
+
+
 class LinesSection(Section):
     """What a device prints: one sample a line. See [a sensor that prints lines](how-to/lines.md)."""
 
-    columns: tuple[ColumnName, ...] = Field(
+    columns: tuple[str, ...] = Field(
         min_length=3,
         max_length=40,
         description="what the numbers of a line are, from left to right; `-` is one that is not read",
-        json_schema_extra={"allowed": "`time`, `sequence`, `gx gy gz`, `ax ay az`, `mx my mz`, `temperature`, `-`"},
+        json_schema_extra={
+            "allowed": "`time`, `sequence`, `gx gy gz`, `ax ay az`, `mx my mz`, `temperature`, names in `scalars`, `-`"
+        },
     )
     separator: Literal["comma", "semicolon", "tab", "space"] = Field(
         default="comma", description="what stands between the numbers; spaces around it do not matter"
@@ -175,10 +191,13 @@ class LinesSection(Section):
     temperature: LineTemperatureSection = Field(
         default=LineTemperatureSection(), description="the thermometer's column, or what is known without one"
     )
+    scalars: dict[ScalarName, LineScalarSection] = Field(
+        default={}, max_length=16, description="columns of what has no axes, by their names"
+    )
 
     @field_validator("columns")
     @classmethod
-    def each_once_and_whole(cls, columns: tuple[ColumnName, ...]) -> tuple[ColumnName, ...]:
+    def each_once_and_whole(cls, columns: tuple[str, ...]) -> tuple[str, ...]:
         """A column of a name, three axes of each triad, and a gyroscope."""
         twice = [name for name, count in Counter(columns).items() if count > 1 and name != "-"]
         if twice:
@@ -196,6 +215,14 @@ class LinesSection(Section):
         """What is read is described, and what is described is there."""
         if self.keys and len(self.keys) != len(self.columns):
             raise ValueError(f"there are {len(self.keys)} keys for {len(self.columns)} columns; give one for each")
+        if reserved := sorted(self.scalars.keys() & {*COLUMNS, "field"}):
+            raise ValueError(f"{', '.join(reserved)}: no name of a scalar, it means something else here")
+        if unknown := [each for each in self.columns if each not in COLUMNS and each not in self.scalars]:
+            raise ValueError(
+                f"no such column: {', '.join(map(quote, unknown))}; it may be {', '.join(COLUMNS)} or a name in scalars"
+            )
+        if missing := [each for each in self.scalars if each not in self.columns]:
+            raise ValueError(f"there is a section scalars.{missing[0]}, but no column {missing[0]}")
         described = {"time": self.time, "mx": self.field}
         for column, section in described.items():
             if (column in self.columns) != (section is not None):

@@ -27,7 +27,7 @@ from rig.errors.quoting import printable, quote
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
 Turners = Mapping[str, type[TurnerSection]] | None  # None: no matter of the reader's but for those in stock
-# The kinds of turners that the laboratory can simulate; `arm` is the section of the first.
+# The kinds of turners in stock, each a room of `rig.turners` by its name; `arm` is the section of the first.
 STOCK_TURNERS: Mapping[str, type[TurnerSection]] = {"ur": ArmSection, "hand": HandSection, "servo": ServoSection}
 TURNS = frozenset({"arm", "turner"})  # the sections of which one says what turns
 PROBLEMS_SHOWN = 25
@@ -336,8 +336,12 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
             yield f"world.sensors.{name}.kvh1775: no such instrument; {where}"
         if world.sensors[name].autopilot is not None and config.sensors[name].mavlink is None:
             yield f"world.sensors.{name}.autopilot: no such instrument; {where}"
-        if world.sensors[name].lines is not None and config.sensors[name].part != "lines":
+        printed, printer = config.sensors[name].lines, world.sensors[name].lines
+        if printer is not None and printed is None:
             yield f"world.sensors.{name}.lines: no such device; the sensor is a {config.sensors[name].part}"
+        if printer is not None and printed is not None:
+            for scalar in sorted(printer.scalars.keys() - printed.scalars.keys()):
+                yield f"world.sensors.{name}.lines.scalars: sensors.{name}.lines.scalars has no {quote(scalar)}"
 
 
 def _is_loopback(host: str) -> bool:

@@ -33,7 +33,7 @@ from rig.config.section import (
     checked_port,
 )
 from rig.config.sensor_catalogue import MAGNETOMETERS
-from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection, field_name
+from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 from rig.config.station_section import StationSection
 
 HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
@@ -249,8 +249,9 @@ class SensorsConfig(Section):
             if place in places:
                 raise ValueError(f"{places[place]} and {name} are both {what}")
             places[place] = name
-        if both := sorted(sensors.keys() & _fields_of_kvhs(sensors)):
-            raise ValueError(f"{', '.join(both)} is the name of a KVH 1775's magnetometer already")
+        brought = _brought(sensors)
+        if both := sorted({name for name in brought if name in sensors or brought.count(name) > 1}):
+            raise ValueError(f"{', '.join(both)} is the name of what another sensor's port brings along already")
         if problem := over_budget_of_autopilots({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
             raise ValueError(problem)
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
@@ -279,7 +280,7 @@ class SensorsConfig(Section):
     ) -> dict[str, MagnetometerSection]:
         """A name stands for one sensor, and the link carries them too."""
         sensors = info.data.get("sensors", {})
-        if both := sorted((sensors.keys() | _fields_of_kvhs(sensors)) & magnetometers.keys()):
+        if both := sorted({*sensors, *_brought(sensors)} & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
         if not magnetometers or not sensors or "board" not in info.data:
             return magnetometers
@@ -333,9 +334,9 @@ class RigConfig(SensorsConfig):
         return self.turner
 
 
-def _fields_of_kvhs(sensors: Mapping[str, SensorSection]) -> set[str]:
-    """The names of the magnetometers that instruments on a port of their own bring along."""
-    return {field_name(name) for name, each in sensors.items() if each.brings_field}
+def _brought(sensors: Mapping[str, SensorSection]) -> list[str]:
+    """The names of what sensors on a port of their own bring along: magnetometers, and what has no axes."""
+    return [brought for name, each in sensors.items() for brought in each.brings(name)]
 
 
 def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:

@@ -31,6 +31,11 @@ def field_name(sensor: str) -> str:
     return f"{sensor}_field"
 
 
+def scalar_name(sensor: str, scalar: str) -> str:
+    """The name of what has no axes, called `scalar` in the lines of the device called `sensor`."""
+    return f"{sensor}_{scalar}"
+
+
 # The speeds that a KVH 1775 knows, and those that microcontrollers are set to beside them.
 KVH1775_BAUDS = (9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200)
 Baud = Literal[
@@ -192,12 +197,12 @@ class SensorSection(Section):
             return "serial.port", self.serial.port
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
-    @property
-    def brings_field(self) -> bool:
-        """Whether its port brings the readings of a magnetometer along."""
-        if self.lines is not None:
-            return self.lines.field is not None
-        return self.serial is not None and self.serial.message == "C"
+    def brings(self, name: str) -> set[str]:
+        """The names of the other sensors whose readings come by its port, where it is called `name`."""
+        if self.lines is None:
+            return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
+        field = {field_name(name)} if self.lines.field is not None else set()
+        return field | {scalar_name(name, scalar) for scalar in self.lines.scalars}
 
     @model_validator(mode="before")
     @classmethod

@@ -30,6 +30,11 @@ class SimulatedLinesSection(Section):
     bit_error_rate: float = Field(
         default=0.0, ge=0, le=0.01, description="share of wrong bits on the line", json_schema_extra=RATIO
     )
+    scalars: dict[str, float] = Field(
+        default={},
+        description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
+        json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
+    )
     prints: LinesSection | None = Field(
         default=None, description="what it prints in truth, for tests of what is refused; left out, as the section says"
     )

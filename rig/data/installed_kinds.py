@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import entry_points
 from types import MappingProxyType
 from typing import Any, Protocol
 
 from rig.data.quantity import OF_THE_RIG, SCALARS, Quantity, Scalar
 from rig.errors import Refused
+from rig.errors.installed import added
 
 GROUP = "rig.kinds"
 
@@ -32,17 +32,11 @@ class InstalledKind(Protocol):
 @cache
 def installed_kinds() -> tuple[InstalledKind, ...]:
     """The kinds of the packages installed here. Raises Refused `kind_not_loaded`."""
-    found = []
-    for entry in entry_points(group=GROUP):
-        try:
-            found.append(entry.load())
-        except (ImportError, AttributeError) as error:
-            raise Refused(
-                "kind_not_loaded",
-                f"the kind of sensor {entry.name} is installed but cannot be loaded ({error})",
-                f"Install the package of {entry.value} again, or remove it",
-            ) from error
-    return tuple(found)
+    return tuple(kind for _, kind in added(GROUP, _not_loaded))
+
+
+def _not_loaded(what: str, remedy: str) -> Refused:
+    return Refused("kind_not_loaded", f"the kind of sensor {what}", remedy)
 
 
 @cache

@@ -4,6 +4,7 @@ A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new 
 kind of sensor that somebody has installed (`rig.data.installed_kinds`).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import pi
 from typing import Final
@@ -150,3 +151,9 @@ OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0))
 SCALARS: Final = (TEMPERATURE, PRESSURE)
+
+
+def of_news(quantities: Iterable[str]) -> list[str]:
+    """Those quantities of a sensor, by name, that are told: its temperature only where it measures nothing else."""
+    names = list(quantities)
+    return [name for name in names if name != TEMPERATURE.name] or names

@@ -48,6 +48,11 @@ class RecordedSensor:
         return self.clock is None
 
     @property
+    def has_axes(self) -> bool:
+        """Whether it can be calibrated: of the pressure of the air, nothing is."""
+        return any(each.measures.shape for each in self.channels)
+
+    @property
     def sample_dtype(self) -> np.dtype[Any]:
         """The type of its samples."""
         return sample_dtype(self.channels)

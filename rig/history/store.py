@@ -333,4 +333,10 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
         for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(some))):
             number, name, *values = row
             found.setdefault(number, {})[name] = Parameter(name, *values)
-    return {number: {name: each[name] for name in ORDER if name in each} for number, each in found.items()}
+    return {number: dict(sorted(each.items(), key=_place)) for number, each in found.items()}
+
+
+def _place(parameter: tuple[str, Parameter]) -> tuple[int, str]:
+    """Where a parameter stands among the others: as in `ORDER`, what is not there after them."""
+    name, _ = parameter
+    return (ORDER.index(name) if name in ORDER else len(ORDER)), name

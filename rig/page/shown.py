@@ -15,7 +15,7 @@ from rig.data.hand_events import (
     HandRestRefused,
 )
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit
+from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, of_news
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
@@ -280,7 +280,7 @@ class Shown:
 def _quantities(sensor: SensorSamples) -> Iterator[tuple[Quantity | Scalar, Unit]]:
     """What a sensor sends, and the unit it is shown in: that of its bias."""
     known = measured()
-    for of in (known[name] for name in sensor.latest if name != TEMPERATURE.name):
+    for of in (known[name] for name in of_news(sensor.latest)):
         yield of, of.bias if isinstance(of, Quantity) else of.reading
 
 

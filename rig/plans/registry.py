@@ -8,7 +8,7 @@ the rig knows a procedure except through its `Procedure`; one that is not instal
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from rig.analysis.analyses import calibrated
@@ -18,6 +18,7 @@ from rig.config.models import ArmSection, ProcedureSection, TurnerSection
 from rig.config.procedure_sections import STOCK_SECTIONS
 from rig.data.run_file import RunData
 from rig.errors import Refused
+from rig.errors.installed import added
 from rig.motion.state import Joints
 from rig.motion.steps import Plan
 from rig.plans.verbs import Script
@@ -104,18 +105,12 @@ Procedures = Mapping[str, AnyProcedure]
 def _found() -> Mapping[str, tuple[AnyProcedure, str]]:
     """The installed procedures by name, each with the module it stands in."""
     stock = (EntryPoint(name, f"procedures.{name}:PROCEDURE", GROUP) for name in STOCK_SECTIONS)
-    found = {}
-    for entry in (*stock, *entry_points(group=GROUP)):
-        try:
-            procedure = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise Refused(
-                "procedure_not_loaded",
-                f"the procedure {entry.name} is installed but cannot be loaded ({error})",
-                f"Install the package of {entry.value} again, or remove it",
-            ) from error
-        found[procedure.name] = procedure, entry.module
-    return found
+    found = added(GROUP, _not_loaded, stock)
+    return {procedure.name: (procedure, entry.module) for entry, procedure in found}
+
+
+def _not_loaded(what: str, remedy: str) -> Refused:
+    return Refused("procedure_not_loaded", f"the procedure {what}", remedy)
 
 
 def installed() -> Procedures:

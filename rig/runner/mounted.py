@@ -86,9 +86,14 @@ class Mounted:
 
 
 def mounted(sensors: Mapping[str, RecordedSensor], board: str | None, memory: Memory, *, simulated: bool) -> Mounted:
-    """The sensors of a run, by name, on the board of that identifier; what is simulated and what is not are two."""
+    """The sensors of a run that can be calibrated, by name, on the board of that identifier.
+
+    What is simulated and what is not are two.
+    """
     found = []
     for name, sensor in sensors.items():
+        if not sensor.has_axes:
+            continue
         of = sensor.part, sensor.serial_number, simulated
         same = [each for each in memory.calibrations if (each.part, each.serial_number, each.simulated) == of]
         here = board if sensor.on_board else None

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from firmware_host.serial_port import READ_TIMEOUT_S
 
+ATTEMPTS = 4  # times something is asked
+
 
 @dataclass(frozen=True, slots=True)
 class Patience:
@@ -11,6 +13,13 @@ class Patience:
 
     first_s: float = 4.0  # an Arduino starts anew when its port is opened
     silent_s: float = 2.0
+
+    def attempts(self, more_s: float = 0.0) -> list[float]:
+        """How long to wait for each answer, s, to what is asked again and again: `first_s` and `more_s` in all.
+
+        Each wait is twice as long as the one before.
+        """
+        return [(self.first_s + more_s) * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
 
 
 USUAL = Patience()

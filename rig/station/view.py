@@ -13,7 +13,7 @@ from rich.table import Table
 
 from rig.data.hand_events import HandAsked
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE
+from rig.data.quantity import of_news
 from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
 from rig.station.events import HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples
@@ -99,12 +99,11 @@ def _panel_by_hand(seen: HandSeen, asked: HandAsked | None, samples: SamplesTake
 def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
     """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
     came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
-    for quantity, newest in sensor.latest.items():
+    for quantity in of_news(sensor.latest):
         of = measured()[quantity]
-        if of != TEMPERATURE:  # beside another quantity it is no news
-            shown = " ".join(f"{component / of.reading.size:+7.2f}" for component in newest)
-            name, more = (f"{sensor.sensor}, {of.sensor}", "") if rows else (sensor.sensor, f", {came}")
-            rows.append((name, f"{shown} {of.reading.name}{more}"))
+        shown = " ".join(f"{component / of.reading.size:+7.2f}" for component in sensor.latest[quantity])
+        name, more = (f"{sensor.sensor}, {of.sensor}", "") if rows else (sensor.sensor, f", {came}")
+        rows.append((name, f"{shown} {of.reading.name}{more}"))
     return rows or [(sensor.sensor, f"waiting, {came}")]
 
 

@@ -5,10 +5,12 @@ Nothing in the rig knows a turner except through its `TurnerKind`.
 
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint
 
+from rig.config.load import STOCK_TURNERS
 from rig.config.models import TurnerSection
 from rig.errors import Refused
+from rig.errors.installed import added
 from rig.turners.kind import AnyTurner, Words
 
 GROUP = "rig.turners"
@@ -16,19 +18,13 @@ GROUP = "rig.turners"
 
 @cache
 def installed() -> Mapping[str, AnyTurner]:
-    """The kinds of turners of the packages installed here. Raises Refused `turner_not_loaded`."""
-    found: dict[str, AnyTurner] = {}
-    for entry in entry_points(group=GROUP):
-        try:
-            kind = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise Refused(
-                "turner_not_loaded",
-                f"the turner {entry.name} is installed but cannot be loaded ({error})",
-                f"Install the package of {entry.value} again, or remove it",
-            ) from error
-        found[kind.name] = kind
-    return found
+    """The kinds of turners in stock, and of the packages installed here. Raises Refused `turner_not_loaded`."""
+    stock = (EntryPoint(name, f"rig.turners.{name}.kind:{name.upper()}", GROUP) for name in STOCK_TURNERS)
+    return {kind.name: kind for _, kind in added(GROUP, _not_loaded, stock)}
+
+
+def _not_loaded(what: str, remedy: str) -> Refused:
+    return Refused("turner_not_loaded", f"the turner {what}", remedy)
 
 
 def sections() -> Mapping[str, type[TurnerSection]]:

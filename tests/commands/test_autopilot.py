@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import closing
 from math import radians
 from pathlib import Path
 from typing import Any
@@ -150,6 +151,6 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
 
 def seen(wire: AutopilotOnAWire) -> list[SensorError]:
     """What the next start says."""
-    with Link("imu", wire.port, 921600) as link:
+    with closing(Link("imu", wire.port, 921600)) as link:
         link.identify()
         return list(unfinished(link))

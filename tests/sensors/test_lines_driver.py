@@ -3,18 +3,19 @@
 import time
 from collections.abc import Iterator
 from itertools import chain, count, repeat
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
+from rig.config.lines_section import SCALAR_UNITS, LineScalarSection
+from rig.data.quantity import ACCELERATION, PRESSURE, RATE, SCALARS, TEMPERATURE
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.source import describe, lines, look
 from rig.sensors.silence import Patience
 from rig.sensors.source import SampleSource
-from support.printed_lines import SEVEN, pty_printing, sensor_section
+from support.printed_lines import SEVEN, lines_section, pty_printing, sensor_section
 
 BOOT = b"ets Jul 29 2019\r\nrst:0x1\r\n"
 
@@ -58,6 +59,48 @@ def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
     )
     thermometer = described.channel(TEMPERATURE)
     assert (thermometer.values(samples)[0], thermometer.resolution) == (22.0, 5.0), "it has none: as it is stated"
+
+
+def test_columns_without_axes_are_sensors_of_their_own_on_the_same_clock() -> None:
+    columns = (*SEVEN[:4], "air", "room", "-")
+    scalars = {"air": {"unit": "hPa", "scale": 100}, "room": {"unit": "K", "scale": 1000}}
+    section: dict[str, Any] = {"columns": columns, "scalars": scalars, "acceleration": None}
+    taken: dict[str, NDArray[Any]] = {}
+
+    def take(sensor: str, samples: NDArray[Any]) -> None:
+        taken.setdefault(sensor, samples)
+
+    with pty_printing(stream()) as (port, _), lines("imu", sensor_section(port, **section), take) as source:
+        source.start()
+        until_s = time.monotonic() + 60
+        while len(taken) < 3 and time.monotonic() < until_s:
+            source.check()
+            time.sleep(0.01)
+        described = source.sensors
+    air, room = described["imu_air"], described["imu_room"]
+    assert not air.has_axes and (air.part, air.clock, room.part) == ("lines_barometer", "imu", "lines_thermometer")
+    assert air.channel(PRESSURE).values(taken["imu_air"]) == pytest.approx(5000.0)
+    assert room.channel(TEMPERATURE).values(taken["imu_room"]) == pytest.approx(-250 - 273.15)
+    assert (taken["imu_air"]["board_time_us"] == taken["imu"]["board_time_us"]).all()
+
+
+@pytest.mark.parametrize(
+    ("columns", "scalars", "complaint"),
+    [
+        (SEVEN, {"air": {"unit": "hPa"}}, "no column air"),
+        ((*SEVEN, "air"), {}, "no such column"),
+        ((*SEVEN, "field"), {"field": {"unit": "hPa"}}, "no name of a scalar"),
+        ((*SEVEN, "air"), {"air": {"unit": "torr"}}, "scalars.air.unit"),
+    ],
+)
+def test_a_column_that_nothing_describes_is_refused(columns: Any, scalars: Any, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        lines_section(columns=columns, scalars=scalars)
+
+
+def test_every_unit_of_what_has_no_axes_is_of_a_quantity_that_is_known() -> None:
+    assert {quantity for quantity, _, _ in SCALAR_UNITS.values()} == {each.name for each in SCALARS}
+    assert set(get_args(LineScalarSection.model_fields["unit"].annotation)) == set(SCALAR_UNITS)
 
 
 def test_a_look_says_what_comes() -> None:

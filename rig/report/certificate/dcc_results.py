@@ -1,6 +1,6 @@
 """The results of a digital certificate: values in full, with U or with their covariance, quantity by quantity."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element
 
 from rig.data.accelerometer_entries import AccelerometerEntry
@@ -8,15 +8,16 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
+from rig.data.result_file import SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
 from rig.estimation.six_observation import PARAMETERS
 from rig.report.certificate.coverage_words import coverage_sentence
-from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
+from rig.report.certificate.tables import AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
-from rig.report.expanded import Expanded, expanded, factor_words, flat
+from rig.report.expanded import Expanded, expanded, factor_words
+from rig.report.kinds.followed import Further
 from rig.report.told_words import told_words
 from rig.report.validity_words import load_words, speed_words, when_words
 
@@ -24,7 +25,6 @@ ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\
 FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
 PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
 Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
-Skewed = VectorEntry | AccelerometerEntry | MagnetometerEntry
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
@@ -41,19 +41,12 @@ def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
     yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
-    if isinstance(sensor.vector_model, VectorEntry):
-        yield _skew(sensor.vector_model)
-        yield from _g_sensitivity(sensor.vector_model)
 
 
 def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
     """Relative to the stated gravity, with U of the budget and the combined covariance."""
     said = f"{found.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {found.gravity_m_s2!r} m/s²."
     yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION, said)
-    yield _skew(found)
-    if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
-        known = found.second_order_std_s2_m, found.second_order_freedom
-        yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, *known), PER_FORCE)
 
 
 def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
@@ -67,7 +60,13 @@ def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iter
     if found.arm_field_in_bias:
         said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
     yield from _relative(found, [*found.scale, *found.bias_t], FIELD, said, ", as mounted")
-    yield _skew(found)
+
+
+def beside(found: Iterable[Further]) -> Iterator[Element]:
+    """What was found of a sensor beside scale and bias, with U by its standard deviations."""
+    for each in found:
+        said = f"{each.said} {SOLUTION}" if each.said else SOLUTION
+        yield _spread(each.name, said, each.labels, (each.values, each.stds, each.freedom), each.unit)
 
 
 def _reversed(found: ReversalEntry) -> Iterator[Element]:
@@ -126,24 +125,6 @@ def verification(found: VerificationEntry) -> Iterator[Element]:
     if found.before is not None:
         yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE]))
     yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE]))
-
-
-def _g_sensitivity(found: VectorEntry) -> Iterator[Element]:
-    if found.g_sensitivity_rad_s_per_m_s2 is None or found.g_sensitivity_std_rad_s_per_m_s2 is None:
-        return
-    labels = [f"{axis}{along}" for axis in AXES for along in AXES]
-    values = [-each for row in found.g_sensitivity_rad_s_per_m_s2 for each in row]  # gravity points down
-    stds = [each for row in found.g_sensitivity_std_rad_s_per_m_s2 for each in row]
-    said = (
-        "What a specific force along the flange's axis (second letter) adds to the reading of an axis (first letter)."
-    )
-    yield _spread(
-        "g-sensitivity",
-        f"{said} {SOLUTION}",
-        labels,
-        (values, stds, flat(found.g_sensitivity_freedom)),
-        PER_ACCELERATION,
-    )
 
 
 def earth_rate(found: EarthRateEntry) -> Iterator[Element]:
@@ -206,11 +187,6 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
         "The ellipsoid holds all six values at once with a probability of 95 %; the matrix is their covariance.",
         real_list(PARAMETERS, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
     )
-
-
-def _skew(found: Skewed) -> Element:
-    known = found.non_orthogonality_rad, found.non_orthogonality_std_rad, found.non_orthogonality_freedom
-    return _spread("angles between the axes less a right one", SOLUTION, ANGLES, known, ANGLE)
 
 
 def _spread(name: str, said: str, labels: Sequence[str], found: Known, unit: str) -> Element:

@@ -49,7 +49,7 @@ def _readings(recording: ObservedRun, name: str, sensor: RecordedSensor, after: 
     beside = [each for each in sensor.channels if sensor.measures(RATE) and each.quantity == ACCELERATION.name]
     own = [each for each in sensor.channels if each not in beside]
     whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings"
-    if any(each.measures.shape for each in sensor.channels):
+    if sensor.has_axes:
         whose += " in the sensor's own axes"
     for table, channels, said in (("", own, ""), ("_acceleration", beside, "Upwards at rest. ")):
         if channels:

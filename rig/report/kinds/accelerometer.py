@@ -32,10 +32,12 @@ from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
+from rig.report.certificate.tables import AXES
 from rig.report.elsewhere_entries import accelerometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.expanded import expanded, factor_words
-from rig.report.kinds.triad import Words, attitude_lines, triad_kind
+from rig.report.kinds.followed import Further
+from rig.report.kinds.triad import Words, angles, attitude_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
@@ -157,11 +159,18 @@ def _temperatures_c(found: AccelerometerEntry) -> dict[str, float | None]:
     return {"": found.temperature_c if found.found_at is None else found.found_at.temperature_c}
 
 
+def _further(found: AccelerometerEntry) -> Iterator[Further]:
+    yield angles(found)
+    if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
+        known = found.second_order_std_s2_m, found.second_order_freedom
+        yield Further("second order", AXES, found.second_order_s2_m, *known, dcc_results.PER_FORCE)
+
+
 ACCELEROMETER = triad_kind(
     ACCELERATION,
     "accelerometers",
     _entries,
-    Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c),
+    Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c, _further),
     header=accelerometer_lines,
     block="at_rest.html.j2:accelerometer",
 )

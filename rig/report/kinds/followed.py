@@ -7,7 +7,7 @@ rate found and its parts in the axes of the base. The mean is one of its own bec
 size, the clock, moves all alike.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -59,6 +59,27 @@ class Parameter:
     def nominal(self) -> float:
         """What an ideal sensor has."""
         return nominal(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Further:
+    """What was found of a sensor beside scale and bias: a kind says it once, for the digital certificate and a history.
+
+    Values, standard deviations and their degrees of freedom by `labels`, in the `unit` as D-SI writes it, under a name
+    and what is `said` before ± U. A history follows it under `prefix` and label, in the unit `followed_in`; not where
+    there is no prefix. `opposite` where it keeps the values with the other sign.
+    """
+
+    name: str
+    labels: Sequence[str]
+    values: Sequence[float]
+    stds: Sequence[float]
+    freedom: "Sequence[Freedom] | None"
+    unit: str
+    said: str = ""
+    prefix: str = ""
+    followed_in: str = ""
+    opposite: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +158,15 @@ def parameters(
     factors = expanded([1.0] * len(names), freedom).factors
     for name, value, std, factor in zip(names, values, stds, factors, strict=True):
         yield Parameter(name, value, std, None, unit, coverage_factor=None if factor == COVERAGE_FACTOR else factor)
+
+
+def followed_beside(found: Iterable[Further]) -> Iterator[Parameter]:
+    """The parameters of what was found beside scale and bias, as far as a history follows it."""
+    for each in found:
+        if each.prefix:
+            values = [-value for value in each.values] if each.opposite else each.values
+            names = [each.prefix + label for label in each.labels]
+            yield from parameters(names, values, each.stds, each.freedom, each.followed_in)
 
 
 def known(found: Sequence[Parameter]) -> tuple[Parameter, ...]:

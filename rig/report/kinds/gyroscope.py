@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from rich.table import Table
@@ -17,13 +18,14 @@ from rig.estimation.six_observation import PARAMETERS
 from rig.report.axes import decimals, matrix_lines, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
 from rig.report.certificate import dcc_results
+from rig.report.certificate.tables import AXES
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.elsewhere_entries import rates_in_attitudes, turned
 from rig.report.expanded import flat
 from rig.report.hand_entry import by_hand_lines
-from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
+from rig.report.kinds.followed import Followed, Further
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
-from rig.report.kinds.triad import item_words, shown_of, tables, unsolved_lines
+from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, tables, unsolved_lines
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import load_words, speed_words, when_words
@@ -73,25 +75,32 @@ def _shown(found: Found[SensorEntry]) -> Shown:
 
 
 def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
-    entry, vector = found.entry, found.entry.vector_model
-    followed = list(scale_and_bias(found.sensor, RATE, entry, entry.bias_rad_s, document))
-    if isinstance(vector, VectorEntry):
-        stds = vector.non_orthogonality_std_rad
-        followed += parameters(ANGLES, vector.non_orthogonality_rad, stds, vector.non_orthogonality_freedom, "rad")
-        if vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None:
-            felt = np.ravel(vector.g_sensitivity_rad_s_per_m_s2).tolist()
-            stds_of = np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2).tolist()
-            freedom = flat(vector.g_sensitivity_freedom)
-            followed += parameters(SENSITIVITIES, felt, stds_of, freedom, "rad/s per m/s²")
-    return Followed(
-        found.sensor,
-        RATE.name,
-        entry.part,
-        entry.serial_number,
-        entry.range_rad_s or 0.0,
-        entry.estimator,
-        entry.temperature_c,
-        known(followed),
+    return followed_of(found, document, _further(found.entry))
+
+
+def _further(sensor: SensorEntry) -> Iterator[Further]:
+    """What the vector model found beside scale and bias: the axes, and what an acceleration adds.
+
+    A history keeps what the accelerations of gravity add, which point down; certificates say it of specific forces.
+    """
+    vector = sensor.vector_model
+    if isinstance(vector, ErrorEntry):
+        return
+    yield angles(vector)
+    if vector.g_sensitivity_rad_s_per_m_s2 is None or vector.g_sensitivity_std_rad_s_per_m_s2 is None:
+        return
+    yield Further(
+        "g-sensitivity",
+        [axis + along for axis in AXES for along in AXES],
+        [-each for row in vector.g_sensitivity_rad_s_per_m_s2 for each in row],
+        [each for row in vector.g_sensitivity_std_rad_s_per_m_s2 for each in row],
+        flat(vector.g_sensitivity_freedom),
+        dcc_results.PER_ACCELERATION,
+        said="What a specific force along the flange's axis (second letter) adds to the reading of an axis (first "
+        "letter).",
+        prefix="g",
+        followed_in="rad/s per m/s²",
+        opposite=True,
     )
 
 
@@ -100,7 +109,8 @@ def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
     sensor = found.entry
     if sensor.role == "reference":
         return None
-    name, results = f"calibration of gyroscope {found.sensor}", dcc_results.gyroscope(sensor)
+    name = f"calibration of gyroscope {found.sensor}"
+    results = chain(dcc_results.gyroscope(sensor), dcc_results.beside(_further(sensor)))
     warm = temperatures_c(sensor)
     return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
 

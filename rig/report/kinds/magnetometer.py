@@ -30,7 +30,8 @@ from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
-from rig.report.kinds.triad import Words, attitude_lines, triad_kind
+from rig.report.kinds.followed import Further
+from rig.report.kinds.triad import Words, angles, attitude_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
@@ -129,11 +130,15 @@ def _tests(found: MagnetometerEntry) -> Iterator[str]:
         yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
 
 
+def _further(found: MagnetometerEntry) -> Iterator[Further]:
+    yield angles(found)
+
+
 MAGNETOMETER = triad_kind(
     FIELD,
     "magnetometers",
     _entries,
-    Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}),
+    Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}, _further),
     header=magnetometer_lines,
     block="at_rest.html.j2:magnetometer",
 )

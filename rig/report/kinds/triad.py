@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -17,7 +18,9 @@ from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
 from rig.report.axes import scale_and_bias_table
 from rig.report.budget_table import budget_table, expanded_heading
-from rig.report.kinds.followed import ANGLES, Calibrated, Followed, known, parameters, scale_and_bias
+from rig.report.certificate import dcc_results
+from rig.report.certificate.tables import ANGLES
+from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
 
 
@@ -25,7 +28,8 @@ from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
 class Words:
     """What is said of one such sensor, by its entry: behind its name, its model, lines below its table.
 
-    Of the digital certificate its results, with what turning it over has told, and how warm it was.
+    Of the digital certificate its scale and bias, with what turning it over has told, and how warm it was; `further`
+    is what was found beside.
     """
 
     title: str
@@ -33,6 +37,7 @@ class Words:
     lines: Callable[[Any], Iterator[str]]
     digital: Callable[[Any, ReversalEntry | None], Iterator[Element]]
     temperatures_c: Callable[[Any], Mapping[str, float | None]]
+    further: Callable[[Any], Iterator[Further]]
 
 
 def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
@@ -54,15 +59,22 @@ def shown_of(name: str, quantity: Quantity, entry: Calibrated) -> Shown:
     return Shown(name, quantity.bias, bias, entry.budget is not None, Three(entry.scale, expanded[:axes]))
 
 
-def followed_of(found: Found[Any], document: ResultDocument, temperature_c: float | None) -> Followed:
-    """Scale, bias and axes as a history keeps them."""
+def angles(entry: Any) -> Further:
+    """How far the axes are from right angles."""
+    of = entry.non_orthogonality_rad, entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom
+    name = "angles between the axes less a right one"
+    return Further(name, ANGLES, *of, dcc_results.ANGLE, prefix="nonorth_", followed_in="rad")
+
+
+def followed_of(found: Found[Any], document: ResultDocument, further: Iterable[Further]) -> Followed:
+    """Scale, bias and what was found beside as a history keeps them."""
     quantity, entry = found.quantity, found.entry
-    stds, freedom = entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom
     followed = [
         *scale_and_bias(found.sensor, quantity, entry, bias_of(quantity, entry), document),
-        *parameters(ANGLES, entry.non_orthogonality_rad, stds, freedom, "rad"),
+        *followed_beside(further),
     ]
     full_scale: float = getattr(entry, quantity.named("range")) or 0.0
+    temperature_c: float | None = getattr(entry, "temperature_c", None)
     of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
     return Followed(found.sensor, quantity.name, *of, known(followed))
 
@@ -140,11 +152,12 @@ def triad_kind(
         return shown_of(beside(each.sensor, quantity), quantity, each.entry)
 
     def followed(each: Found[Any], document: ResultDocument) -> Followed:
-        return followed_of(each, document, getattr(each.entry, "temperature_c", None))
+        return followed_of(each, document, words.further(each.entry))
 
     def measured(each: Found[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
         entry, name = each.entry, f"calibration of {quantity.sensor} {each.sensor}"
-        results, warm = words.digital(entry, turned.get(each.sensor)), words.temperatures_c(entry)
+        results = chain(words.digital(entry, turned.get(each.sensor)), dcc_results.beside(words.further(entry)))
+        warm = words.temperatures_c(entry)
         return Measured(quantity.sensor, each.sensor, entry.part, entry.serial_number, name, results, warm)
 
     return ResultKind(

@@ -4,12 +4,9 @@ The same driver talks to the instrument over RS-422 and to the simulated one: by
 """
 
 import re
-import threading
-import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import suppress
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -18,9 +15,9 @@ from rig.sensors.errors import SensorError, no_port
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.settings import NAMES, Wanted, same
-from rig.sensors.silence import USUAL, Patience, Silence
+from rig.sensors.port_reader import PortReader
+from rig.sensors.silence import ATTEMPTS, USUAL, Patience
 
-ATTEMPTS = 4  # times a command is sent; each waits twice as long as the one before
 KEPT_BYTES = 4096  # of what came while an answer was awaited
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
@@ -29,7 +26,7 @@ OnMessages = Callable[[NDArray[Any], NDArray[Any], NDArray[Any], float], None]
 
 
 class Kvh1775:
-    """The instrument on a serial port or `socket://host:port`; a context manager. `on_messages` runs on its thread.
+    """The instrument on a serial port or `socket://host:port`, until `close`. `on_messages` runs on its thread.
 
     What goes wrong is a SensorError whose name begins with `kvh_`; all messages name `sensor`, as the configuration.
     """
@@ -54,16 +51,12 @@ class Kvh1775:
         self._tests: list[BuiltInTest] = []
         self._counter: MessageCounter | None = None  # while it streams
         self._format = b""
-        self._fault: SensorError | None = None
         self._heard = bytearray()
-        self._news = threading.Condition()
-        self._closing = threading.Event()
-        self._silence = Silence()
         try:
             self._serial = SerialPort(port, baud)
         except OSError as error:
             raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
-        self._reader = threading.Thread(target=self._read, name=f"kvh1775 {port}", daemon=True)
+        self._reader = PortReader(f"kvh1775 {port}", self._serial.read, self._take, self._failed)
         self._reader.start()
         try:
             self._configure()
@@ -72,14 +65,6 @@ class Kvh1775:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def port(self) -> str:
@@ -104,9 +89,9 @@ class Kvh1775:
         """Back to normal mode, in which it sends messages as it is set to. Raises SensorError `kvh_silent`."""
         seen = self._messages_seen
         period_s = 1.0 / float(self.settings["DR"])
-        for wait_s in self._waits(self._patience.first_s + ATTEMPTS * period_s):
+        for wait_s in self._patience.attempts(ATTEMPTS * period_s):
             self._write("=CONFIG,0")  # which is not answered
-            if self._wait(lambda: self._messages_seen > seen, wait_s):
+            if self._reader.wait(lambda: self._messages_seen > seen, wait_s):
                 return
         raise SensorError(
             "kvh_silent",
@@ -118,9 +103,9 @@ class Kvh1775:
         """What its built-in test says, in normal mode. Raises SensorError `kvh_no_test`, `kvh_test_failed`."""
         self._tests.clear()
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
-        for wait_s in self._waits(self._patience.first_s + ATTEMPTS * period_s):
+        for wait_s in self._patience.attempts(ATTEMPTS * period_s):
             self._write("?BIT")  # ?BIT,2 has bytes that the ICD does not print as 7f when all is well
-            if self._wait(lambda: bool(self._tests), wait_s):
+            if self._reader.wait(lambda: bool(self._tests), wait_s):
                 found = self._tests[0]
                 if not found.passed:
                     raise SensorError(
@@ -138,10 +123,10 @@ class Kvh1775:
 
     def start(self, wanted: Wanted) -> None:
         """Start to hand everything to `on_messages`, from the next message on."""
-        with self._news:
+        with self._reader.news:
             self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
             self._format = wanted.message.encode()
-            self._silence.restart()
+            self._reader.silence.restart()
 
     @property
     def lost(self) -> int:
@@ -153,10 +138,7 @@ class Kvh1775:
 
         `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
         """
-        if self._fault is not None:
-            raise self._fault
-        with self._news:
-            silent_s = self._silence.seen_by(clock_s)
+        silent_s = self._reader.silent_s(clock_s)
         if self._counter is not None and silent_s > self._patience.silent_s + 2e-6 * self._counter.interval_us:
             raise SensorError(
                 "kvh_link_lost",
@@ -166,20 +148,19 @@ class Kvh1775:
 
     def listen(self, duration_s: float) -> None:
         """Waits so long while it streams. Raises what goes wrong meanwhile."""
-        self._wait(lambda: False, duration_s)
+        self._reader.wait(lambda: False, duration_s)
 
     def fail(self, error: SensorError) -> None:
         """Makes `error` what `check` raises, unless there is one already."""
-        self._fault = self._fault or error
+        self._reader.fail(error)
 
     def close(self) -> None:
         """Leaves it in normal mode, as after switching on, and closes the port. May be called twice."""
-        if self._closing.is_set():
+        if self._reader.closed:
             return
         with suppress(SensorError):
             self._write("=CONFIG,0")
-        self._closing.set()
-        self._reader.join()
+        self._reader.close()
         self._serial.close()
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
@@ -188,7 +169,7 @@ class Kvh1775:
         try:
             self._ask("=CONFIG,1", "CONFIG")
         except SensorError as error:
-            if error.name != "kvh_link_lost" or self._fault is not None:
+            if error.name != "kvh_link_lost" or self._reader.fault is not None:
                 raise
             raise self._why_no_answer() from error
 
@@ -211,11 +192,11 @@ class Kvh1775:
     def _ask(self, command: str, name: str) -> str:
         """What stands behind `name` in the answer. Raises SensorError `kvh_command_refused`, `kvh_link_lost`."""
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
-        for wait_s in self._waits(self._patience.first_s):
-            with self._news:
+        for wait_s in self._patience.attempts():
+            with self._reader.news:
                 self._heard.clear()
             self._write(command)
-            self._wait(lambda: answer.search(self._heard) is not None, wait_s)
+            self._reader.wait(lambda: answer.search(self._heard) is not None, wait_s)
             if (found := answer.search(self._heard)) is not None:
                 return found.group(1).decode("ascii", "replace").strip()
             # Only now: what it finds invalid may have been half a command of somebody else's, or the empty line before.
@@ -233,50 +214,31 @@ class Kvh1775:
             _CABLE,
         )
 
-    @staticmethod
-    def _waits(timeout_s: float) -> Collection[float]:
-        return [timeout_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
-
-    def _wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether it was so in time. Raises what went wrong meanwhile."""
-        with self._news:
-            done = self._news.wait_for(lambda: until() or self._fault is not None, timeout_s)
-            if self._fault is not None:
-                raise self._fault
-            return done
-
     def _write(self, command: str) -> None:
         """The leading line end finishes whatever half a command it may have heard before."""
         try:
             self._serial.write(b"\r\n" + command.encode("ascii") + b"\r\n")
         except OSError as error:
-            raise self._port_closed(error) from error
-
-    def _port_closed(self, error: Exception) -> SensorError:
-        return SensorError("kvh_link_lost", f"sensors.{self._sensor}: the port {self._port} closed: {error}", _CABLE)
+            raise self._failed(error) from error
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _read(self) -> None:
-        try:
-            while not self._closing.is_set():
-                self._take(self._serial.read(), time.monotonic())
-        except OSError as error:
-            self.fail(self._port_closed(error))
-        except SensorError as error:
-            self.fail(error)
-        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
-            self.fail(SensorError("kvh_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log"))
-        with self._news:
-            self._news.notify_all()
+    def _failed(self, error: Exception) -> SensorError:
+        """The fault that an error of the port or of a consumer is."""
+        if isinstance(error, SensorError):
+            return error
+        if isinstance(error, OSError):
+            closed = f"sensors.{self._sensor}: the port {self._port} closed: {error}"
+            return SensorError("kvh_link_lost", closed, _CABLE)
+        return SensorError("kvh_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
 
     def _take(self, data: bytes, host_time_s: float) -> None:
         decoded = self._messages.feed(data)
-        with self._news:
-            silent_s = self._silence.lasts_s
+        with self._reader.news:
+            silent_s = self._reader.silence.lasts_s
             if len(decoded.messages):
-                self._silence.heard()
+                self._reader.silence.heard()
             else:
-                self._silence.idle()
+                self._reader.silence.idle()
             if not data:
                 return
             self._bytes_seen += len(data)
@@ -284,7 +246,7 @@ class Kvh1775:
             self._heard = (self._heard + data)[-KEPT_BYTES:]
             self._tests += decoded.tests
             counter = self._counter
-            self._news.notify_all()
+            self._reader.news.notify_all()
         if counter is None or not len(decoded.messages):
             return
         if decoded.tests:

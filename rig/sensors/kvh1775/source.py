@@ -1,7 +1,7 @@
 """A configured KVH 1775 as a source of samples: set up as the run needs it, its messages made samples."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing
 from math import radians
 from typing import Any
 
@@ -193,22 +193,17 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
     )
 
 
-@contextmanager
 def kvh1775(
     name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
-) -> Iterator[Kvh1775Source]:
+) -> closing[Kvh1775Source]:
     """The instrument for the length of the `with` block. Raises SensorError as `Kvh1775Source`."""
-    source = Kvh1775Source(name, section, on_samples, patience=patience)
-    try:
-        yield source
-    finally:
-        source.close()
+    return closing(Kvh1775Source(name, section, on_samples, patience=patience))
 
 
 def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
     """What there is, and what is wrong with it; nothing in its memory is changed. Raises SensorError as `Kvh1775`."""
     line = _line_of(section)
-    with Kvh1775(name, line.port, line.baud) as driver:
+    with closing(Kvh1775(name, line.port, line.baud)) as driver:
         yield f"KVH 1775 at {line.port}: serial number {driver.serial_number}"
         for setting, value in corrections(driver.settings, wanted_of(section)).items():
             yield f"{setting} is {driver.settings[setting]}; a run sets it to {value}"

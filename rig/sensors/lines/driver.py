@@ -3,12 +3,8 @@
 Nothing is sent to the device. It says nothing of itself, so that it is what the configuration says shows in its lines.
 """
 
-import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +17,8 @@ from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError, no_port
 from rig.sensors.lines.decoding import Decoded, LineReader
 from rig.sensors.lines.stamping import Stamper
-from rig.sensors.silence import USUAL, Patience, Silence
+from rig.sensors.port_reader import PortReader
+from rig.sensors.silence import USUAL, Patience
 
 LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
 SHOWN = 60  # characters of a line that is quoted
@@ -65,7 +62,7 @@ class Counts:
 
 
 class LinesDevice:
-    """A device on a serial port or `socket://host:port`; a context manager. `on_values` runs on its thread.
+    """A device on a serial port or `socket://host:port`, until `close`. `on_values` runs on its thread.
 
     What goes wrong is a SensorError whose name begins with `lines_`; all messages name `sensor`.
     """
@@ -86,34 +83,22 @@ class LinesDevice:
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
         self._on_values, self._patience = on_values, patience
-        self._reader = LineReader(section)
+        self._lines = LineReader(section)
         self.counts = Counts()
         self._stamper: Stamper | None = None  # while it streams
         self._skipped = 0  # lines that were no samples since the last that was
         self._seen: list[Array] = []  # until it is known what comes
-        self._fault: SensorError | None = None
-        self._news = threading.Condition()
-        self._closing = threading.Event()
-        self._silence = Silence()
         try:
             self._serial = SerialPort(line.port, line.baud)
         except OSError as error:
             raise no_port(line.port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
-        self._thread = threading.Thread(target=self._read, name=f"lines {line.port}", daemon=True)
-        self._thread.start()
+        self._reader = PortReader(f"lines {line.port}", self._serial.read, self._take, self._failed)
+        self._reader.start()
         try:
             self.rate_hz = self._look(patience.first_s)
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def where(self) -> str:
@@ -127,10 +112,10 @@ class LinesDevice:
 
     def start(self) -> None:
         """Start to hand everything to `on_values`, from the next line on."""
-        with self._news:
+        with self._reader.news:
             self._stamper = Stamper(self._section, self._rate_hz)
             self._skipped = 0
-            self._silence.restart()
+            self._reader.silence.restart()
 
     @property
     def lost(self) -> int:
@@ -142,37 +127,28 @@ class LinesDevice:
 
         `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
         """
-        if self._fault is not None:
-            raise self._fault
-        with self._news:
-            silent_s = self._silence.seen_by(clock_s)
+        silent_s = self._reader.silent_s(clock_s)
         if self._stamper is not None and silent_s > self._patience.silent_s + 2 / self._rate_hz:
             raise SensorError("lines_link_lost", f"{self.where} has sent no sample for {silent_s:.1f} s", _CABLE)
 
     def fail(self, error: SensorError) -> None:
         """Makes `error` what `check` raises, unless there is one already."""
-        self._fault = self._fault or error
+        self._reader.fail(error)
 
     def close(self) -> None:
         """Ends the thread and closes the port. May be called twice."""
-        if self._closing.is_set():
+        if self._reader.closed:
             return
-        self._closing.set()
-        self._thread.join()
+        self._reader.close()
         self._serial.close()
 
     # -- what comes at all -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
         """The rate of its samples by its own time, NaN where it has none. Raises as the constructor does."""
         enough = LOOK_SAMPLES if self._section.time is not None else 3
-        with self._news:
-            came = self._news.wait_for(
-                lambda: self.counts.samples >= enough or self._fault is not None or self._lasted(), timeout_s
-            )
-            if self._fault is not None:
-                raise self._fault
-            if not came and not self.counts.samples:
-                raise self._why_no_sample(timeout_s)
+        came = self._reader.wait(lambda: self.counts.samples >= enough or self._lasted(), timeout_s)
+        if not came and not self.counts.samples:
+            raise self._why_no_sample(timeout_s)
         rate_hz = self._measured_hz()
         if abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE:
             raise SensorError(
@@ -216,7 +192,7 @@ class LinesDevice:
         return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s
 
     def _why_no_sample(self, timeout_s: float) -> SensorError:
-        reader, counts = self._reader, self.counts
+        reader, counts = self._lines, self.counts
         if not reader.bytes_seen:
             return SensorError("lines_silent", f"{self.where} has sent nothing within {timeout_s:g} s", _CABLE)
         if reader.unprintable > UNPRINTABLE * reader.bytes_seen or not (counts.before or counts.comments):
@@ -234,33 +210,28 @@ class LinesDevice:
         )
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _read(self) -> None:
-        try:
-            while not self._closing.is_set():
-                self._take(self._serial.read(), time.monotonic())
-        except OSError as error:
-            self.fail(SensorError("lines_link_lost", f"{self.where}: the port closed: {error}", _CABLE))
-        except SensorError as error:
-            self.fail(SensorError(error.name, f"{self.where}: {error.what}", error.remedy))
-        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
-            self.fail(SensorError("lines_not_taken", f"{self.where}: {error!r}", "See the run's log"))
-        with self._news:
-            self._news.notify_all()
+    def _failed(self, error: Exception) -> SensorError:
+        """The fault that an error of the port, of the lines or of a consumer is."""
+        if isinstance(error, OSError):
+            return SensorError("lines_link_lost", f"{self.where}: the port closed: {error}", _CABLE)
+        if isinstance(error, SensorError):
+            return SensorError(error.name, f"{self.where}: {error.what}", error.remedy)
+        return SensorError("lines_not_taken", f"{self.where}: {error!r}", "See the run's log")
 
     def _take(self, data: bytes, host_time_s: float) -> None:
-        decoded = self._reader.feed(data)
-        with self._news:
+        decoded = self._lines.feed(data)
+        with self._reader.news:
             if len(decoded.values):
-                self._silence.heard()
+                self._reader.silence.heard()
             else:
-                self._silence.idle()
+                self._reader.silence.idle()
             if not data:
                 return
             self.counts.add(decoded)
             stamper = self._stamper
             if stamper is None and len(decoded.values):
                 self._seen.append(decoded.values)
-            self._news.notify_all()
+            self._reader.news.notify_all()
         if stamper is None:
             return
         self._refuse_damage()

@@ -1,9 +1,9 @@
 """A configured device that prints lines as a source of samples: its numbers made counts in SI units."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing
+from dataclasses import dataclass, replace
 from math import radians
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +12,16 @@ from rig.config.lines_section import (
     ACCELEROMETER,
     GYROSCOPE,
     MAGNETOMETER,
+    SCALAR_UNITS,
     SECONDS,
     LineAccelerationSection,
     LineFieldSection,
     LineRateSection,
     LinesSection,
 )
-from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
+from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
 from rig.data.channel import Channel, of_thermometer, of_three_axes
-from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -40,6 +41,7 @@ AT_THE_END = 1 - 1e-4  # of the range, where readings count as saturated: a coun
 FIELD_FULL_SCALE_T = 1e-3
 DEGREES_PER_COUNT = 0.01
 LookedAt = str | SensorError
+AXES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
 _OfTriad = LineRateSection | LineAccelerationSection | LineFieldSection
 
 
@@ -48,11 +50,10 @@ class LinesSource:
 
     def __init__(self, name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL) -> None:
         """Raises SensorError as `LinesDevice`."""
-        self._name, self._on_samples = name, on_samples
-        line, self._section = _parts_of(section)
-        self._described = describe(name, section)
-        self._field_name, self._field = field_name(name), describe_field(name, section)
-        self._device = LinesDevice(name, line, self._section, section.rate_hz, self._take, patience=patience)
+        self._on_samples = on_samples
+        line, lines = _parts_of(section)
+        self._read = dict(_read(name, section))
+        self._device = LinesDevice(name, line, lines, section.rate_hz, self._take, patience=patience)
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -61,9 +62,8 @@ class LinesSource:
 
     @property
     def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The one there is, and its magnetometer if it prints one."""
-        field = {} if self._field is None else {self._field_name: self._field}
-        return {self._name: self._described, **field}
+        """The gyroscope, the magnetometer if it prints one, and what it prints that has no axes."""
+        return {name: sensor for name, (sensor, _) in self._read.items()}
 
     def start(self) -> None:
         """Start the device's samples, as of `SampleSource`."""
@@ -79,61 +79,63 @@ class LinesSource:
 
     def _take(self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float) -> None:
         """Hand over the lines' numbers as samples, on the reader's thread."""
-        columns = self._section.columns
-        for name, sensor in self.sensors.items():
+        for name, (sensor, columns) in self._read.items():
             samples = np.zeros(len(values), sensor.sample_dtype)
             samples["sequence"], samples["board_time_us"] = numbers, times_us
             samples["host_time_s"] = host_time_s
-            for channel in sensor.channels:
-                if channel.quantity == TEMPERATURE.name:
-                    samples[channel.column] = self._temperatures(values, channel)
-                    continue
-                section, axes = _described_by(self._section, channel.quantity)
-                read = values[:, [columns.index(axis) for axis in axes]] * _unit(section)
-                most = np.iinfo(np.int32).max
-                samples[channel.column] = np.clip(np.rint(read / channel.unit_per_count), -most, most)
+            for channel, printed in zip(sensor.channels, columns, strict=True):
+                if printed.places:  # what is stated of a temperature has none: its counts stay zero
+                    samples[channel.column] = printed.counts(values, channel)
             self._on_samples(name, samples)
 
-    def _temperatures(self, values: Array, channel: Channel) -> Any:
-        if "temperature" not in self._section.columns:
-            return 0  # counts above what is stated
-        told = self._section.temperature
-        celsius = values[:, self._section.columns.index("temperature")] * told.scale + told.offset_c
-        most = np.iinfo(np.int16).max
-        return np.clip(np.rint((celsius - channel.offset) / channel.unit_per_count), -most, most)
+
+@dataclass(frozen=True, slots=True)
+class _Printed:
+    """Where a channel's numbers stand in a line; a printed 1 is `size` in the channel's unit, a printed 0 `zero`."""
+
+    places: tuple[int, ...]
+    size: float = 1.0
+    zero: float = 0.0
+
+    def counts(self, values: Array, channel: Channel) -> Array:
+        """The channel's numbers (n,) or (n, 3) of printed `values` (n, columns)."""
+        read = values[:, self.places].reshape(len(values), *channel.measures.shape) * self.size + self.zero
+        counts: Array = (read - channel.offset) / channel.unit_per_count
+        if channel.type == "<f8":
+            return counts
+        most = np.iinfo(channel.type).max
+        return np.clip(np.rint(counts), -most, most)
 
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:
-    """What a reader of its samples must know."""
+    """What a reader of the gyroscope's samples must know."""
+    _, (sensor, _) = next(_read(name, section))
+    return sensor
+
+
+def _read(name: str, section: SensorSection) -> Iterator[tuple[str, tuple[RecordedSensor, tuple[_Printed, ...]]]]:
+    """What is read of the lines, by names, the gyroscope first: as it is recorded, and where each channel stands."""
     _, lines = _parts_of(section)
-    channels = [_channel(RATE, lines.rate, radians(section.range_deg_s)), _thermometer(lines)]
+    own = [_triad(lines, RATE, lines.rate, radians(section.range_deg_s)), _thermometer(lines)]
     if section.acceleration is not None and lines.acceleration is not None:
         range_m_s2 = (section.acceleration.range_g or 0.0) * STANDARD_GRAVITY_M_S2
-        channels.append(_channel(ACCELERATION, lines.acceleration, range_m_s2))
-    return RecordedSensor(
-        part=section.part,
-        serial_number=section.serial_number,
-        rate_hz=section.rate_hz,
-        channels=tuple(channels),
-        mounting=recorded_mounting(section.mounting),
-        clock=name,
-        stamp_std_s=stamp_std_s(lines, section.rate_hz),
-    )
+        own.append(_triad(lines, ACCELERATION, lines.acceleration, range_m_s2))
 
+    def recorded(part: str, *channels: tuple[Channel, _Printed]) -> tuple[RecordedSensor, tuple[_Printed, ...]]:
+        of, printed = zip(*channels, strict=True)
+        mounting = recorded_mounting(section.mounting)
+        return RecordedSensor(part, section.serial_number, section.rate_hz, of, mounting, clock=name), printed
 
-def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
-    """How a recording describes the device's magnetometer; None where it prints none."""
-    _, lines = _parts_of(section)
-    if lines.field is None:
-        return None
-    return RecordedSensor(
-        part="lines_magnetometer",
-        serial_number=section.serial_number,
-        rate_hz=section.rate_hz,
-        channels=(_channel(FIELD, lines.field, FIELD_FULL_SCALE_T),),
-        mounting=recorded_mounting(section.mounting),
-        clock=name,
-    )
+    gyroscope, printed = recorded(section.part, *own)
+    yield name, (replace(gyroscope, stamp_std_s=stamp_std_s(lines, section.rate_hz)), printed)
+    if lines.field is not None:
+        field = _triad(lines, FIELD, lines.field, FIELD_FULL_SCALE_T)
+        yield field_name(name), recorded("lines_magnetometer", field)
+    for scalar, told in lines.scalars.items():
+        quantity, size, zero = SCALAR_UNITS[told.unit]
+        channel = Channel(quantity, quantity, "<f8", 1.0)
+        place = _Printed((lines.columns.index(scalar),), told.scale * size, zero)
+        yield scalar_name(name, scalar), recorded(f"lines_{channel.measures.sensor}", (channel, place))
 
 
 def stamp_std_s(lines: LinesSection, rate_hz: float) -> float | None:
@@ -145,22 +147,17 @@ def stamp_std_s(lines: LinesSection, rate_hz: float) -> float | None:
     return None
 
 
-@contextmanager
 def lines(
     name: str, section: SensorSection, on_samples: OnSamples, *, patience: Patience = USUAL
-) -> Iterator[LinesSource]:
+) -> closing[LinesSource]:
     """The device for the length of the `with` block. Raises SensorError as `LinesSource`."""
-    source = LinesSource(name, section, on_samples, patience=patience)
-    try:
-        yield source
-    finally:
-        source.close()
+    return closing(LinesSource(name, section, on_samples, patience=patience))
 
 
 def look(name: str, section: SensorSection) -> Iterator[LookedAt]:
     """What there is, and what is wrong with it. Raises SensorError as `LinesDevice`."""
     line, told = _parts_of(section)
-    with LinesDevice(name, line, told, section.rate_hz) as device:
+    with closing(LinesDevice(name, line, told, section.rate_hz)) as device:
         counts = device.counts
         rate = "" if np.isnan(device.rate_hz) else f", {device.rate_hz:.4g} a second by its own time"
         yield f"lines at {line.port}: {counts.samples} samples{rate}"
@@ -174,40 +171,29 @@ def look(name: str, section: SensorSection) -> Iterator[LookedAt]:
             if section_of is not None:
                 mean = device.seen[:, [told.columns.index(axis) for axis in axes]].mean(axis=0) * section_of.scale
                 yield f"{what}: {' '.join(f'{value:+.4g}' for value in mean)} {section_of.unit}, the mean"
+        for called, scalar in told.scalars.items():
+            mean = device.seen[:, told.columns.index(called)].mean() * scalar.scale
+            yield f"{called}: {mean:.6g} {scalar.unit}, the mean"
         if (std_s := stamp_std_s(told, section.rate_hz)) is not None:
             yield f"its samples are timed to {1e3 * std_s:.2g} ms, which is a line of the budget"
 
 
-def _channel(quantity: Quantity, section: _OfTriad, full_scale: float) -> Channel:
+def _triad(lines: LinesSection, quantity: Quantity, section: _OfTriad, full_scale: float) -> tuple[Channel, _Printed]:
     """Three axes in steps of the last digit that is printed, where that is stated and fits 32 bits."""
-    step = 0.0 if section.decimals is None else _unit(section) * 10.0**-section.decimals
+    unit = section.scale * UNITS[section.unit]
+    step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
-    return of_three_axes(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
+    channel = of_three_axes(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
+    return channel, _Printed(tuple(map(lines.columns.index, AXES[quantity])), unit)
 
 
-def _thermometer(section: LinesSection) -> Channel:
-    told = section.temperature
+def _thermometer(lines: LinesSection) -> tuple[Channel, _Printed]:
+    told = lines.temperature
     if told.stated_c is not None:  # a thermometer whose steps are so wide that it shows no change
-        return of_thermometer(told.stated_within_k, told.stated_c)
+        return of_thermometer(told.stated_within_k, told.stated_c), _Printed(())
     step = 0.0 if told.decimals is None else told.scale * 10.0**-told.decimals
-    return of_thermometer(max(step, DEGREES_PER_COUNT), 0.0)
-
-
-def _unit(section: _OfTriad) -> float:
-    """What a printed 1 is in the SI unit."""
-    return section.scale * UNITS[section.unit]
-
-
-def _described_by(section: LinesSection, quantity: str) -> tuple[_OfTriad, tuple[str, str, str]]:
-    found: dict[str, tuple[_OfTriad | None, tuple[str, str, str]]] = {
-        RATE.name: (section.rate, GYROSCOPE),
-        ACCELERATION.name: (section.acceleration, ACCELEROMETER),
-        FIELD.name: (section.field, MAGNETOMETER),
-    }
-    told, axes = found[quantity]
-    if told is None:
-        raise ValueError("the configuration lets no quantity pass that it does not describe")
-    return told, axes
+    place = lines.columns.index("temperature")
+    return of_thermometer(max(step, DEGREES_PER_COUNT), 0.0), _Printed((place,), told.scale, told.offset_c)
 
 
 def _parts_of(section: SensorSection) -> tuple[OwnPortSection, LinesSection]:

@@ -8,17 +8,16 @@ import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from rig.sensors.errors import SensorError, no_port
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
 from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
 from rig.sensors.mavlink.port import open_port
+from rig.sensors.port_reader import PortReader
 from rig.sensors.silence import USUAL, Patience, Silence
 
-ATTEMPTS = 4  # times something is asked; each waits twice as long as the one before
 HEARTBEAT_S = 1.0
 OURS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
 GROUND_STATION, NO_AUTOPILOT = 6, 8  # MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID
@@ -48,7 +47,7 @@ class Autopilot:
 
 
 class Link:
-    """An autopilot at a port; a context manager. `on_messages` gets what is in `wanted`, on the reader's thread.
+    """An autopilot at a port, until `close`. `on_messages` gets what is in `wanted`, on the reader's thread.
 
     What goes wrong is a SensorError; all messages name `sensor`, as the configuration does.
     """
@@ -81,29 +80,19 @@ class Link:
         self._answers: dict[int, int] = {}
         self._version: Any = None
         self._streaming = False
-        self._fault: SensorError | None = None
-        self._silence = Silence()
-        self._news, self._sending = threading.Condition(), threading.Lock()
-        self._closing = threading.Event()
+        self._sending = threading.Lock()
+        self._beaten_s = 0.0
         try:
             self._port = open_port(port, baud)
         except OSError as error:
             raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="mavlink.port") from error
-        self._reader = threading.Thread(target=self._read, name=f"mavlink {port}", daemon=True)
+        self._reader = PortReader(f"mavlink {port}", self._read, self._take, self._failed)
         self._reader.start()
         try:
             self._find()
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def known(self) -> Autopilot:
@@ -119,14 +108,14 @@ class Link:
         """
         needed = set(needed)
         names = needed | set(others)
-        with self._news:
+        with self._reader.news:
             for name in names:
                 self._parameters.pop(name, None)
-        for wait_s in self._waits():
+        for wait_s in self._patience.attempts():
             for name in sorted(names - self._parameters.keys()):
                 self._send(self._mavlink.MAVLink_param_request_read_message(*self._address, name.encode(), -1))
-            self._wait(lambda: names <= self._parameters.keys(), wait_s)
-            if needed <= self._parameters.keys() and wait_s > 2 * self._waits()[0]:
+            self._reader.wait(lambda: names <= self._parameters.keys(), wait_s)
+            if needed <= self._parameters.keys() and wait_s > 2 * self._patience.attempts()[0]:
                 break
         found = {name: self._parameters[name] for name in names & self._parameters.keys()}
         if not found:
@@ -139,13 +128,13 @@ class Link:
 
     def set_parameter(self, parameter: Parameter) -> Parameter:
         """Set it to those four bytes, and what the autopilot answers. Raises SensorError `autopilot_not_set`."""
-        with self._news:
+        with self._reader.news:
             self._parameters.pop(parameter.name, None)
         value = field_as_number(parameter.field)
-        for wait_s in self._waits():
+        for wait_s in self._patience.attempts():
             name = parameter.name.encode()
             self._send(self._mavlink.MAVLink_param_set_message(*self._address, name, value, parameter.type))
-            if self._wait(lambda: parameter.name in self._parameters, wait_s):
+            if self._reader.wait(lambda: parameter.name in self._parameters, wait_s):
                 return self._parameters[parameter.name]
         raise SensorError(
             "autopilot_not_set",
@@ -167,9 +156,9 @@ class Link:
 
     def identify(self) -> None:
         """Ask for its version and its own number, which some do not tell."""
-        for wait_s in self._waits()[:2]:
+        for wait_s in self._patience.attempts()[:2]:
             self._send(self._command_message(REQUEST_MESSAGE, AUTOPILOT_VERSION, 0.0))
-            if self._wait(lambda: self._version is not None, wait_s):
+            if self._reader.wait(lambda: self._version is not None, wait_s):
                 break
         if self._version is not None:
             version = self._version.flight_sw_version
@@ -180,35 +169,31 @@ class Link:
 
     def start(self) -> None:
         """Start to take the stream's silence for a fault."""
-        with self._news:
-            self._streaming, self._silence = True, Silence()
+        with self._reader.news:
+            self._streaming, self._reader.silence = True, Silence()
 
     def check(self, clock_s: float | None = None) -> None:
         """Raises what went wrong meanwhile: `mavlink_link_lost`, `autopilot_armed`, what a consumer raised.
 
         `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
         """
-        if self._fault is not None:
-            raise self._fault
-        with self._news:
-            silent_s = self._silence.seen_by(clock_s)
+        silent_s = self._reader.silent_s(clock_s)
         if self._streaming and silent_s > self._patience.silent_s:
             raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
         """Whether it was so in time. Raises what went wrong meanwhile."""
-        return self._wait(until, timeout_s)
+        return self._reader.wait(until, timeout_s)
 
     def close(self) -> None:
         """Lets messages come as often as they did before, and closes the port. May be called twice."""
-        if self._closing.is_set():
+        if self._reader.closed:
             return
         with suppress(SensorError):
             for message in self.wanted if self.autopilot is not None else ():
                 number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
                 self._send(self._command_message(SET_INTERVAL, number, 0.0))
-        self._closing.set()
-        self._reader.join()
+        self._reader.close()
         self._port.close()
 
     # -- inside ----------------------------------------------------------------------------------------------------
@@ -221,7 +206,7 @@ class Link:
         return self.known.system, self.known.component
 
     def _find(self) -> None:
-        if not self._wait(lambda: self.autopilot is not None, self._patience.first_s):
+        if not self._reader.wait(lambda: self.autopilot is not None, self._patience.first_s):
             if self._others_seen:
                 raise SensorError(
                     "mavlink_other_device",
@@ -248,22 +233,12 @@ class Link:
             "Disarm it, and take the propellers off before anything else",
         )
 
-    def _waits(self) -> list[float]:
-        return [self._patience.first_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
-
-    def _wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        with self._news:
-            done = self._news.wait_for(lambda: until() or self._fault is not None, timeout_s)
-            if self._fault is not None:
-                raise self._fault
-            return done
-
     def _command(self, command: int, first: float, second: float) -> int | None:
-        with self._news:
+        with self._reader.news:
             self._answers.pop(command, None)
-        for wait_s in self._waits():
+        for wait_s in self._patience.attempts():
             self._send(self._command_message(command, first, second))
-            if self._wait(lambda: command in self._answers, wait_s):
+            if self._reader.wait(lambda: command in self._answers, wait_s):
                 return self._answers[command]
         return None
 
@@ -276,34 +251,27 @@ class Link:
                 self._port.write(message.pack(self._parser))
                 self._parser.seq = (self._parser.seq + 1) % 256
         except OSError as error:
-            raise self._port_closed(error) from error
-
-    def _port_closed(self, error: Exception) -> SensorError:
-        return SensorError("mavlink_link_lost", f"{self._where}: the port closed: {error}", _CABLE)
+            raise self._failed(error) from error
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _read(self) -> None:
-        beaten_s = 0.0
-        heartbeat = self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3)
-        try:
-            while not self._closing.is_set():
-                if time.monotonic() - beaten_s > HEARTBEAT_S:
-                    beaten_s = time.monotonic()
-                    self._send(heartbeat)
-                self._take(self._port.read(), time.monotonic())
-        except OSError as error:
-            self._fault = self._fault or self._port_closed(error)
-        except SensorError as error:
-            self._fault = self._fault or error
-        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
-            failed = SensorError("mavlink_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
-            self._fault = self._fault or failed
-        with self._news:
-            self._news.notify_all()
+    def _read(self) -> bytes:
+        """What the port brings; the autopilot is told every second that somebody listens."""
+        if time.monotonic() - self._beaten_s > HEARTBEAT_S:
+            self._beaten_s = time.monotonic()
+            self._send(self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3))
+        return self._port.read()
+
+    def _failed(self, error: Exception) -> SensorError:
+        """The fault that an error of the port or of a consumer is."""
+        if isinstance(error, SensorError):
+            return error
+        if isinstance(error, OSError):
+            return SensorError("mavlink_link_lost", f"{self._where}: the port closed: {error}", _CABLE)
+        return SensorError("mavlink_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
 
     def _take(self, data: bytes, host_time_s: float) -> None:
         found: list[tuple[Any, bool]] = []
-        with self._news:
+        with self._reader.news:
             self._bytes_seen += len(data)
             heard = False
             for message in (self._parser.parse_buffer(data) or []) if data else []:
@@ -317,17 +285,17 @@ class Link:
                     found.append((message, self.counter.lost == lost))
             # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
             if found if self._streaming else heard:
-                self._silence.heard()
+                self._reader.silence.heard()
             else:
-                self._silence.idle()
+                self._reader.silence.idle()
             if self.armed and self._streaming:
                 raise self._armed()
             if data:
-                self._news.notify_all()
+                self._reader.news.notify_all()
         if found and self._on_messages is not None:
             self._on_messages(found, host_time_s)
-            with self._news:
-                self._news.notify_all()
+            with self._reader.news:
+                self._reader.news.notify_all()
 
     def _is_its(self, message: Any) -> bool:
         """Whether the autopilot sent it; the first heartbeat of one says which it is."""

@@ -1,7 +1,7 @@
 """The configured IMUs of one autopilot as a source of samples: rates asked for, corrections undone."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from math import radians
 from typing import Any
@@ -213,7 +213,7 @@ def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
     """What there is and what is wrong with it; nothing is changed. Raises SensorError as `Link`."""
     (first, section), *_ = sections.items()
     line = line_of(section)
-    with Link(first, line.port, line.baud) as link:
+    with closing(Link(first, line.port, line.baud)) as link:
         link.identify()
         yield f"{link.known.words}, at {line.port}"
         yield from unfinished(link)

@@ -123,6 +123,7 @@ class Printer:
         values["time"] = self._time(at_s)
         sequence = self._samples % prints.sequence_wrap if prints.sequence_wrap else self._samples
         values["sequence"] = str(sequence)
+        values |= {name: f"{value:.{USUAL_DECIMALS}f}" for name, value in self._section.scalars.items()}
         numbers = [values.get(name, "0") for name in prints.columns]
         if prints.keys:
             text = ",".join(key + number for key, number in zip(prints.keys, numbers, strict=True))
