@@ -49,6 +49,8 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         where = ".".join(map(str, first["loc"]))
         why = f"{where}{': ' if where else ''}{first['msg']}"
         raise Refused("not_a_result", f"{file} is no result of {what}: {why}", remedy) from error
+    except UnicodeDecodeError as error:
+        raise Refused("not_a_result", f"{file} is no result of {what}: it is not text", remedy) from error
     except json.JSONDecodeError as error:
         raise Refused("not_a_result", f"{file} is no result of {what}: it is not JSON: {error}", remedy) from error
     except (ValueError, RecursionError) as error:

@@ -240,6 +240,15 @@ def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     assert slow.chi_square == pytest.approx(usual.chi_square, rel=0.02)
 
 
+def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
+    recorded = handle(TWELVE, 6)
+    usual, uneven = (
+        next(line.std[:3] for line in solved(each).budget.contributors if line.name == "noise")
+        for each in (recorded, late(recorded))
+    )
+    assert (uneven > 3 * usual).all()
+
+
 @pytest.mark.slow
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     wrong = Turn(1, Mistake("short", 5.0))

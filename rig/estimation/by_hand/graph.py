@@ -34,6 +34,7 @@ BIAS_STD_RAD_S = 1.0
 EARTH_STD_RAD_S = 5e-5  # of each axis: a face that is come back to reads the same of it
 LEAN_RAD = 0.02
 NONLINEARITY = 1e-4  # of the angle of a move: what is known of parts
+BUT_GAPS = 0.95
 QUARTER_RAD = np.pi / 2  # of which `Sizes.of_angle` is said; it grows with the root, as errors of many pushes do
 ALONG_M_S2 = 0.1  # what an accelerometer's own errors may be along the vertical
 HEADING_STD_RAD = 1.0
@@ -119,6 +120,15 @@ class Graph:
         """The angle random walk, of the scatter at rest as white noise."""
         return self.noise_rad_s * float(np.sqrt(np.median(np.diff(self.session.time_s))))
 
+    @cached_property
+    def stamp_std_s(self) -> float:
+        """The scatter of time stamps, of their second differences but for the largest, which gaps make.
+
+        Stamps that are right and uneven cannot be told from even ones that are not.
+        """
+        apart = np.sort(np.abs(np.diff(self.session.time_s, 2)))
+        return float(np.sqrt(np.mean(np.square(apart[: round(BUT_GAPS * len(apart))])) / 6))
+
 
 def factors(graph: Graph) -> Iterator[Factor]:
     """Every factor of the graph where it is."""
@@ -174,6 +184,7 @@ def _move(graph: Graph, row: int) -> Factor:
     design[:, first], design[:, second] = np.eye(3), -between
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(moved.durations_s[row])),
+        "stamps": np.full(3, graph.stamp_std_s * moved.changes_rad_s[row]),
         "nonlinearity": np.full(3, NONLINEARITY * moved.paths_rad[row]),
         "of_angle": np.full(3, sizes.of_angle * np.sqrt(QUARTER_RAD * moved.paths_rad[row])),
     }

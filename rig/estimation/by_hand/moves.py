@@ -24,6 +24,8 @@ class Moved:
       (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9).
     - `swept_rad` (k, 3): the integral of the reading less offset and g-sensitivity.
     - `durations_s` (k,), `paths_rad` (k,): how far it turned in all, there and back.
+    - `changes_rad_s` (k,): the root of the sum of squares of how the rate changed from sample to sample, which makes an
+      angle of what time stamps err by.
     """
 
     rotations: Array
@@ -33,13 +35,14 @@ class Moved:
     swept_rad: Array
     durations_s: Array
     paths_rad: Array
+    changes_rad_s: Array
 
 
 def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up: Array) -> Moved:
     """The moves by F (3, 3), biases (N, 3) at the rests, G (3, 3) and the vertical `up` (N, 3) in the body at each."""
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)
-    rotations, by_theta, by_gravity, swept, durations, paths = [], [], [], [], [], []
+    rotations, by_theta, by_gravity, swept, durations, paths, changes = [], [], [], [], [], [], []
     for row, move in enumerate(session.moves):
         inside = _inside(session.time_s, move.start_s, move.end_s)
         at_s = session.time_s[inside]
@@ -56,6 +59,7 @@ def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up
         swept.append(np.trapezoid(corrected, at_s, axis=0))
         durations.append(float(np.ptp(at_s)))
         paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s, axis=1), at_s)))
+        changes.append(float(np.linalg.norm(there.rates_rad_s[2:] - there.rates_rad_s[:-2]) / 2))
     theta = _stacked(by_theta, (3, 12))
     return Moved(
         _stacked(rotations, (3, 3)),
@@ -65,6 +69,7 @@ def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up
         _stacked(swept, (3,)),
         np.array(durations),
         np.array(paths),
+        np.array(changes),
     )
 
 

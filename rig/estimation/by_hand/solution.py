@@ -24,7 +24,7 @@ ENOUGH = 0.02  # U (k = 2) of the scale, beyond which nothing has been told
 REAL_HANDS = 5e-4  # of the scale: by so much (1 u) recordings of real hands have been seen to disagree with themselves
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
 LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
-    "noise": ("A", ("noise", "acceleration noise"), "scatter at rest"),
+    "noise": ("A", ("noise", "acceleration noise", "stamps"), "scatter at rest, and of the time stamps"),
     "placement": (
         "A",
         ("repeat", "closure", "box", "table", "lean", "acceleration", "along", "level", "heading", "held"),
