@@ -197,8 +197,9 @@ def test_over_whole_turns_the_noise_averages_out() -> None:
         calibrated = uncertain[:3] * TURN_RATE + uncertain[3:] * calibrated_gyro().solution.scale
         assert np.all(np.abs(turn.error_rad_s) < 4 * np.hypot(turn.std_rad_s, calibrated))
         assert turn.std_rad_s.max() < 1e-4
-    assert verified().before is not None
-    assert [(turn.joint_name, turn.direction) for turn in verified().before.revolutions] == [
+    before = verified().before
+    assert before is not None
+    assert [(turn.joint_name, turn.direction) for turn in before.revolutions] == [
         (turn.joint_name, turn.direction) for turn in verified().after.revolutions
     ]
 
@@ -218,8 +219,9 @@ def test_the_filters_delay_is_told_and_taken_out() -> None:
     (delay_s,), (std_s,) = verified().after.delay_s, verified().after.delay_std_s
     assert delay_s == pytest.approx(0.004, abs=4 * std_s)
     assert std_s < 1e-4
-    assert verified().before is not None
-    assert abs(verified().before.delay_s[0]) < 4 * verified().before.delay_std_s[0]
+    before = verified().before
+    assert before is not None
+    assert abs(before.delay_s[0]) < 4 * before.delay_std_s[0]
 
 
 def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
@@ -242,13 +244,14 @@ def test_the_recordings_of_a_resumed_run_count_together() -> None:
             kept += [recorded] if current in sweeps else []
         return replace(movement(), events=tuple(kept))
 
-    assert verified().before is not None
+    before = verified().before
+    assert before is not None
     parts = observe_runs([part(range(2)), part(range(0)), part(range(2, 6))])
     resumed = verify("gyro", KNOWN, seen_after(), parts, calibrated_gyro())
     assert resumed.before is not None
     assert len(resumed.before.delay_s) == 2
-    assert resumed.before.movement.samples == verified().before.movement.samples
-    np.testing.assert_allclose(resumed.before.movement.rms_rad_s, verified().before.movement.rms_rad_s)
+    assert resumed.before.movement.samples == before.movement.samples
+    np.testing.assert_allclose(resumed.before.movement.rms_rad_s, before.movement.rms_rad_s)
     np.testing.assert_allclose(resumed.rotation.matrix, verified().rotation.matrix, atol=1e-6)
 
 
