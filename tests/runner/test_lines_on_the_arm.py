@@ -17,6 +17,10 @@ from support.worlds import fresh_host, merge
 
 UNEVEN_S = 0.04  # both sides of jitter_ms
 LINES = CONFIGS / "lines.yaml"
+QUICK: dict[str, Any] = {
+    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "limits": {"scale_std": 0.01, "bias_std_rad_s": 0.05},
+}
 TRUTH = np.array([1.011, 0.993, 1.006, 0.012, -0.02, 0.007])
 
 
@@ -63,7 +67,7 @@ def test_a_device_that_prints_lines_is_calibrated_on_the_arm_and_its_barometer_r
     columns = ["time", "gx", "gy", "gz", "ax", "ay", "az", "temperature", "air", "room"]
     printed = {"lines": {"scalars": {"air": 964.8, "room": 294.65}}}
     changes = {"sensors": {"imu": {"lines": {"columns": columns, "scalars": scalars}}}}
-    assert np.abs(off(calibrated(tmp_path, changes, {"world": {"sensors": {"imu": printed}}}))).max() < 4
+    assert np.abs(off(calibrated(tmp_path, QUICK, changes, {"world": {"sensors": {"imu": printed}}}))).max() < 4
     folder = tmp_path / "run"
     run = read_run(folder / "run.h5")
     assert {name: sensor.channels[0].measures for name, sensor in run.sensors.items() if not sensor.has_axes} == {
