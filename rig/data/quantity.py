@@ -154,6 +154,6 @@ SCALARS: Final = (TEMPERATURE, PRESSURE)
 
 
 def of_news(quantities: Iterable[str]) -> list[str]:
-    """Those quantities of a sensor, by name, that are told: its temperature only where it measures nothing else."""
+    """Names of the quantities of a sensor that are told: its temperature only where it measures nothing else."""
     names = list(quantities)
     return [name for name in names if name != TEMPERATURE.name] or names
