@@ -16,7 +16,7 @@ def main() -> int:
 
 
 def _end(*_: Any) -> None:
-    """End at once: while modules are loaded nothing has begun, and what is raised there shows where each of them was."""
+    """End at once: while modules are loaded nothing has begun, and what is raised there is a traceback."""
     with suppress(OSError):
         os.write(2, b"rig: interrupted\n")
     os._exit(130)

@@ -1,4 +1,4 @@
-"""A run file that somebody made to do harm: it opens no other file, takes no memory, and is refused with what is wrong."""
+"""A run file that somebody made to do harm: it opens no other file, takes no memory, and is refused by name."""
 
 import json
 import os
@@ -114,6 +114,7 @@ def test_a_file_reaches_no_other(recording: Path, structure: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("chunk", [1024, 29_000_000])
 def test_rows_that_unpack_without_end_take_no_memory(recording: Path, chunk: int) -> None:
     with h5py.File(recording, "r+") as file:
@@ -177,7 +178,7 @@ def test_what_a_terminal_would_obey_is_made_seen() -> None:
     [
         ({"name": []}, "no event"),
         ({"name": {}}, "no event"),
-        ({"detail": {"sensor": "gyro", "sweep": 0, "reason": [{}] * 60_000}, "name": "board_not_observed"}, "over 50000"),
+        ({"detail": {"reason": [{}] * 60_000}, "name": "board_not_observed"}, "over 50000"),
         ({"host_time_s": float("inf")}, "'Infinity' is no number"),
     ],
 )  # fmt: skip
