@@ -51,7 +51,6 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
     label = "the history"
     try:
         from rig.history.finished import finished_run
-        from rig.history.place import own_place
 
         where = chosen()
         if where is None:
@@ -61,7 +60,17 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
         numbers, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
-    return Remembered(label, numbers, tuple(map(_since, beside)), usual=where == own_place(None)), beside
+    return Remembered(label, numbers, tuple(map(_since, beside)), usual=_is_usual(where)), beside
+
+
+def _is_usual(where: "Place") -> bool:
+    """Whether it is the one that a command means which names none."""
+    from rig.history.place import own_place
+
+    try:
+        return where == own_place(None)
+    except RigError:  # the user has no home
+        return False
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:

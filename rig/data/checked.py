@@ -16,6 +16,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
 MOST_VALUES = 200_000  # the largest of a run has 3,000; every wrong one of them costs a thousand bytes to tell
+MOST_RECORDED = 50_000  # of a text or an event in a recording, where they are as dear
 SEPARATORS = (b",", b"[", b"{")  # in JSON, before each value but the first
 LARGEST_NUMBER = 1e100  # in SI units: what is beyond that overflows where it is squared, and nothing measured is
 UNSEEN = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069\\ud800-\\udfff]")
@@ -36,11 +37,7 @@ def checked(kind: type[Kind], document: Any, where: str) -> Kind:
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
     """A JSON file of that kind; `what` it is a result of, for messages. Raises Refused `no_result`, `not_a_result`."""
     try:
-        content = read_regular_file(file, limit_bytes)
-        if sum(map(content.count, SEPARATORS)) > MOST_VALUES:
-            raise Refused("not_a_result", f"{file} is no result of {what}: it holds over {MOST_VALUES} values", remedy)
-        document = json.loads(content, parse_float=_measured, parse_int=_measured, parse_constant=_measured)
-        return kind.model_validate(_seen(document))
+        return kind.model_validate(parsed(read_regular_file(file, limit_bytes), MOST_VALUES))
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
@@ -57,6 +54,17 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
         raise Refused("not_a_result", f"{file} is no result of {what}: {error}", remedy) from error
 
 
+def parsed(content: str | bytes, most: int = MOST_RECORDED) -> Any:
+    """The value of JSON that anybody may have written, its texts printable.
+
+    Raises ValueError for a number that cannot be measured and for over `most` values; RecursionError.
+    """
+    content = content.encode() if isinstance(content, str) else content
+    if sum(map(content.count, SEPARATORS)) > most:
+        raise ValueError(f"it holds over {most} values")
+    return seen(json.loads(content, parse_float=_measured, parse_int=_measured, parse_constant=_measured))
+
+
 def _measured(text: str) -> int | float:
     """A number of a JSON file. Raises ValueError for one that nothing could have found."""
     value = float(text)
@@ -65,7 +73,7 @@ def _measured(text: str) -> int | float:
     return value if set(text) & set(".eE") else int(text)
 
 
-def _seen(value: Any) -> Any:
+def seen(value: Any) -> Any:
     """A JSON value in whose texts nothing is hidden: a terminal, a certificate and a C header show all there is.
 
     Raises RecursionError.
@@ -73,9 +81,9 @@ def _seen(value: Any) -> Any:
     if isinstance(value, str):
         return UNSEEN.sub(lambda found: printable(found[0]), value)
     if isinstance(value, list):
-        return [_seen(each) for each in value]
+        return [seen(each) for each in value]
     if isinstance(value, dict):
-        return {_seen(key): _seen(each) for key, each in value.items()}
+        return {seen(key): seen(each) for key, each in value.items()}
     return value
 
 

@@ -4,13 +4,12 @@ In the file an event is a line of JSON: its kind's name, when it happened, and t
 """
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.data.checked import Finite, checked
+from rig.data.checked import Finite, checked, parsed
 from rig.data.hand_events import (
     HandAsked,
     HandBegunAnew,
@@ -25,6 +24,7 @@ from rig.errors.quoting import quote
 from rig.motion.steps import Dwell, Sweep
 
 LARGEST_INTEGER = 2**63 - 1
+LARGEST = 1e6  # of a sweep or a dwell in rad, rad/s, rad/s² or s: ten days, and turns that no joint makes
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ def from_lines(stream: bytes) -> Iterator[Recorded]:
     for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
         if line.strip(b"\0"):
             try:
-                yield _from_document(json.loads(line))
+                yield _from_document(parsed(line))
             except (ValueError, RecursionError) as error:
                 raise ValueError(f"event {number} cannot be understood: {' '.join(str(error).split())}") from None
 
@@ -164,7 +164,7 @@ def _from_document(document: Any) -> Recorded:
     if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
         raise ValueError("it has no name and no details")
     name, detail = document.get("name"), document["detail"]
-    if name not in _KINDS:
+    if not isinstance(name, str) or name not in _KINDS:
         raise ValueError(f"there is no event {quote(name)}")
     event = checked(_KINDS[name], _nested(name, detail), name)
     if isinstance(event, SweepStarted | SweepFinished):
@@ -192,15 +192,17 @@ class _Times:
 def _check_sweep(sweep: Sweep) -> None:
     """A sweep that could be planned: what reads it relies on its numbers."""
     low, high = sweep.revolution_rad
-    numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, sweep.speed_rad_s, sweep.duration_s)
+    rates = sweep.speed_rad_s, sweep.acceleration_rad_s2, sweep.duration_s
+    numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)
     joints = len(sweep.start_q_rad)
-    if not (0 <= sweep.joint < joints == len(sweep.end_q_rad) and low < high and all(map(math.isfinite, numbers))):
+    possible = all(abs(number) <= LARGEST for number in numbers) and all(rate >= 1 / LARGEST for rate in rates)
+    if not (0 <= sweep.joint < joints == len(sweep.end_q_rad) and low < high and possible):
         raise ValueError(f"there is no such sweep as {quote(sweep)}")
 
 
 def _check_dwell(dwell: Dwell) -> None:
     """Raises ValueError for a dwell that cannot be."""
-    if not all(map(math.isfinite, (*dwell.q_rad, dwell.duration_s))):
+    if not all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s)):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 

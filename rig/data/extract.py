@@ -31,6 +31,7 @@ MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a 
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
 MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
+LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
 
 
 def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
@@ -75,6 +76,10 @@ def reason(error: Exception) -> str:
         return "it is not an HDF5 file"
     if "checksum" in text:
         return f"it is damaged: {text}"
+    if isinstance(error, MemoryError) or "filter returned failure" in text or "memory allocation failed" in text:
+        return "its rows cannot be unpacked: they are damaged, or more than they are said to be"
+    if "required filter" in text or "filter plugins disabled" in text:
+        return "its rows are packed by a filter that is none of the HDF5 library's own"
     system = re.search(r"error message = '([^']*)'", text)
     return system[1] if system else text or type(error).__name__
 
@@ -90,9 +95,9 @@ def _member(group: Any, name: str, kind: type) -> Any:
     """A group or dataset that lies in this very file."""
     import h5py
 
-    if name not in group:
+    if (link := group.get(name, getlink=True)) is None:
         raise ValueError(f"it has no {name}")
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+    if not isinstance(link, h5py.HardLink):
         raise ValueError(f"{name} is a link to somewhere else")
     member = group[name]
     if not isinstance(member, kind):
@@ -102,11 +107,11 @@ def _member(group: Any, name: str, kind: type) -> Any:
 
 def _check(dataset: Any, name: str) -> None:
     """Raises ValueError unless it holds rows of numbers, for which there is room in the file."""
+    if dataset.is_virtual or dataset.external:  # first: to tell the shape of the former, the library opens the others
+        raise ValueError(f"the rows of {name} lie somewhere else")
     columns = [dataset.dtype[each] for each in dataset.dtype.names or ()] or [dataset.dtype]
     if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(each.base.kind not in "iuf" for each in columns):
         raise ValueError(f"{name} holds {dataset.dtype!s:.200} in {dataset.ndim} dimensions, not rows of numbers")
-    if dataset.external or dataset.is_virtual:
-        raise ValueError(f"the rows of {name} lie somewhere else")
     stored = _stored_rows(dataset)
     if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
         raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
@@ -150,6 +155,8 @@ def _text(file: Any, name: str) -> str:
     value = _plain(file.attrs.get(name))
     if not isinstance(value, str):
         raise ValueError(f"its {name} is not a text")
+    if not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
+        raise ValueError(f"its {name} is not UTF-8")
     return value
 
 
@@ -158,14 +165,28 @@ def _plain(value: Any) -> Any:
 
     Raises ValueError for one that no run file has.
     """
-    if np.size(value) > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
+    size = getattr(value, "size", 1) or 0  # an attribute of nothing has None
+    if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
         raise ValueError("an attribute of it is longer than any a run has")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _main() -> int:
+def _limit_memory(path: Path) -> None:
+    """Let this process have no more memory than what a file may hold: a packed piece need not be as long as it says."""
     try:
-        for part in extract(Path(sys.argv[1])):
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return
+    limit = LIBRARIES_BYTES + 3 * (MAX_UNPACKED * _stored_bytes(path) + MAX_UNWRITTEN_BYTES)  # rows, and their copies
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
+
+
+def _main() -> int:
+    path = Path(sys.argv[1])
+    try:
+        _limit_memory(path)
+        for part in extract(path):
             encoded = _encoded(part)
             try:
                 sys.stdout.buffer.write(encoded)

@@ -12,7 +12,6 @@ Readings from elsewhere (schema "rig.files/1") have no `/samples` and an empty `
 motion tells).
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.written_file import PART
+from rig.data.checked import parsed, seen
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recorded_turner import turner_of
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, states_name
@@ -66,12 +66,13 @@ def states_dtype(schema: str, texts: Mapping[str, str]) -> np.dtype[Any]:
 
 def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
     """The sensor that the attributes of its samples describe in a file of that schema. Raises ValueError."""
+    attributes = seen(dict(attributes))
     if schema not in IN_CHANNELS:
         return sensor_of(described_in_channels(name, attributes))
     channels = attributes.get("channels")
     if not isinstance(channels, str):
         raise ValueError(f"the channels of {name} are not a text")
-    return sensor_of({**attributes, "channels": json.loads(channels)})
+    return sensor_of({**attributes, "channels": parsed(channels)})
 
 
 def check_rows(contents: Contents) -> None:

@@ -7,10 +7,13 @@ import hashlib
 from contextlib import suppress
 from pathlib import Path
 
+from rig.config.own_folder import own_folder
+from rig.errors import Refused
+
 
 def note_own(*texts: str) -> None:
     """Note that this user has run these texts. One that cannot be noted is not known later, and then asked about."""
-    with suppress(OSError):
+    with suppress(OSError, Refused):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         for text in texts:
@@ -19,10 +22,11 @@ def note_own(*texts: str) -> None:
 
 def is_own(sha256: str) -> bool:
     """Whether the text with this hash, in hexadecimal, was run by this user on this computer."""
-    return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
+    with suppress(Refused):
+        return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
+    return False
 
 
 def _folder() -> Path:
-    from platformdirs import user_data_path
-
-    return user_data_path("calibration-rig", appauthor=False) / "own"
+    """Where they are noted. Raises as `own_folder`."""
+    return own_folder() / "own"

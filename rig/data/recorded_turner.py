@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from rig.data.checked import checked
+from rig.data.checked import checked, parsed
 from rig.data.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
 from rig.data.settings import RunSettings
 from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
@@ -73,7 +73,7 @@ def described(document: Any) -> RecordedTurner:
 
 def turner_of(text: str) -> RecordedTurner:
     """What `RecordedTurner.to_json` wrote. Raises ValueError naming what is wrong."""
-    return described(json.loads(text))
+    return described(parsed(text))
 
 
 def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[Recorded]) -> None:

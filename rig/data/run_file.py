@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.section import SensorName
-from rig.data.checked import checked
+from rig.data.checked import LARGEST_NUMBER, checked, parsed
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
 from rig.data.layout import (
@@ -36,7 +36,7 @@ from rig.data.layout import (
 )
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
-from rig.data.quantity import RATE, Quantity, Scalar
+from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner, check_joints, turner_of
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
@@ -45,11 +45,15 @@ from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.data.silence import Silence
 from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.errors import Fault, Refused
+from rig.errors.quoting import quote
 from rig.motion.state import State
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
 READ_TICK_S = 0.1
+LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
+# A file that somebody made loads no plugin of the library; and threads for linear algebra reserve memory by gigabytes.
+READING = {f"{each}_NUM_THREADS": "1" for each in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
 READ_SPARED = 6  # … and at most so many times that, when the reading process gets no processor
 
 
@@ -219,12 +223,16 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
         if elsewhere is not None:
             sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
         settings = _settings(contents, sensors)
-        provenance = checked(Provenance, json.loads(contents.texts["provenance"]), "provenance")
+        provenance = checked(Provenance, parsed(contents.texts["provenance"]), "provenance")
         events = tuple(from_lines(contents.events.tobytes()))
         turner = None
         if elsewhere is None:
             turner = _turner(contents, provenance)
             check_joints(turner, settings, events)
+        states = _whole_rows(contents.states)
+        _check_numbers("states", states, LARGEST_STATE)
+        for name, rows in samples.items():
+            _check_numbers(name, rows, LARGEST_NUMBER)
         return RunData(
             config=contents.texts["config"],
             settings=settings,
@@ -232,7 +240,7 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
             turner=turner,
             sensors=sensors,
             samples=samples,
-            states=_whole_rows(contents.states),
+            states=states,
             events=events,
             elsewhere=elsewhere,
         )
@@ -269,7 +277,7 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
     # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
     command = [sys.executable, "-P", "-m", "rig.data.extract", str(path)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = {**os.environ, **READING, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with tempfile.TemporaryFile() as out:
         with subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, env=environment
@@ -341,6 +349,10 @@ def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunS
     named = (*settings.to_calibrate, *([settings.reference.name] if settings.reference else []))
     if missing := [name for name in named if name not in sensors or not sensors[name].measures(RATE)]:
         raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
+    for name, sensor in sensors.items():
+        moved = sensor.measures(RATE) or sensor.measures(ACCELERATION)
+        if moved and settings.uncertainty is not None and not settings.uncertainty.knows(name, sensor.part):
+            raise ValueError(f"nothing is known of the part {quote(sensor.part)} of its sensor {name}")
     return settings
 
 
@@ -356,7 +368,7 @@ def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
 def _elsewhere(contents: Contents) -> ReadElsewhere:
     tables = [contents.tables[each] for each in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
-    told = checked(ToldElsewhere, json.loads(contents.texts["elsewhere"]), "elsewhere")
+    told = checked(ToldElsewhere, parsed(contents.texts["elsewhere"]), "elsewhere")
     samples_header().check(readings)
     MOTIONS[told.tells].check(motion)
     return ReadElsewhere(told.item, readings, told.tells, motion)
@@ -367,6 +379,19 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
+
+
+def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
+    """Raises ValueError for numbers that overflow where they are reckoned with, and for a host time that is none.
+
+    Readings and angles that are no numbers are found where they are read, for some may never be.
+    """
+    if not np.isfinite(rows["host_time_s"]).all():
+        raise ValueError(f"a host time of {name} is not a number")
+    for column in rows.dtype.names or ():
+        values = rows[column]
+        if values.dtype.kind == "f" and (np.abs(values[np.isfinite(values)]) > most).any():
+            raise ValueError(f"a value in {column} of {name} cannot have been measured")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
-from rig.data.checked import Finite, Positive, checked
+from rig.data.checked import Finite, Positive, checked, parsed
 from rig.data.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -142,11 +142,14 @@ class Uncertainty:
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
 
+    def knows(self, name: str, part: str) -> bool:
+        """Whether `of` has an answer for a sensor."""
+        return part in PARTS or all(name in getattr(self, what) for what in OF_SENSORS)
+
     def of(self, what: OfSensor, name: str, part: str) -> float:
         """What is known of a sensor of that name; what is known of the part where nothing is said of the sensor."""
         said: dict[str, float] = getattr(self, what)
-        of_part: float = getattr(PARTS[part], what)
-        return said.get(name, of_part)
+        return said[name] if name in said else float(getattr(PARTS[part], what))
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,7 +349,7 @@ class RunSettings:
 
 def settings_from_json(text: str) -> RunSettings:
     """What `to_json` wrote. Raises ValueError naming what is wrong."""
-    document = json.loads(text)
+    document = parsed(text)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema not in SCHEMAS:
         raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")

@@ -1,12 +1,21 @@
 """The one array type of everything that computes."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+SMALLEST_SIZE = 1e-200  # an uncertainty below it is none: nothing measured is so sure, and to divide by it overflows
 
 
 def scale_of(matrix: Array) -> Array:
     """Scale factors k (3,) of a sensor that reads F g + o: one over the length of each row of the `matrix` F (3, 3)."""
     scale: Array = 1 / np.linalg.norm(matrix, axis=1)
     return scale
+
+
+def in_units_of(values: ArrayLike, sizes: ArrayLike) -> Array:
+    """Values over sizes ≥ 0, of any one shape; infinite where a value is not zero and its size as good as none."""
+    value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
+    none = np.where(value == 0, 0.0, np.copysign(np.inf, value))
+    found: Array = np.divide(value, size, out=none, where=size > SMALLEST_SIZE)
+    return found

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.history_address import history_url
+from rig.config.own_folder import own_folder
 from rig.errors import Refused
 
 if TYPE_CHECKING:
@@ -49,13 +50,15 @@ def own_place(said: str | None) -> Place | None:
 
 
 def place(said: str | None) -> Place:
-    """A file's name or a URL; None is the user's own file. Raises Refused `history_address`."""
+    """A file's name or a URL; None is the user's own file. Raises Refused `history_address`, and as `own_folder`."""
     if not said:
-        from platformdirs import user_data_path
-
-        said = str(user_data_path("calibration-rig", appauthor=False) / NAME)
+        said = str(own_folder() / NAME)
     if "://" not in said:
-        path = Path(said).expanduser().absolute()
+        try:
+            path = Path(said).expanduser().absolute()
+        except RuntimeError as error:  # a `~` of somebody who has no home
+            remedy = "Write out the folder in --history, RIG_HISTORY or the configuration"
+            raise Refused("history_address", f"the history {said} cannot be found: {error}", remedy) from None
         return Place(str(path), path)
     try:
         url = history_url(said)

@@ -14,6 +14,7 @@ from rig.data.budget_entries import expanded_uncertainties
 from rig.data.quantity import RATE
 from rig.data.result_file import BoardEntry, EstimateEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
 from rig.data.result_types import ErrorEntry, Role
+from rig.estimation.arrays import in_units_of
 from rig.estimation.six_observation import PARAMETERS
 from rig.report.axes import decimals, matrix_lines, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
@@ -160,7 +161,7 @@ def _differs(sensor: SensorEntry, other: EstimateEntry | VectorEntry) -> Iterato
     """Which of two estimators to believe, where they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*each.scale, *each.bias_rad_s) for each in (sensor, other))
-    off = np.abs(np.subtract(others, values)) / np.array(expanded)
+    off = in_units_of(np.abs(np.subtract(others, values)), expanded)
     worst = int(np.argmax(off))
     if off[worst] > 1 and sensor.estimator == "vector":
         yield (

@@ -13,6 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from rig.config.own_folder import own_folder
 from rig.errors import Refused
 from rig.sensors.mavlink.parameters import REAL32, WHOLE, Parameter
 
@@ -103,10 +104,8 @@ def change_in(path: Path) -> Change:
 
 
 def folder() -> Path:
-    """Where the journals lie."""
-    from platformdirs import user_data_path
-
-    return user_data_path("calibration-rig", appauthor=False) / "autopilots"
+    """Where the journals lie. Raises as `own_folder`."""
+    return own_folder() / "autopilots"
 
 
 def _journal(place: str) -> Path:

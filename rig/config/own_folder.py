@@ -1,0 +1,22 @@
+"""The folder of this user's own in which the rig keeps what it is to know again: texts, a history, old parameters."""
+
+from pathlib import Path
+
+from rig.errors import Refused
+
+
+def own_folder() -> Path:
+    """Where it is, whether it is there or not. Raises Refused `no_home` for a user of whom no home is known."""
+    from platformdirs import user_data_path
+
+    try:
+        folder = user_data_path("calibration-rig", appauthor=False)
+    except RuntimeError as error:
+        raise _no_home(str(error)) from None
+    if not folder.is_absolute():  # so older versions of the library answer: a folder that is called `~`
+        raise _no_home(f"there is no folder {folder}")
+    return folder
+
+
+def _no_home(why: str) -> Refused:
+    return Refused("no_home", f"no home of this user is known: {why}", "Set HOME to a folder of yours")
