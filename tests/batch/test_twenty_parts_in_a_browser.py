@@ -11,10 +11,12 @@ from support.browser import needs_browser, picture, text, typed, until
 from support.command_with_a_page import with_a_page
 from support.commands import configuration, wait_for_log
 from support.crowd import kept, timed, told
+from support.processes import grown, resident_kb
 from support.station_laboratory import Laboratory
 
 PARTS = 20
 NEXT_S, FIRST_MOTION_S = 3.0, 2.0
+GROWTH = 0.02
 BUSY_S = 400.0  # a busy machine's patience
 NUMBER, MOUNT, GO, DOUBT, AGAIN = "serial number", "mount it", "Type go", "Go on all the same", "again?"
 pytestmark = [
@@ -43,6 +45,7 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
     config = configuration(tmp_path, {"world": {"tray": {unplugged: {"plugged_in": False}}}})
     laboratory, out = Laboratory(config), tmp_path / "batch"
     next_s, motion_s = list[tuple[float, float]](), list[tuple[float, float]]()
+    memory_kb = list[int]()
     with with_a_page(tmp_path / "told.txt", "station", config, "--page", "--out", out) as (process, url):
         driver.get(url)
         for at, number in enumerate(numbers, 1):
@@ -61,6 +64,8 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
             wait_for_log(folder, "recorded: ", timeout_s=BUSY_S, times=2 if number == disturbed else 1)
             with timed(NEXT_S, next_s):
                 asks(driver, NUMBER)
+            memory_kb.append(resident_kb(process.pid))
+            print(f"{number}: {memory_kb[-1]} kB", flush=True)
             if at == 1:
                 answers(driver, NUMBER, number)
                 answers(driver, DOUBT, "no")
@@ -78,4 +83,6 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
         rows = list(csv.DictReader(csv_file))
     assert [(row["serial_number"], row["verdict"]) for row in rows] == [(number, "pass") for number in numbers]
     assert [row["serial_number"] for row in rows if row["sweeps_repeated"] != "0"] == [disturbed] * thorough
-    assert kept(motion_s) and kept(next_s)
+    if thorough:
+        assert kept(motion_s) and kept(next_s)
+        assert grown(memory_kb) <= GROWTH

@@ -20,3 +20,11 @@ def descendant(process: int, word: str) -> int:
             for thread in Path(f"/proc/{each}/task").iterdir():
                 family += map(int, (thread / "children").read_text(encoding="ascii").split())
     raise LookupError(f"process {process} has started no {word}")
+
+
+def grown(memory_kb: list[int]) -> float:
+    """By which part memory has grown over parts in a row.
+
+    Of a few parts the most counts: what is connected ahead comes and goes, and a part with repeated sweeps needs more.
+    """
+    return max(memory_kb[-4:]) / max(memory_kb[1:5]) - 1.0
