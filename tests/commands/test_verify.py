@@ -128,8 +128,9 @@ def test_it_is_told_in_words_and_nobody_is_trusted_unasked(lab: Laboratory, caps
 
 
 def pdfsig(file: Path) -> str:
-    command = ["pdfsig", "-nocert", file]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    command = ["pdfsig", "-nocert", str(file)]
+    said: str = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    return said
 
 
 def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not(lab: Laboratory) -> None:
