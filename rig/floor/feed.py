@@ -1,4 +1,4 @@
-"""The floor's page as its server is handed it: the history is looked at every second, in a thread of its own."""
+"""The floor's page as its server is handed it: the history is looked at twice a second, in a thread of its own."""
 
 import threading
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from rig.history.place import Place
 from rig.history.store import History, open_history
 from rig.page.sections import Sections
 
-LOOK_S = 1.0
+LOOK_S = 0.5  # a rig that is dead after 3.5 s has to be shown as such within 5 s
 
 
 @contextmanager
