@@ -6,7 +6,7 @@ from rig.errors import Refused
 
 
 def own_folder() -> Path:
-    """Where it is, whether it is there or not. Raises Refused `no_home` for a user of whom no home is known."""
+    """The rig's folder of this user, whether it is there or not. Raises Refused `no_home` where no home is known."""
     from platformdirs import user_data_path
 
     try:

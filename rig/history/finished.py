@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import platform
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,7 +89,7 @@ def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Fini
         check_standards=section.check_standards,
         simulated=simulated or calls_itself_simulated(provenance.arm_software),
         computer=platform.node(),
-        path=str(folder.resolve()),
+        path=os.fsencode(folder.resolve()).decode("utf-8", "backslashreplace"),  # no database takes other bytes
         recordings=tuple(
             recording_of(file) for readings in ("raw", "calibrated") for file in recordings(folder, readings)
         ),
