@@ -4,7 +4,7 @@ What the file asks for beside the uncertainty stays: order, directions, stages, 
 attitudes where magnetometers need theirs.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -13,21 +13,17 @@ from typing import Protocol
 import numpy as np
 
 from rig.analysis.predicted import predicted
-from rig.analysis.predicted_accelerations import predicted_accelerations
+from rig.analysis.predicted_accelerations import accelerometers_of, predicted_accelerations
 from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
 from rig.analysis.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
-from rig.config.attitude_sets import SETS
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedure_sections import (
-    LONGEST_SWEEP_S,
-    AttitudesSection,
     ImuSection,
     SixObservationSection,
-    SixSweepsSection,
     StaticAttitudesSection,
 )
-from rig.config.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
+from rig.config.servo_procedure import ServoSixObservationSection
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.solution import REAL_HANDS
@@ -37,17 +33,14 @@ from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
 from rig.plans.imu import plan_imu
 from rig.plans.servo_sweeps import plan_servo_six_observation
+from rig.plans.shortest_motions import Motion, of_arm, of_attitudes, of_imu, of_servo
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import plan_static_attitudes
 from rig.turners.registry import kind_of
 
-SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
-ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them
-TURNS_DEG = (360.0, 720.0, 1080.0)
-BEYOND_DEG = (45.0, 90.0, 180.0)  # of a servo's turn
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
@@ -69,9 +62,9 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted, or not of what is wanted.
     """
     what = tried(config)
+    _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = {each.family: floor for each in _once(candidates) if (floor := what.endless(each)) is not None}
-    _refuse_others(wanted, list(floors.values()))
     least = min(floors, key=lambda family: wanted.share(floors[family].reached))
     able = {family for family, floor in floors.items() if wanted.met_by(floor.reached)}
     found = shortest([each for each in candidates if each.family in able], what.predict, wanted)
@@ -104,13 +97,13 @@ def tried(config: RigConfig) -> Tried:
         return _ByHand(config, procedure)
     made = kind_of(config.turner).meant(config.turner)
     if isinstance(procedure, ServoSixObservationSection):
-        return _Swept(config, made, _of_servo)
+        return _Swept(config, made, of_servo)
     if type(procedure) is StaticAttitudesSection:
-        return _Swept(config, made, _of_attitudes, ("dwell_s",))
+        return _Swept(config, made, of_attitudes, ("dwell_s",))
     if type(procedure) is ImuSection and not procedure.finds_earth_rate:
-        return _Swept(config, made, _of_imu, ("rest_s", "dwell_s"))
+        return _Swept(config, made, of_imu, ("rest_s", "dwell_s"))
     if type(procedure) is SixObservationSection and not procedure.finds_earth_rate:
-        return _Swept(config, made, _of_arm)
+        return _Swept(config, made, of_arm)
     raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
 
 
@@ -123,11 +116,12 @@ def _not_foretold(what: str) -> Refused:
     )
 
 
-def _refuse_others(wanted: Wanted, floors: Sequence[Budgets]) -> None:
-    """Raise Refused `not_foretold` where something is wanted of a kind of sensor that no run of these calibrates."""
-    kinds = ("gyroscope", [each.rates for each in floors]), ("accelerometer", [each.accelerations for each in floors])
-    for (kind, budgets), sizes in zip(kinds, (SIZES[:2], SIZES[2:]), strict=True):
-        if not any(budgets) and any(getattr(wanted, each) < inf for each in sizes):
+def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
+    """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
+    kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
+    kinds["accelerometer"] = bool(accelerometers_of(config))
+    for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
+        if not calibrated and any(getattr(wanted, each) < inf for each in sizes):
             raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
 
 
@@ -165,9 +159,6 @@ def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_mos
     return sorted(own, key=lambda each: each.duration_s)[-1:]
 
 
-Motions = Callable[[RigConfig], Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]]
-
-
 @dataclass(frozen=True, slots=True)
 class _Swept:
     """Sweeps or attitudes of a turner with joints; `motions` are what may be told of them but repeats and waits.
@@ -178,7 +169,7 @@ class _Swept:
 
     config: RigConfig
     made: Made
-    motions: Motions
+    motions: Callable[[RigConfig], Iterator[Motion]]
     waits: tuple[str, ...] = ("rest_s",)
 
     def candidates(self) -> Sequence[Candidate]:
@@ -264,51 +255,6 @@ def _down_from(wait_s: float) -> list[float]:
     """The waits of so long and of less, down to the next of the coarse ones."""
     below = max((each for each in RESTS_S if each < wait_s), default=wait_s - REST_STEP_S)
     return np.arange(wait_s, below + REST_STEP_S / 2, -REST_STEP_S).round(3).tolist()
-
-
-def _of_arm(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    procedure = config.procedure
-    assert isinstance(procedure, SixSweepsSection)
-    axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)
-    several, some = procedure.speeds_deg_s, _speeds_deg_s(config)
-    speeds: list[tuple[float, Mapping[str, object]]] = [
-        *((speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in some),
-        *((speed, {"speeds_deg_s": (speed, some[-1])}) for speed in some[:-1]),
-    ]
-    if several is not None:
-        speeds = [(min(several), {})]
-    turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
-    for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
-        if arc_deg / slowest <= LONGEST_SWEEP_S:
-            closed = arc_deg % 360 == 0
-            yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
-
-
-def _of_attitudes(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    procedure = config.procedure
-    assert isinstance(procedure, AttitudesSection)
-    sets = [procedure.attitudes, *(() if config.magnetometers else SETS.values())]
-    for attitudes in dict.fromkeys(sets):
-        yield (attitudes,), 0.0, {"attitudes": attitudes}
-
-
-def _of_imu(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    """Whole turns at one speed, once round: an accelerometer's wave is that of one."""
-    once_round = (each for each in _of_arm(config) if each[1] == TURNS_DEG[0])
-    own = config.procedure.speeds_deg_s  # type: ignore[attr-defined]
-    turns = [each for each in once_round if each[2].get("speeds_deg_s", own) == own]
-    for (family, turned, keys), (attitudes, _, stood) in product(turns, _of_attitudes(config)):
-        yield (*family, *attitudes), turned, {**keys, **stood}
-
-
-def _of_servo(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    for speed_deg_s, beyond_deg in product(_speeds_deg_s(config), BEYOND_DEG):
-        yield (speed_deg_s,), beyond_deg, {"speed_deg_s": speed_deg_s, "beyond_deg": beyond_deg}
-
-
-def _speeds_deg_s(config: RigConfig) -> list[float]:
-    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / SPEED_TO_RANGE
-    return [speed for speed in SPEEDS_DEG_S if speed <= fastest]
 
 
 @dataclass(frozen=True, slots=True)

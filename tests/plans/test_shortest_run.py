@@ -24,7 +24,8 @@ from rig.observation.handled import handled
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
 from rig.plans.registry import installed, sections
-from rig.plans.shortest import ARCS_DEG, plan_of, shortest_run, tried
+from rig.plans.shortest import plan_of, shortest_run, tried
+from rig.plans.shortest_motions import ARCS_DEG
 from rig.turners import registry as turners
 from rig.world.hand.habits import Action, Flip, Turn
 from support.drawn_accelerations import drawn, solved
@@ -261,6 +262,7 @@ def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
     return predict
 
 
+@pytest.mark.slow
 def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
     speeds = {each.procedure.speeds_deg_s for each in tried(demo()).candidates()}  # type: ignore[attr-defined]
     assert None in speeds and (15.0, 150.0) in speeds
@@ -276,6 +278,7 @@ def in_attitudes() -> RigConfig:
     return load(CONFIGS / "attitudes.yaml", others, sections(installed()), turners.sections()).config
 
 
+@pytest.mark.slow
 def test_attitudes_are_chosen_for_an_accelerometer() -> None:
     """The scale factors are known soonest in the twelve, the biases better in the eighteen."""
     scale, bias = (
@@ -288,6 +291,7 @@ def test_attitudes_are_chosen_for_an_accelerometer() -> None:
     assert scale.best.candidate.duration_s < scale.before.candidate.duration_s
 
 
+@pytest.mark.slow
 def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches() -> None:
     """On an arm as far off as the configuration states: U of the drawn session has temperatures that stray, too."""
     said = ["site.gravity_uncertainty_m_s2=1e-5", f"uncertainty.axis_deg={np.degrees(3**0.5 * ARM_RAD):.6f}"]
