@@ -59,7 +59,8 @@ class Wanted:
 
     def share(self, reached: Reached) -> float:
         """What is reached by what is wanted, of the worst."""
-        return max(getattr(reached, each) / getattr(self, each) for each in SIZES)
+        shares: list[float] = [getattr(reached, each) / getattr(self, each) for each in SIZES]
+        return max(shares)
 
 
 SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields of both are called
