@@ -13,6 +13,7 @@ import numpy as np
 from rig.analysis.clock import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
 from rig.analysis.planned_motion import STANDING_S, Timed, timed
 from rig.analysis.surroundings import Surroundings
+from rig.analysis.uneven_turn import scattering_variance
 from rig.analysis.vector_inputs import Part, known_sensor, put_together, unknown_of
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
@@ -28,7 +29,7 @@ from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
 from rig.motion.state import Joints, Made
-from rig.motion.steps import TURN_RAD, Plan, Rest, Sweep, closes
+from rig.motion.steps import TURN_RAD, Dwell, Plan, Rest, Sweep, closes
 from rig.observation.arm_motion import ATTITUDES
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
@@ -41,9 +42,6 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
 ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
-# What a gear's ripple leaves in the mean over a turn, as a share of the rate: as simulated servos have it, where it
-# differs from turn to turn by half. No real one was measured.
-RIPPLE_LEFT = 3e-5
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
@@ -66,7 +64,8 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
     found = {}
     for name, sensor in config.to_calibrate.items():
         surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
-        seen = put_together([_part(config, each, sensor, made) for each in _stages(plan, settings)], surroundings)
+        parts = [_part(config, each, sensor, made, endless=endless) for each in _stages(plan, settings)]
+        seen = put_together(parts, surroundings)
         whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
         kept = tuple(each for each in whole.contributors if not (endless and each.name in ANEW))
         found[name] = replace(whole, contributors=kept)
@@ -133,7 +132,9 @@ def _stages(plan: Plan, settings: RunSettings) -> list[tuple[Plan, RunSettings, 
     return found
 
 
-def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made) -> Part:
+def _part(
+    config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made, *, endless: bool
+) -> Part:
     """What a recording of a stage would tell."""
     plan, settings, since_s = stage
     mount = np.array(settings.mount)
@@ -141,8 +142,10 @@ def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: Sen
     for each in timed(plan):
         if isinstance(each.step, Sweep):
             turned = Timed(each.step, each.start_s, each.end_s)
-            turns.append(_turn(turned, sensor, made, mount, _scatter(config, each.step, made)))
-        elif isinstance(each.step, Rest):
+            turn = _turn(turned, sensor, made, mount, _scatter(config, each.step, made))
+            turns.append(_unevenly(turn, sensor, len(plan.sweeps)) if made.reading_std_rad and not endless else turn)
+        elif isinstance(each.step, (Rest, Dwell)):
+            here = each.step.q_rad if isinstance(each.step, Dwell) else here
             window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
             if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_REST_SAMPLES:
                 rests.append(_average(window_s, sensor, mount @ _attitude(made.kinematics, here)))
@@ -204,7 +207,15 @@ def _scatter(config: RigConfig, sweep: Sweep, made: Made) -> float:
     whole_rad = abs(sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
     places = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
     scatter_rad = np.hypot(made.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
-    return float(np.hypot(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD, RIPPLE_LEFT))
+    return float(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD)
+
+
+def _unevenly(turn: Observation, sensor: SensorSection, turns: int) -> Observation:
+    """A turn of which the mean scatters, along the axis that turns, as those of a servo that makes so many `turns`."""
+    noise_rad_s = angle_walk_rad_sqrt_s(sensor) * sensor.rate_hz**0.5
+    scattering = scattering_variance(turn.speed_rad_s, noise_rad_s, sensor.rate_hz, turns)
+    variances = np.where(np.array(list("xyz")) == turn.axis, scattering, turn.average.variance_rad2_s2)
+    return replace(turn, average=replace(turn.average, variance_rad2_s2=variances))
 
 
 @lru_cache(maxsize=512)

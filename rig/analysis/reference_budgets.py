@@ -56,10 +56,18 @@ def accelerometer_budget(
         (solution.chi_square, solution.freedom),
         noise_freedom=noise_freedom,
     )
+    own = None if sheet is None else solution.own
+    return accelerometer_lines(spread, solution.theta, replace(movement, own=own), site, lag_s, sheet=sheet)
+
+
+def accelerometer_lines(
+    spread: Spread, theta: Array, movement: Movement, site: Site, lag_s: float, *, sheet: Sheet | None
+) -> Budget:
+    """The budget of scale and bias that spread so, where θ (22,) is found from the `movement` with its `own` errors."""
     others = [_lagging(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
-    if solution.own is None or sheet is None:
+    if movement.own is None or sheet is None:
         return reference_budget(spread, _gravity(site), others)
-    bare, own = of_its_own(spread, solution.theta, replace(movement, own=solution.own), sheet)
+    bare, own = of_its_own(spread, theta, movement, sheet)
     return reference_budget(bare, _gravity(site), [*own, *others])
 
 

@@ -1,45 +1,69 @@
 """The shortest run that reaches a wanted uncertainty: a search among candidates by what is predicted of each. Pure."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
+from types import MappingProxyType
 
 from rig.config.models import ProcedureSection
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 
-Budgets = Mapping[str, Budget]  # by sensor
+NONE: Mapping[str, Budget] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
 class Reached:
-    """U of scale and of bias (rad/s), each of the axis and the sensor that is known worst."""
+    """U of scale and of bias (rad/s), each of the axis and the sensor that is known worst; 0 where there is none.
+
+    Those of accelerometers (m/s²) beside them.
+    """
 
     scale: float
     bias_rad_s: float
+    acceleration_scale: float = 0.0
+    acceleration_bias_m_s2: float = 0.0
 
     @classmethod
-    def by(cls, budgets: Budgets) -> "Reached":
-        """The worst U in the budgets of all sensors."""
-        expanded = [each.expanded for each in budgets.values()]
-        return cls(float(max(each[:3].max() for each in expanded)), float(max(each[3:].max() for each in expanded)))
+    def by(cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NONE) -> "Reached":
+        """The worst U in the budgets of all gyroscopes, and in those of all accelerometers."""
+        return cls(*_worst(rates), *_worst(accelerations))
+
+
+@dataclass(frozen=True, slots=True)
+class Budgets:
+    """The budgets of a run by sensor: of gyroscopes, and of the accelerometers that attitudes calibrate."""
+
+    rates: Mapping[str, Budget]
+    accelerations: Mapping[str, Budget] = field(default_factory=dict)
+
+    @property
+    def reached(self) -> Reached:
+        """The worst U of them."""
+        return Reached.by(self.rates, self.accelerations)
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The U that is wanted of scale and of bias (rad/s), infinite where nothing is, in a run of `at_most_s`."""
+    """The U that is wanted of what is `Reached`, infinite where nothing is, in a run of `at_most_s`."""
 
     scale: float = inf
     bias_rad_s: float = inf
     at_most_s: float = inf
+    acceleration_scale: float = inf
+    acceleration_bias_m_s2: float = inf
 
     def met_by(self, reached: Reached) -> bool:
-        """Whether both are reached."""
+        """Whether all of it is reached."""
         return self.share(reached) <= 1.0
 
     def share(self, reached: Reached) -> float:
-        """What is reached by what is wanted, of the worse of both."""
-        return max(reached.scale / self.scale, reached.bias_rad_s / self.bias_rad_s)
+        """What is reached by what is wanted, of the worst."""
+        shares: list[float] = [getattr(reached, each) / getattr(self, each) for each in SIZES]
+        return max(shares)
+
+
+SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields of both are called
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +95,7 @@ class Planned:
     @property
     def reached(self) -> Reached:
         """U that is predicted of it."""
-        return Reached.by(self.budgets)
+        return self.budgets.reached
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,25 +113,28 @@ class Shortest:
     """The shortest run for what is wanted.
 
     `before` is the file's own procedure, None where it tells nothing; `nearest` what comes nearest where none does, and
-    `endless` the budgets of the endless runs that know the scale best, and the bias. `cannot_be_had`: no run of this
-    kind has what is wanted, however long. `directions` (N, 3) are those of the sweeps, None by hand.
+    `endless` the budgets of the endless runs of each family. `cannot_be_had`: no run of this kind has what is wanted,
+    however long. `directions` (N, 3) are those of the sweeps, None without.
     """
 
     wanted: Wanted
     before: Planned | None
     best: Planned | None
     nearest: Planned | None
-    endless: tuple[Budgets, Budgets]
+    endless: Sequence[Budgets]
     cannot_be_had: bool
     tried: int
     among: int
     directions: Array | None
 
+    def least(self, size: str) -> Budgets:
+        """The budgets of the endless run that knows best what is called so in `Reached`."""
+        return min(self.endless, key=lambda each: float(getattr(each.reached, size)))
+
     @property
     def at_any_length(self) -> Reached:
-        """The least U of scale and the least U of bias that endless runs have, which may be different runs."""
-        of_scale, of_bias = (Reached.by(each) for each in self.endless)
-        return Reached(of_scale.scale, of_bias.bias_rad_s)
+        """The least U that endless runs have, of each size for itself: these may be different runs."""
+        return Reached(*(getattr(self.least(each).reached, each) for each in SIZES))
 
 
 def shortest(
@@ -139,3 +166,10 @@ def shortest(
         else:
             left = [each for each in left if not each.within(candidate)]
     return Searched(best, nearest, tried, among)
+
+
+def _worst(budgets: Mapping[str, Budget]) -> tuple[float, float]:
+    """U of the scale factor and of the bias that are known worst."""
+    expanded = [each.expanded for each in budgets.values()]
+    scale, bias = (max((float(each[of].max()) for each in expanded), default=0.0) for of in (slice(3), slice(3, 6)))
+    return scale, bias

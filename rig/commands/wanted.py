@@ -14,7 +14,13 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.analysis.shortest import Planned, Wanted
 
-SCALE, BIAS = "scale", "bias"
+# What may be wanted, and how `rig.analysis.shortest.Wanted` calls it.
+NAMES = {
+    "scale": "scale",
+    "bias": "bias_rad_s",
+    "acceleration_scale": "acceleration_scale",
+    "acceleration_bias": "acceleration_bias_m_s2",
+}
 EXAMPLE = "Give for example --wanted scale=5e-4 --wanted bias=1e-4"
 
 
@@ -25,7 +31,8 @@ def add_wanted(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="scale=U",
-        help="the shortest run that is predicted to reach this expanded uncertainty (k = 2): scale=U, bias=U in rad/s",
+        help="the shortest run that is predicted to reach this expanded uncertainty (k = 2): scale=U, bias=U in rad/s, "
+        "acceleration_scale=U, acceleration_bias=U in m/s²",
     )
     parser.add_argument("--at-most", type=float, metavar="S", help="… in so many seconds")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the configuration of that run, a new file")
@@ -57,7 +64,7 @@ def print_shortest_run(options: Namespace) -> int:
 
 
 def wanted_of(said: Sequence[str], at_most_s: float | None) -> "Wanted":
-    """What the words `scale=U` and `bias=U` say. Raises Refused `bad_option`."""
+    """What the words `scale=U`, `bias=U` and the like say. Raises Refused `bad_option`."""
     from rig.analysis.shortest import Wanted
 
     sizes: dict[str, float] = {}
@@ -67,13 +74,14 @@ def wanted_of(said: Sequence[str], at_most_s: float | None) -> "Wanted":
             sizes[name] = float(value)
         except ValueError:
             raise Refused("bad_option", f"--wanted {each} is no size", EXAMPLE) from None
-        if name not in (SCALE, BIAS) or not 0 < sizes[name] < inf:
-            raise Refused("bad_option", f"--wanted {each} is no uncertainty of scale or bias", EXAMPLE)
+        if name not in NAMES or not 0 < sizes[name] < inf:
+            raise Refused("bad_option", f"--wanted {each} is no uncertainty of {', '.join(NAMES)}", EXAMPLE)
     if not sizes:
         raise Refused("bad_option", "--at-most and --write are for a run with --wanted", EXAMPLE)
     if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):
         raise Refused("bad_option", f"--at-most is {at_most_s:g}", "Give a time above 0, in seconds")
-    return Wanted(sizes.get(SCALE, inf), sizes.get(BIAS, inf), inf if at_most_s is None else at_most_s)
+    wanted = {NAMES[name]: size for name, size in sizes.items()}
+    return Wanted(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
 
 
 def _write(options: Namespace, best: "Planned") -> None:
@@ -87,10 +95,8 @@ def _write(options: Namespace, best: "Planned") -> None:
     overrides = [f"procedure.{key}={json.dumps(value)}" for key, value in changed.items()]
     loaded = configured(options.config, [*options.overrides, *overrides]).loaded
     reached = best.reached
-    said = (
-        f"# Made by rig plan --wanted. Predicted: {best.candidate.duration_s:.1f} s, U = {reached.scale:.3g} of the "
-        f"scale factors, {reached.bias_rad_s:.3g} rad/s of the biases.\n"
-    )
+    predicted = ", ".join(f"{name} {size:.3g}" for name, each in NAMES.items() if (size := getattr(reached, each)) > 0)
+    said = f"# Made by rig plan --wanted. Predicted: {best.candidate.duration_s:.1f} s, U: {predicted} (SI units).\n"
     try:
         write_new(options.write, said + loaded.text)
     except OSError as error:

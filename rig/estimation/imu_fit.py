@@ -42,12 +42,14 @@ class Fit:
         return inverse
 
 
-def covariance_bound(theta: Array, movement: Movement, attitude_std_rad: float) -> tuple[Array, Array]:
+def covariance_bound(
+    theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
+) -> tuple[Array, Array]:
     """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given, and (22, 3 K) the response.
 
     The readings themselves do not matter.
     """
-    free = free_ways(theta, held_still(movement, second_order=False))
+    free = free_ways(theta, held_still(movement, second_order=second_order))
     readings = apart(noise(theta, movement), effects(theta, movement))
     fit = Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0)
     return fit.covariance(), fit.response()

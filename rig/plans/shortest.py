@@ -1,9 +1,10 @@
 """The shortest run of a configuration: which procedures are tried, and the shortest of them. Pure.
 
-What the file asks for beside the uncertainty stays: order, directions, stages, several speeds, six axes.
+What the file asks for beside the uncertainty stays: order, directions, stages, several speeds, six axes, and the
+attitudes where magnetometers need theirs.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -12,12 +13,17 @@ from typing import Protocol
 import numpy as np
 
 from rig.analysis.predicted import predicted
+from rig.analysis.predicted_accelerations import accelerometers_of, predicted_accelerations
 from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
-from rig.analysis.shortest import Budgets, Candidate, Planned, Reached, Searched, Shortest, Wanted, shortest
+from rig.analysis.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedure_sections import LONGEST_SWEEP_S, SixObservationSection
-from rig.config.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
+from rig.config.procedure_sections import (
+    ImuSection,
+    SixObservationSection,
+    StaticAttitudesSection,
+)
+from rig.config.servo_procedure import ServoSixObservationSection
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.solution import REAL_HANDS
@@ -25,17 +31,16 @@ from rig.motion.state import Made
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
+from rig.plans.imu import plan_imu
 from rig.plans.servo_sweeps import plan_servo_six_observation
+from rig.plans.shortest_motions import Motion, of_arm, of_attitudes, of_imu, of_servo
 from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.static_attitudes import plan_static_attitudes
 from rig.turners.registry import kind_of
 
-SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
-RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)
-ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them
-TURNS_DEG = (360.0, 720.0, 1080.0)
-BEYOND_DEG = (45.0, 90.0, 180.0)  # of a servo's turn
+RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
@@ -54,13 +59,14 @@ class Tried(Protocol):
 def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     """The shortest run of this configuration that is predicted to reach what is wanted.
 
-    Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted.
+    Raises Refused `not_foretold` where its procedure is none whose uncertainty is predicted, or not of what is wanted.
     """
     what = tried(config)
+    _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = {each.family: floor for each in _once(candidates) if (floor := what.endless(each)) is not None}
-    least = min(floors, key=lambda family: wanted.share(Reached.by(floors[family])))
-    able = {family for family, floor in floors.items() if wanted.met_by(Reached.by(floor))}
+    least = min(floors, key=lambda family: wanted.share(floors[family].reached))
+    able = {family for family, floor in floors.items() if wanted.met_by(floor.reached)}
     found = shortest([each for each in candidates if each.family in able], what.predict, wanted)
     if not able:
         found = shortest(_longest(candidates, least, wanted.at_most_s), what.predict, wanted)
@@ -74,10 +80,7 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
         None if own is None else Planned(replace(before, duration_s=_duration_s(config)), own),
         best,
         found.nearest,
-        (
-            min(floors.values(), key=lambda each: Reached.by(each).scale),
-            min(floors.values(), key=lambda each: Reached.by(each).bias_rad_s),
-        ),
+        list(floors.values()),
         not able,
         found.tried + fine.tried,
         len(candidates),
@@ -94,9 +97,13 @@ def tried(config: RigConfig) -> Tried:
         return _ByHand(config, procedure)
     made = kind_of(config.turner).meant(config.turner)
     if isinstance(procedure, ServoSixObservationSection):
-        return _Swept(config, made, _of_servo)
+        return _Swept(config, made, of_servo)
+    if type(procedure) is StaticAttitudesSection:
+        return _Swept(config, made, of_attitudes, ("dwell_s",))
+    if type(procedure) is ImuSection and not procedure.finds_earth_rate:
+        return _Swept(config, made, of_imu, ("rest_s", "dwell_s"))
     if type(procedure) is SixObservationSection and not procedure.finds_earth_rate:
-        return _Swept(config, made, _of_arm)
+        return _Swept(config, made, of_arm)
     raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
 
 
@@ -104,14 +111,28 @@ def _not_foretold(what: str) -> Refused:
     return Refused(
         "not_foretold",
         what,
-        "Use six_observation with the Earth's rate known or left out, servo_six_observation, or by_hand",
+        "Use six_observation or imu with the Earth's rate known or left out, static_attitudes, servo_six_observation, "
+        "or by_hand",
     )
+
+
+def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
+    """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
+    kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
+    kinds["accelerometer"] = bool(accelerometers_of(config))
+    for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
+        if not calibrated and any(getattr(wanted, each) < inf for each in sizes):
+            raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
     """The motions of a procedure; none by hand."""
     if isinstance(procedure, ServoSixObservationSection):
         return plan_servo_six_observation(config.turner, procedure)  # type: ignore[arg-type]
+    if isinstance(procedure, ImuSection):
+        return plan_imu(config.arm, procedure)
+    if isinstance(procedure, StaticAttitudesSection):
+        return plan_static_attitudes(config.arm, procedure)
     if isinstance(procedure, SixObservationSection):
         return plan_six_observation(config.arm, procedure)
     return Plan((), (), ())
@@ -138,46 +159,57 @@ def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_mos
     return sorted(own, key=lambda each: each.duration_s)[-1:]
 
 
-Motions = Callable[[RigConfig], Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]]
-
-
 @dataclass(frozen=True, slots=True)
 class _Swept:
-    """Sweeps of a turner with joints; `motions` are what may be told of them but repeats and rests.
+    """Sweeps or attitudes of a turner with joints; `motions` are what may be told of them but repeats and waits.
 
-    Of each its family, how far it turns, and the keys of the procedure.
+    Of each its family, how far it turns, and the keys of the procedure. `waits` are the keys that say how long is
+    stood still: after a sweep, in an attitude.
     """
 
     config: RigConfig
     made: Made
-    motions: Motions
+    motions: Callable[[RigConfig], Iterator[Motion]]
+    waits: tuple[str, ...] = ("rest_s",)
 
     def candidates(self) -> Sequence[Candidate]:
         found = []
+        shortest_s = dict.fromkeys(self.waits, RESTS_S[0])
         for family, turned, keys in self.motions(self.config):
-            once, twice = (self._procedure(**keys, repeats=repeats, rest_s=RESTS_S[0]) for repeats in (1, 2))
+            once, twice = (self._procedure(**keys, repeats=repeats, **shortest_s) for repeats in (1, 2))
             plan = plan_of(self.config, once)
             if kind_of(self.config.turner).problems([plan], self.config.turner, None):
                 continue
             again_s = plan_of(self.config, twice).duration_s - plan.duration_s
-            rests = sum(1 for step in plan.steps if step.name.startswith("rest"))
-            some = [each for each in REPEATS if each * len(plan.sweeps) <= MOST or each == 1]
-            for repeats, rest_s in product(some, RESTS_S):
-                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * rests * (rest_s - RESTS_S[0])
-                procedure = self._procedure(**keys, repeats=repeats, rest_s=rest_s)
-                found.append(Candidate(procedure, family, (turned, repeats, rest_s), lasting_s))
+            some = [each for each in REPEATS if each * len(plan.sweeps or plan.dwells) <= MOST or each == 1]
+            if any(twice.problems(self.config)):
+                some = [1]
+            for repeats, waits_s in product(some, product(RESTS_S, repeat=len(self.waits))):
+                longer_s = sum(
+                    count * (wait_s - RESTS_S[0]) for count, wait_s in zip(self._counts(plan), waits_s, strict=True)
+                )
+                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * longer_s
+                procedure = self._procedure(**keys, repeats=repeats, **dict(zip(self.waits, waits_s, strict=True)))
+                found.append(Candidate(procedure, family, (turned, repeats, *waits_s), lasting_s))
         return found
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The candidates whose rests are a little shorter, down to the next of the coarse ones."""
-        *sizes, rest_s = best.sizes
-        below = max((each for each in RESTS_S if each < rest_s), default=rest_s)
+        """The candidates that stand still a little shorter, down to the next of the coarse ones."""
+        turned, repeats, *waits_s = best.sizes
+        counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
         found = []
-        for shorter_s in np.arange(below + REST_STEP_S, rest_s - REST_STEP_S / 2, REST_STEP_S).round(3).tolist():
-            procedure = best.procedure.model_copy(update={"rest_s": shorter_s})
-            lasting_s = plan_of(self.config, procedure).duration_s
-            found.append(Candidate(procedure, best.family, (*sizes, shorter_s), lasting_s))
+        for shorter_s in product(*map(_down_from, waits_s)):
+            less_s = sum(
+                count * (wait_s - each_s) for count, wait_s, each_s in zip(counts, waits_s, shorter_s, strict=True)
+            )
+            procedure = best.procedure.model_copy(update=dict(zip(self.waits, shorter_s, strict=True)))
+            found.append(Candidate(procedure, best.family, (turned, repeats, *shorter_s), best.duration_s - less_s))
         return found
+
+    def _counts(self, plan: Plan) -> list[int]:
+        """How many waits of each key a plan has."""
+        rests = sum(1 for step in plan.steps if step.name.startswith("rest"))
+        return [{"rest_s": rests, "dwell_s": len(plan.dwells)}[each] for each in self.waits]
 
     def predict(self, candidate: Candidate) -> Budgets | None:
         return self._predicted(candidate, endless=False)
@@ -198,6 +230,8 @@ class _Swept:
 
     def directions(self, procedure: ProcedureSection) -> Array | None:
         plan = plan_of(self.config, procedure)
+        if not plan.sweeps:
+            return None
         turned = [np.array(sweep.axis_flange) for sweep in plan.sweeps]
         for stage in plan.stages:
             for each in (each for each in plan.sweeps if each.index in stage.indices):
@@ -206,39 +240,21 @@ class _Swept:
 
     def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
         config = self.config.model_copy(update={"procedure": candidate.procedure})
+        plan = plan_of(config, candidate.procedure)
         try:
-            return predicted(config, plan_of(config, candidate.procedure), self.made, endless=endless)
-        except Fault:  # so few sweeps and rests tell nothing
+            rates = predicted(config, plan, self.made, endless=endless) if plan.sweeps else {}
+            return Budgets(rates, predicted_accelerations(config, plan, self.made.kinematics, endless=endless))
+        except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
             return None
 
     def _procedure(self, **keys: object) -> ProcedureSection:
         return self.config.procedure.model_copy(update=keys)
 
 
-def _of_arm(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    procedure = config.procedure
-    assert isinstance(procedure, SixObservationSection)
-    axes = (3, 6) if procedure.axes == 3 and not procedure.stages else (procedure.axes,)
-    speeds: list[tuple[float, Mapping[str, object]]] = [
-        (speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in _speeds_deg_s(config)
-    ]
-    if procedure.speeds_deg_s is not None:
-        speeds = [(min(procedure.speeds), {})]
-    turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
-    for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
-        if arc_deg / slowest <= LONGEST_SWEEP_S:
-            closed = arc_deg % 360 == 0
-            yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
-
-
-def _of_servo(config: RigConfig) -> Iterator[tuple[tuple[object, ...], float, Mapping[str, object]]]:
-    for speed_deg_s, beyond_deg in product(_speeds_deg_s(config), BEYOND_DEG):
-        yield (speed_deg_s,), beyond_deg, {"speed_deg_s": speed_deg_s, "beyond_deg": beyond_deg}
-
-
-def _speeds_deg_s(config: RigConfig) -> list[float]:
-    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / SPEED_TO_RANGE
-    return [speed for speed in SPEEDS_DEG_S if speed <= fastest]
+def _down_from(wait_s: float) -> list[float]:
+    """The waits of so long and of less, down to the next of the coarse ones."""
+    below = max((each for each in RESTS_S if each < wait_s), default=wait_s - REST_STEP_S)
+    return np.arange(wait_s, below + REST_STEP_S / 2, -REST_STEP_S).round(3).tolist()
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,6 +300,6 @@ class _ByHand:
         assert isinstance(section, ByHandSection)
         try:
             moves = list(listed(Asked(section.flips, section.turns)))
-            return predicted_by_hand(self.config, moves, section.rest_s, endless=endless)
+            return Budgets(predicted_by_hand(self.config, moves, section.rest_s, endless=endless))
         except Fault:
             return None

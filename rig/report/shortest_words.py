@@ -10,8 +10,10 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.shortest import Budgets, Planned, Reached, Shortest
+from rig.analysis.shortest import SIZES, Budgets, Planned, Reached, Shortest
+from rig.config.attitude_sets import SETS
 from rig.config.models import ProcedureSection
+from rig.config.procedure_sections import AttitudesSection
 from rig.estimation.optimality import c_efficiency, g_efficiency, named_designs
 from rig.station.plain_text import plain
 
@@ -19,7 +21,15 @@ if TYPE_CHECKING:
     from rig.estimation.arrays import Array
 
 TOLD = 3  # of what limits it, as many lines
+# What may be wanted, by its name in `SIZES`: unit and words.
+SHOWN = {
+    "scale": ("", "the scale factors"),
+    "bias_rad_s": (" rad/s", "the biases"),
+    "acceleration_scale": ("", "the accelerometers' scale factors"),
+    "acceleration_bias_m_s2": (" m/s²", "the accelerometers' biases"),
+}
 WORTH_TELLING = 0.05  # of the variance
+MANY = 8  # more than speeds
 ASSUMED = (
     "Predicted for parts as in their data sheets, at one temperature, with a bias that flickers and does nothing else, "
     "off the nominal mounting by 5° (in stages by uncertainty.mount_deg). A sensor that sits straighter does better, "
@@ -28,9 +38,17 @@ ASSUMED = (
 
 
 def changed_keys(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
-    """The keys of the procedure that differ, with what they are now."""
-    was, now = before.model_dump(mode="json"), after.model_dump(mode="json")
+    """The keys of the procedure that differ, with what they are now; of sets of attitudes that have one, the name."""
+    was, now = _said(before), _said(after)
     return {key: value for key, value in now.items() if was.get(key) != value}
+
+
+def _said(section: ProcedureSection) -> dict[str, Any]:
+    said = section.model_dump(mode="json")
+    if isinstance(section, AttitudesSection):
+        named = {attitudes: name for name, attitudes in SETS.items()}
+        said["attitudes"] = named.get(section.attitudes, said["attitudes"])
+    return said
 
 
 def print_shortest(found: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
@@ -56,15 +74,14 @@ def shortest_document(found: Shortest, section: ProcedureSection) -> dict[str, A
     return {
         "schema": "rig.shortest/1",
         "wanted": {
-            "scale": _finite(found.wanted.scale),
-            "bias_rad_s": _finite(found.wanted.bias_rad_s),
+            **{size: _finite(getattr(found.wanted, size)) for size in SIZES},
             "at_most_s": _finite(found.wanted.at_most_s),
         },
         "reached": found.best is not None,
         "cannot_be_had": found.cannot_be_had,
         "plan": None if shown is None else _plan_entry(shown, section),
         "before": None if found.before is None else _plan_entry(found.before, section),
-        "at_any_length": {"scale": found.at_any_length.scale, "bias_rad_s": found.at_any_length.bias_rad_s},
+        "at_any_length": _sizes_entry(found.at_any_length),
         "optimality": None if found.directions is None else _efficiencies(found.directions),
         "tried": found.tried,
         "among": found.among,
@@ -74,14 +91,18 @@ def shortest_document(found: Shortest, section: ProcedureSection) -> dict[str, A
 def _plan_entry(planned: Planned, section: ProcedureSection) -> dict[str, Any]:
     return {
         "duration_s": planned.candidate.duration_s,
-        "scale": planned.reached.scale,
-        "bias_rad_s": planned.reached.bias_rad_s,
+        **_sizes_entry(planned.reached),
         "changed": changed_keys(section, planned.candidate.procedure),
         "limits": {
             name: [{"contributor": line, "scale_share": scale, "bias_share": bias} for line, scale, bias in lines]
             for name, lines in _shares(planned.budgets).items()
         },
     }
+
+
+def _sizes_entry(reached: Reached) -> dict[str, float | None]:
+    """What is reached; null of a kind of sensor that is not calibrated."""
+    return {size: getattr(reached, size) or None for size in SIZES}
 
 
 def _verdict(found: Shortest) -> str:
@@ -95,12 +116,10 @@ def _verdict(found: Shortest) -> str:
 
 
 def _wish(found: Shortest) -> str:
-    parts = []
-    if found.wanted.scale < inf:
-        parts.append(f"U ≤ {found.wanted.scale:.3g} of the scale factors")
-    if found.wanted.bias_rad_s < inf:
-        parts.append(f"U ≤ {found.wanted.bias_rad_s:.3g} rad/s of the biases")
-    return " and ".join(parts)
+    wanted = {size: getattr(found.wanted, size) for size in SIZES}
+    return " and ".join(
+        f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in wanted.items() if value < inf
+    )
 
 
 def _plans(found: Shortest, shown: Planned, section: ProcedureSection) -> Table:
@@ -109,18 +128,22 @@ def _plans(found: Shortest, shown: Planned, section: ProcedureSection) -> Table:
     for heading in ("", "as in the file", "shortest" if found.best else "nearest"):
         table.add_column(heading, justify="right" if heading else "left")
     before = found.before
-    was = section.model_dump(mode="json")
+    was = _said(section)
     for key, value in changed_keys(section, shown.candidate.procedure).items():
         table.add_row(f"procedure.{key}", plain(_shown(was.get(key))), plain(_shown(value)))
-    for name, place in (("U of the scale factors", "scale"), ("U of the biases, rad/s", "bias_rad_s")):
-        own = "–" if before is None else f"{getattr(before.reached, place):.3g}"
-        table.add_row(name, own, f"{getattr(shown.reached, place):.3g}")
+    for size, (unit, what) in SHOWN.items():
+        if getattr(shown.reached, size) > 0:
+            own = "–" if before is None else f"{getattr(before.reached, size):.3g}"
+            name = f"U of {what}" + unit.replace(" ", ", ")
+            table.add_row(name, own, f"{getattr(shown.reached, size):.3g}")
     own = "–" if before is None else f"{before.candidate.duration_s:.1f}"
     table.add_row("duration, s", own, f"{shown.candidate.duration_s:.1f}")
     return table
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, list) and len(value) > MANY:
+        return f"{len(value)} attitudes"
     return "–" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -137,7 +160,8 @@ def _limits(title: str, budgets: Budgets) -> Table:
 def _shares(budgets: Budgets) -> dict[str, list[tuple[str, float, float]]]:
     """The largest contributors of each sensor: shares of the variance of its worst scale factor and its worst bias."""
     found = {}
-    for name, budget in budgets.items():
+    kinds = {**budgets.rates, **{f"{name}, acceleration": each for name, each in budgets.accelerations.items()}}
+    for name, budget in kinds.items():
         scale, bias = int(np.argmax(budget.std[:3])), 3 + int(np.argmax(budget.std[3:]))
         shares = [
             (each.name, _share(each.std[scale], budget.std[scale]), _share(each.std[bias], budget.std[bias]))
@@ -154,16 +178,15 @@ def _share(part: float, whole: float) -> float:
 
 def _floor(found: Shortest) -> str:
     """What no run of this kind gets below, and why."""
-    least: Reached = found.at_any_length
     parts = []
-    for size, unit, what, place in (
-        (least.scale, "", "the scale factors", 1),
-        (least.bias_rad_s, " rad/s", "the biases", 2),
-    ):
-        lines = [each for each in _shares(found.endless[place - 1]).values() if each]
-        largest = sorted({max(each, key=lambda line: line[place])[0] for each in lines})
-        if size > 0:
-            parts.append(f"U = {size:.2g}{unit} of {what} ({', '.join(largest)})")
+    for place, (size, (unit, what)) in enumerate(SHOWN.items()):
+        least = found.least(size)
+        of_kind = Budgets(least.rates) if place < len(SIZES) // 2 else Budgets({}, least.accelerations)
+        lines = [each for each in _shares(of_kind).values() if each]
+        largest = sorted({max(each, key=lambda line: line[1 + place % 2])[0] for each in lines})
+        value = getattr(least.reached, size)
+        if value > 0:
+            parts.append(f"U = {value:.2g}{unit} of {what} ({', '.join(largest)})")
     return f"However long it is, no run of this kind gets below {' and '.join(parts)}."
 
 

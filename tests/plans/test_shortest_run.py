@@ -11,7 +11,8 @@ import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.predicted import angle_walk_rad_sqrt_s
-from rig.analysis.shortest import Candidate, Reached, Wanted, shortest
+from rig.analysis.predicted_accelerations import predicted_accelerations
+from rig.analysis.shortest import Budgets, Candidate, Reached, Wanted, shortest
 from rig.analysis.surroundings import surroundings_of
 from rig.cli import main
 from rig.config.load import load, parse
@@ -23,9 +24,11 @@ from rig.observation.handled import handled
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
 from rig.plans.registry import installed, sections
-from rig.plans.shortest import ARCS_DEG, shortest_run, tried
+from rig.plans.shortest import plan_of, shortest_run, tried
+from rig.plans.shortest_motions import ARCS_DEG
 from rig.turners import registry as turners
 from rig.world.hand.habits import Action, Flip, Turn
+from support.drawn_accelerations import drawn, solved
 from support.drawn_servo import KNOWN as OF_DRAWN
 from support.drawn_servo import drawn_servo
 from support.drawn_servo import loaded as servo_loaded
@@ -36,8 +39,11 @@ from support.synthetic_run import CONFIG, Setup, synthetic_run
 SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
 PARTS = tuple(SET_TO)
 RATIO = 0.9, 1.15  # of reached to predicted
-OF_SERVO = 0.85, 1.35  # what a gear's ripple leaves differs from turn to turn
+# What a servo's recording says of its turns' noise doubles from one stage to another: see `rig.analysis.uneven_turn`.
+OF_SERVO = 0.85, 1.35
+SCALES = 0.97, 1.03  # as data sheets have them: U of a scale factor grows with it, and nobody knows it beforehand
 SAMPLED_HZ = 238.0
+ARM_RAD = 1e-4  # by which the wrists' axes are off
 # A part that has been calibrated before: its axes are known to be square, and it hardly feels gravity.
 KNOWN = "uncertainty.non_orthogonality_deg=0.02", "uncertainty.g_sensitivity_deg_s_g=0.001"
 
@@ -93,7 +99,8 @@ def as_set(part: str) -> tuple[str, ...]:
 
 def noise_of(of: Run) -> float:
     """RMS of one sample, as the data sheet's random walk makes it."""
-    return float(angle_walk_rad_sqrt_s(config_of(of).sensors["gyro"]) * np.sqrt(SAMPLED_HZ))
+    sensor = config_of(of).sensors["gyro"]
+    return float(angle_walk_rad_sqrt_s(sensor) * np.sqrt(sensor.rate_hz if of.turner == "servo" else SAMPLED_HZ))
 
 
 def reached(of: Run, seed: int) -> Reached:
@@ -107,7 +114,7 @@ def reached(of: Run, seed: int) -> Reached:
             seed=seed,
             part=of.part,
             noise_rad_s=noise_of(of),
-            scale=tuple(rng.uniform(0.97, 1.03, 3).tolist()),
+            scale=tuple(rng.uniform(*SCALES, 3).tolist()),
             mounting_error_rad=off(rng, 5.0),
             speed_deg_s=keys.pop("speed_deg_s", 60.0),
             rest_s=keys.pop("rest_s", 3.0),
@@ -117,8 +124,10 @@ def reached(of: Run, seed: int) -> Reached:
         recorded = synthetic_run(setup)
         runs, sensors, estimator = [recorded], recorded.sensors, "vector"
     else:
-        drawn = drawn_servo(seed, of_servo(of), mounting_deg=1.4, adapter_deg=1.4, noise_rad_s=noise_of(of))
-        runs, sensors, estimator = drawn.runs, drawn.runs[0].sensors, "newton"
+        on_servo = drawn_servo(
+            seed, of_servo(of), mounting_deg=1.4, adapter_deg=1.4, noise_rad_s=noise_of(of), scales=SCALES
+        )
+        runs, sensors, estimator = on_servo.runs, on_servo.runs[0].sensors, "newton"
     seen = observe_recordings(runs)
     found = solve_observed(sensors, seen, estimator, surroundings_of(seen))["gyro"]
     assert found.uncertainty is not None
@@ -145,7 +154,7 @@ def predicted_of(of: Run) -> Reached:
     config = config_of(of)
     budgets = tried(config).predict(Candidate(config.procedure, (), (), 0.0))
     assert budgets is not None
-    return Reached.by(budgets)
+    return budgets.reached
 
 
 @pytest.mark.slow
@@ -157,8 +166,7 @@ def test_what_is_predicted_is_reached(thorough: bool) -> None:
         foretold, found = predicted_of(each), reached(each, seed)
         ratios[each] = found.scale / foretold.scale, found.bias_rad_s / foretold.bias_rad_s
         print(f"{each.turner} {each.part} {dict(each.keys)}: {ratios[each][0]:.3f} {ratios[each][1]:.3f}")
-    wrong = {each: found for each, found in ratios.items() if not _within(each, *found)}
-    assert not wrong
+    assert not {each: found for each, found in ratios.items() if not _within(each, *found)}
 
 
 def _within(of: Run, *ratios: float) -> bool:
@@ -192,7 +200,7 @@ def test_no_plan_of_the_grid_is_shorter(thorough: bool, wanted: Wanted) -> None:
     does = [
         each.duration_s
         for each in grid
-        if (budgets := what.predict(each)) is not None and wanted.met_by(Reached.by(budgets))
+        if (budgets := what.predict(each)) is not None and wanted.met_by(budgets.reached)
     ]
     assert found.best is not None and found.best.candidate.duration_s <= 1.05 * min(does)
     assert found.tried < len(grid) / 2
@@ -246,12 +254,56 @@ def test_the_search_takes_the_least_of_a_grid_it_has_not_seen_whole() -> None:
 Tells = Callable[[Candidate], float]
 
 
-def budgets_of(tells: Tells) -> Callable[[Candidate], dict[str, Budget]]:
-    def predict(each: Candidate) -> dict[str, Budget]:
+def budgets_of(tells: Tells) -> Callable[[Candidate], Budgets]:
+    def predict(each: Candidate) -> Budgets:
         covariance = np.diag([(tells(each) / 2) ** 2] * 6)
-        return {"gyro": Budget((Contributor("all", "B", "normal", None, "", "", np.inf, covariance),))}
+        return Budgets({"gyro": Budget((Contributor("all", "B", "normal", None, "", "", np.inf, covariance),))})
 
     return predict
+
+
+@pytest.mark.slow
+def test_several_speeds_are_tried_and_keep_what_the_file_says_of_them() -> None:
+    speeds = {each.procedure.speeds_deg_s for each in tried(demo()).candidates()}  # type: ignore[attr-defined]
+    assert None in speeds and (15.0, 150.0) in speeds
+    said = load(CONFIGS / "demo.yaml", ["procedure.speeds_deg_s=[20, 50]"], sections(installed()), turners.sections())
+    speeds = {each.procedure.speeds_deg_s for each in tried(said.config).candidates()}  # type: ignore[attr-defined]
+    assert speeds == {(20.0, 50.0)}
+
+
+@cache
+def in_attitudes() -> RigConfig:
+    """The accelerometer of one LSM9DS1."""
+    others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in ("mpu9250", "adis16465")]
+    return load(CONFIGS / "attitudes.yaml", others, sections(installed()), turners.sections()).config
+
+
+@pytest.mark.slow
+def test_attitudes_are_chosen_for_an_accelerometer() -> None:
+    """The scale factors are known soonest in the twelve, the biases better in the eighteen."""
+    scale, bias = (
+        shortest_run(in_attitudes(), wanted)
+        for wanted in (Wanted(acceleration_scale=3e-4), Wanted(acceleration_bias_m_s2=2.8e-3))
+    )
+    assert scale.best is not None and bias.best is not None and scale.before is not None
+    assert [len(each.candidate.procedure.attitudes) for each in (scale.best, bias.best)] == [12, 18]  # type: ignore[attr-defined]
+    assert scale.best.reached.acceleration_scale <= 3e-4 and bias.best.reached.acceleration_bias_m_s2 <= 2.8e-3
+    assert scale.best.candidate.duration_s < scale.before.candidate.duration_s
+
+
+@pytest.mark.slow
+def test_the_accelerometers_uncertainty_is_what_a_drawn_session_reaches() -> None:
+    """On an arm as far off as the configuration states: U of the drawn session has temperatures that stray, too."""
+    said = ["site.gravity_uncertainty_m_s2=1e-5", f"uncertainty.axis_deg={np.degrees(3**0.5 * ARM_RAD):.6f}"]
+    said += ["uncertainty.repeatability_deg=0", "uncertainty.acceleration_lag_ms=0", "procedure.rest_s=1"]
+    others = [f"{where}sensors.{name}=null" for where in ("", "world.") for name in ("mpu9250", "lsm9ds1")]
+    config = load(CONFIGS / "imu.yaml", [*said, *others], sections(installed()), turners.sections()).config
+    made = turners.kind_of(config.turner).meant(config.turner)
+    budgets = predicted_accelerations(config, plan_of(config, config.procedure), made.kinematics)
+    foretold, found = Reached.by({}, budgets), Reached.by({}, {"drawn": solved(drawn("adis16465", 0, ARM_RAD))[1]})
+    low, high = RATIO
+    assert low <= found.acceleration_scale / foretold.acceleration_scale <= high
+    assert low <= found.acceleration_bias_m_s2 / foretold.acceleration_bias_m_s2 <= high
 
 
 @pytest.mark.slow
@@ -263,9 +315,11 @@ def test_arcs_are_tried_where_the_encoders_are_known() -> None:
 
 
 def test_a_procedure_that_is_not_predicted_is_refused() -> None:
-    config = load(CONFIGS / "imu.yaml", (), sections(installed()), turners.sections()).config
+    config = load(CONFIGS / "bias_drift.yaml", (), sections(installed()), turners.sections()).config
     with pytest.raises(Refused, match="not predicted"):
         shortest_run(config, Wanted(scale=1e-3))
+    with pytest.raises(Refused, match="no accelerometer"):
+        shortest_run(demo(), Wanted(acceleration_scale=1e-3))
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ What is drawn anew in each run: the encoder's phases and the noise, the gear's a
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -90,13 +91,14 @@ def drawn_servo(
     mounting_deg: float = 1.0,
     adapter_deg: float = 1.0,
     noise_rad_s: float = 0.035,
+    scales: tuple[float, float] = (0.9, 1.15),
     truth: ServoTruth | None = None,
     source: Source | None = None,
 ) -> Drawn:
     """A run of configs/servo.yaml with these `overrides`, with the samples of another `source` than a board.
 
-    One reading has that noise. The sensor sits `mounting_deg` off its mounting, the item off each stage's by
-    `adapter_deg`, ways drawn anew.
+    One reading has that noise, the scale factors lie between those `scales`. The sensor sits `mounting_deg` off its
+    mounting, the item off each stage's by `adapter_deg`, ways drawn anew.
     """
     rng = np.random.default_rng([seed, 43])
     configuration = loaded((*(f"uncertainty.{each}" for each in KNOWN), *overrides))
@@ -104,7 +106,7 @@ def drawn_servo(
     assert isinstance(config.turner, ServoSection) and isinstance(config.procedure, ServoSixObservationSection)
     plan = plan_servo_six_observation(config.turner, config.procedure)
     settings = settings_of(config, plan)
-    scale, bias = rng.uniform(0.9, 1.15, 3), rng.uniform(-0.02, 0.02, 3)
+    scale, bias = rng.uniform(*scales, 3), rng.uniform(-0.02, 0.02, 3)
     sits = _leaning(rng, config.uncertainty) @ rotation_by(np.radians(mounting_deg) * _direction(rng)).T
     felt = np.radians(config.uncertainty.g_sensitivity_deg_s_g or 0.0) * rng.uniform(-1, 1, (3, 3))
     drift = float(rng.uniform(-3e-5, 3e-5))
@@ -124,7 +126,8 @@ def drawn_servo(
         states, events, end_s = _driven(far, own, 1 / config.turner.state_rate_hz, rng)
         mount = rotation_by(np.radians(adapter_deg) * _direction(rng)).T @ np.array(each.mount)
         model = scale, bias - felt @ sits @ mount[:, 2]
-        sensor, samples = (source or _sampled)(far.servo, sits @ mount, model, (end_s, drift, noise_rad_s), rng)
+        sampled = source or partial(_sampled, rate_hz=config.sensors["gyro"].rate_hz)
+        sensor, samples = sampled(far.servo, sits @ mount, model, (end_s, drift, noise_rad_s), rng)
         runs.append(
             RunData(
                 configuration.rig_text,
@@ -203,11 +206,11 @@ def _driven(
 
 
 def _sampled(
-    servo: Servo, rows: Array, model: tuple[Array, Array], until: Until, rng: np.random.Generator
+    servo: Servo, rows: Array, model: tuple[Array, Array], until: Until, rng: np.random.Generator, *, rate_hz: float
 ) -> tuple[RecordedSensor, np.ndarray]:
     """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until
-    time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / SENSOR.rate_hz)
+    time_s = np.arange(BEGINS_S + 0.2, end_s - 0.2, 1 / rate_hz)
     rates = np.array([servo.rate_at(each) for each in time_s.tolist()])
     read = np.outer(rates, rows[:, 2]) / scale - bias + noise_rad_s * rng.normal(size=(len(time_s), 3))
     samples = np.zeros(len(time_s), SAMPLE_DTYPE)
@@ -216,4 +219,4 @@ def _sampled(
     samples["host_time_s"] = time_s + 1e4
     samples["counts"] = np.round(read / SENSITIVITY)
     samples["temperature_counts"] = -48
-    return SENSOR, samples
+    return replace(SENSOR, rate_hz=rate_hz), samples

@@ -1,0 +1,65 @@
+"""Motions that the search for the shortest run tries: sweeps, attitudes, turns of a servo. Pure."""
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+
+from rig.config.attitude_sets import SETS
+from rig.config.models import RigConfig
+from rig.config.procedure_sections import LONGEST_SWEEP_S, AttitudesSection, SixSweepsSection
+from rig.config.servo_procedure import SPEED_TO_RANGE
+
+SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
+ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them
+TURNS_DEG = (360.0, 720.0, 1080.0)
+BEYOND_DEG = (45.0, 90.0, 180.0)  # of a servo's turn
+
+# Its family, how far it turns, and the keys of the procedure that say so.
+Motion = tuple[tuple[object, ...], float, Mapping[str, object]]
+
+
+def of_arm(config: RigConfig) -> Iterator[Motion]:
+    """Sweeps about three axes or six, at one speed or at two, over turns or arcs; the several speeds of a file stay."""
+    procedure = config.procedure
+    assert isinstance(procedure, SixSweepsSection)
+    axes = (3, 6) if procedure.axes == 3 and not procedure.mountings else (procedure.axes,)
+    several, some = procedure.speeds_deg_s, _speeds_deg_s(config)
+    speeds: list[tuple[float, Mapping[str, object]]] = [
+        *((speed, {"speed_deg_s": speed, "speeds_deg_s": None}) for speed in some),
+        *((speed, {"speeds_deg_s": (speed, some[-1])}) for speed in some[:-1]),
+    ]
+    if several is not None:
+        speeds = [(min(several), {})]
+    turned = TURNS_DEG if config.uncertainty.angle_std_deg is None or config.magnetometers else (*ARCS_DEG, *TURNS_DEG)
+    for count, (slowest, keys), arc_deg in product(axes, speeds, turned):
+        if arc_deg / slowest <= LONGEST_SWEEP_S:
+            closed = arc_deg % 360 == 0
+            yield (count, *keys.values(), closed), arc_deg, {**keys, "axes": count, "arc_deg": arc_deg}
+
+
+def of_attitudes(config: RigConfig) -> Iterator[Motion]:
+    """The attitudes of the file and the sets that have a name; for magnetometers the file's alone."""
+    procedure = config.procedure
+    assert isinstance(procedure, AttitudesSection)
+    sets = [procedure.attitudes, *(() if config.magnetometers else SETS.values())]
+    for attitudes in dict.fromkeys(sets):
+        yield (attitudes,), 0.0, {"attitudes": attitudes}
+
+
+def of_imu(config: RigConfig) -> Iterator[Motion]:
+    """Sweeps and attitudes: whole turns at one speed, once round, for an accelerometer's wave is that of one."""
+    once_round = (each for each in of_arm(config) if each[1] == TURNS_DEG[0])
+    own = config.procedure.speeds_deg_s  # type: ignore[attr-defined]
+    turns = [each for each in once_round if each[2].get("speeds_deg_s", own) == own]
+    for (family, turned, keys), (attitudes, _, stood) in product(turns, of_attitudes(config)):
+        yield (*family, *attitudes), turned, {**keys, **stood}
+
+
+def of_servo(config: RigConfig) -> Iterator[Motion]:
+    """Turns of a servo at one speed, and how far beyond."""
+    for speed_deg_s, beyond_deg in product(_speeds_deg_s(config), BEYOND_DEG):
+        yield (speed_deg_s,), beyond_deg, {"speed_deg_s": speed_deg_s, "beyond_deg": beyond_deg}
+
+
+def _speeds_deg_s(config: RigConfig) -> list[float]:
+    fastest = min(sensor.range_deg_s for sensor in config.sensors.values()) / SPEED_TO_RANGE
+    return [speed for speed in SPEEDS_DEG_S if speed <= fastest]
