@@ -76,7 +76,7 @@ EVENTS: tuple[Event, ...] = (
     SweepStarted(SWEEP),
     SweepFinished(SWEEP),
     BoardObserved("gyro", 0, 1.001, BoardObservation(0, 1_000_000, 7_000_000, 1400, (0.1, -0.2, -1.0))),
-    BoardNotObserved("gyro", 1, "µ\n" * 400),
+    BoardNotObserved("gyro", 1, "µ " * 400),
     BoardRecalled("gyro", 2),
     BoardSolved("gyro", BoardSolution("closed_form", "solved", 6, 1, (1.1, 1.2, 0.9), (0.01, 0.0, -0.02))),
 )
