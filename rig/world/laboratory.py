@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
+from weakref import WeakSet
 
 import numpy as np
 
@@ -49,7 +50,9 @@ class Laboratory:
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self._mount = np.eye(3)  # from the flange's frame to the item's
         self._laid_in: set[str] = set()  # parts of a series
-        self._mounted: list[SensorTruth | MountedMagnetometer] = []  # all that sits on the item
+        self._mounted = WeakSet[
+            SensorTruth | MountedMagnetometer
+        ]()  # all on the item, while it is there
         # By the sensor's name; an autopilot, which may have several, by its port.
         self.instruments: Mapping[str, Place] = {
             **mounts(config, world),
@@ -155,7 +158,7 @@ class Laboratory:
 
     def _on_the_item(self, sensor: SensorTruth | MountedMagnetometer) -> None:
         sensor.mount_anew(self._mount)
-        self._mounted.append(sensor)
+        self._mounted.add(sensor)
 
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""

@@ -170,6 +170,7 @@ class World:
     def fit_part(self, part: str) -> None:
         """Exchange the board for that of another part, as the simulated operator does."""
         self.unplug_board()
+        gc.collect()  # an emulated board holds itself, and some megabytes: by itself it would stay for several parts
         if self.laboratory.fit(part):
             self.plug_in_board()
 

@@ -1,9 +1,8 @@
 """What the floor shows of stations and of a history, and who may ask for it."""
 
 import http.client
+import json
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack
 from datetime import date, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +17,7 @@ from rig.batch.now import Now, Present, after, last, of_batch
 from rig.errors import Fault, Refused
 from rig.floor import shown
 from rig.floor.feed import looking
+from rig.floor.heartbeat import heartbeat
 from rig.history import stations
 from rig.history.place import place
 from rig.history.stations import Told
@@ -28,13 +28,10 @@ from rig.page.feed import frame_of
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
-from support.beating_station import beating
-from support.floor_seen import sections, until
 from support.past_runs import FIRST, finished
-from support.postgres import postgresql
+from support.waiting import wait_for
 
 AT = "2026-11-25T08:00:00+00:00"
-LATEST_S = 15.0  # within which the floor shows what has become of a rig: 5 s, and a busy machine's patience
 
 
 def told(now: Now, age_s: float = 0.4) -> Told:
@@ -115,35 +112,25 @@ def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: P
     assert shown.recalls(pasts, date(2020, 1, 1)) == []
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
-    if request.param == "sqlite":
-        yield str(tmp_path / "history.sqlite")
-        return
-    with postgresql() as found:
-        yield found
+def states_become(feed: Sections, wanted: dict[str, str]) -> None:
+    """Wait until the floor shows each rig in the state that is wanted."""
+
+    def so() -> bool:
+        shown_now = json.loads(feed.whole().split(b"data: ", 1)[1])
+        return {each["rig"]: each["state"] for each in shown_now.get("rigs", ())} == wanted
+
+    wait_for(so, f"the floor shows {wanted}")
 
 
-@pytest.mark.thorough
 @pytest.mark.slow
-def test_five_rigs_on_one_history_one_killed_one_unplugged(url: str) -> None:
-    with open_history(url), ExitStack() as stack:
-        stations_there = {name: stack.enter_context(beating(url, name)) for name in map(str, range(1, 6))}
-        feed = stack.enter_context(looking(place(url)))
-        until(feed, lambda states: states == dict.fromkeys(stations_there, "running"), within_s=120.0)
-        stations_there["2"].kill()
-        pulled = stations_there["4"].stdin
-        assert pulled is not None
-        pulled.write("board_link_lost\n")
-        pulled.flush()
-        wanted = {"1": "running", "2": "dead", "3": "running", "4": "fault", "5": "running"}
-        until(feed, lambda states: states == wanted, within_s=LATEST_S)
-        of_4 = next(each for each in sections(feed)["rigs"] if each["rig"] == "4")
-        assert of_4["doing"].startswith("board_link_lost") and of_4["part"] == "4-001"
-        ended = stations_there["1"].stdin
-        assert ended is not None
-        ended.close()  # it ends in the middle of its batch, and says so
-        until(feed, lambda states: states == {**wanted, "1": "stopped"}, within_s=LATEST_S)
+def test_what_stations_tell_a_history_is_on_the_floor(tmp_path: Path) -> None:
+    where = place(str(tmp_path / "history.sqlite"))
+    with open_history(where), looking(where) as feed:
+        with heartbeat("bench 1", where, Now("running")), heartbeat("bench 2", where, Now("waiting")) as second:
+            states_become(feed, {"bench 1": "running", "bench 2": "waiting"})
+            second.hear(Now("fault", doing="board_link_lost: the cable was pulled out"))
+            states_become(feed, {"bench 1": "running", "bench 2": "fault"})
+        states_become(feed, {"bench 1": "stopped", "bench 2": "fault"})
 
 
 @pytest.mark.slow

@@ -1,76 +1,91 @@
-"""Five rigs on one PostgreSQL, two of them whole ones at work: one is killed, of one the board is unplugged."""
+"""Five rigs on one PostgreSQL, as a browser shows them: one is killed, of one the board is unplugged.
 
-import os
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+Each is a `rig station` with a laboratory of its own. Two of them measure; the others wait for an operator.
+"""
+
+import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from selenium.webdriver import Chrome
 
-from rig.floor.feed import looking
-from rig.history.place import place
-from rig.history.store import open_history
-from support.beating_station import beating
+from support.browser import needs_browser, picture, text, until
+from support.command_with_a_page import with_a_page
 from support.commands import configuration
-from support.floor_seen import sections, until
+from support.crowd import kept, timed, told
 from support.postgres import postgresql
+from support.scanner import Scanner, station
 from support.station_laboratory import Laboratory
 
 WITHIN_S = 5.0
-BUSY_S, BEGUN_S = 120.0, 900.0  # the patience with a machine whose processors are all taken
-pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough]
+BUSY_S = 300.0  # the patience with a machine whose processors are all taken
+UNPLUGGED, KILLED, WAITS, MOUNTS, AGREES = RIGS = ("unplugged", "killed", "waits", "mounts", "agrees")
+AT_WORK = {UNPLUGGED: "running", KILLED: "running", WAITS: "waiting", MOUNTS: "asking", AGREES: "asking"}
+pytestmark = [
+    pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough, needs_browser,
+    pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere"),
+]  # fmt: skip
 
 
-@contextmanager
-def whole(folder: Path, url: str, rig: str) -> Iterator[tuple["subprocess.Popen[bytes]", Path]]:
-    """A station at work on three parts without questions, and its configuration."""
-    folder.mkdir()
-    config = configuration(folder, {"history": {"rig": rig}, "world": {"time_scale": 1}})
-    parts = folder / "parts.csv"
-    parts.write_text("".join(f"{rig}-{number}\n" for number in (1, 2, 3)), encoding="utf-8")
-    words = "station", config, "--series", parts, "--out", folder / "batch"
-    command, env = [sys.executable, "-m", "rig", *map(str, words)], {**os.environ, "RIG_HISTORY": url}
-    with (
-        (folder / "told.txt").open("wb") as told,
-        subprocess.Popen(command, stdout=told, stderr=told, env=env) as process,
-    ):
-        try:
-            yield process, config
-        finally:
-            process.kill()
+def states(driver: Chrome) -> dict[str, str]:
+    """The state of each rig that the page shows, in one go: its cards are made anew every second."""
+    each = "[each.querySelector('span').innerText, each.dataset.state]"
+    return dict(driver.execute_script(f"return [...document.querySelectorAll('.rig')].map((each) => {each})"))
 
 
-def seen_at_work(*rigs: str) -> Callable[[dict[str, str]], bool]:
-    """Whether each of these has been seen running; on a busy machine one may be silent for a while."""
-    seen = set[str]()
+def card(driver: Chrome, rig: str) -> str:
+    """What the card of a rig says."""
+    script = "return [...document.querySelectorAll('.rig')].map((each) => each.innerText)"
+    return next(str(each) for each in driver.execute_script(script) if str(each).startswith(rig))
 
-    def all_seen(states: dict[str, str]) -> bool:
-        seen.update(rig for rig, state in states.items() if state == "running")
-        return seen.issuperset(rigs)
 
-    return all_seen
+def mounted(at: Scanner) -> None:
+    """The part that was named is mounted; it is checked without moving."""
+    at.waits_for("then Enter")
+    at.types("")
+    at.waits_for("Type go to start: ")
 
 
 @pytest.mark.timeout(1800)
-def test_five_rigs_of_which_two_are_whole_are_shown_as_they_are(tmp_path: Path) -> None:
+def test_five_rigs_at_once_of_which_one_is_killed_and_one_unplugged_are_shown_as_they_are(
+    driver: Chrome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with postgresql() as url, ExitStack() as stack:
-        stack.enter_context(open_history(url))
-        others = {name: stack.enter_context(beating(url, name)) for name in ("3", "4", "5")}
-        unplugged, config = stack.enter_context(whole(tmp_path / "one", url, "1"))
-        killed, _ = stack.enter_context(whole(tmp_path / "two", url, "2"))
-        feed = stack.enter_context(looking(place(url)))
-        until(feed, seen_at_work("1", "2", *others), within_s=BEGUN_S)
-        until(feed, lambda states: (states.get("1"), states.get("2")) == ("running", "running"), within_s=BEGUN_S)
-        within_s = WITHIN_S if os.getloadavg()[0] <= (os.cpu_count() or 1) + 1 else BUSY_S
-        killed.kill()
-        Laboratory(config)("unplug_board")
-        began_s = time.monotonic()
-        until(feed, lambda states: (states.get("1"), states.get("2")) == ("fault", "dead"), within_s=within_s)
-        print(f"a killed and an unplugged rig are shown after {time.monotonic() - began_s:.1f} s")
-        cards = {each["rig"]: each for each in sections(feed)["rigs"]}
-        assert cards["1"]["doing"].startswith("board_link_lost") and cards["1"]["part"] == "1-1"
-        until(feed, seen_at_work(*others), within_s=BUSY_S)
-        assert unplugged.wait(BUSY_S) == 3
+        monkeypatch.setenv("RIG_HISTORY", url)
+        configs = dict[str, Path]()
+        for rig in RIGS:
+            (tmp_path / rig).mkdir()
+            configs[rig] = configuration(tmp_path / rig, {"history": {"rig": rig}, "world": {"time_scale": 1}})
+        _, page = stack.enter_context(with_a_page(tmp_path / "told.txt", "floor", "--history", url))
+        at = {rig: stack.enter_context(station(configs[rig], "--out", tmp_path / rig / "batch")) for rig in RIGS}
+        driver.get(page)
+        for rig in RIGS:
+            at[rig].waits_for("serial number (Enter alone ends): ")
+        for rig in (UNPLUGGED, KILLED, MOUNTS, AGREES):
+            at[rig].types(f"{rig}-1")
+        for rig in (UNPLUGGED, KILLED, AGREES):
+            mounted(at[rig])
+        for rig in (UNPLUGGED, KILLED):
+            at[rig].types("go")
+        until(lambda: states(driver) == AT_WORK, "all at work", BUSY_S)
+
+        shown = list[tuple[float, float]]()
+        with timed(WITHIN_S, shown):
+            at[KILLED].process.kill()
+            Laboratory(configs[UNPLUGGED])("unplug_board")
+            until(lambda: states(driver)[UNPLUGGED] == "fault" and states(driver)[KILLED] == "dead", "both", BUSY_S)
+        print("both are shown after", told(shown))
+        assert kept(shown)
+        until(lambda: states(driver) == {**AT_WORK, UNPLUGGED: "fault", KILLED: "dead"}, "the others as before", BUSY_S)
+        assert "board_link_lost" in card(driver, UNPLUGGED) and f"{UNPLUGGED}-1" in card(driver, UNPLUGGED)
+        assert "no sign of life" in card(driver, KILLED)
+        picture(driver, "floor-of-five")
+        assert not Laboratory(configs[UNPLUGGED])("state")["moving"]
+
+        at[WAITS].types("")
+        at[MOUNTS].process.send_signal(signal.SIGINT)
+        said = {WAITS: "ended", MOUNTS: "stopped", UNPLUGGED: "fault", KILLED: "dead", AGREES: "asking"}
+        until(lambda: states(driver) == said, "how two others have ended", BUSY_S)
+        assert not driver.find_element("id", "stale").is_displayed() and text(driver, "link-words") == "connected"
+        driver.get("about:blank")  # a page whose server ends would complain of it

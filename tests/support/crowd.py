@@ -1,5 +1,6 @@
 """How busy this machine was while a limit ran: what is late may be late by that, and a limit says nothing beyond it."""
 
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -54,3 +55,27 @@ def soon(condition: Callable[[], object], what: str, limit_s: float) -> None:
     with watched_crowd() as crowd:
         wait_for(condition, what)
     assert time.monotonic() - began_s < crowd.stretched(limit_s), f"it took too long: {what}"
+
+
+def has_the_machine() -> bool:
+    """Whether nobody else is busy on this machine, or only those who come after this process."""
+    return os.nice(0) < 0 or os.getloadavg()[0] <= (os.cpu_count() or 1)
+
+
+@contextmanager
+def timed(limit_s: float, times: list[tuple[float, float]]) -> Iterator[None]:
+    """Adds to `times` how long what is inside took, and how long it may: `limit_s`, or more on a crowded machine."""
+    began_s = time.monotonic()
+    with watched_crowd() as crowd:
+        yield
+    times.append((time.monotonic() - began_s, limit_s if has_the_machine() else crowd.stretched(limit_s)))
+
+
+def kept(times: list[tuple[float, float]]) -> bool:
+    """Whether each of these is as short as it has to be."""
+    return all(took_s <= limit_s for took_s, limit_s in times)
+
+
+def told(times: list[tuple[float, float]]) -> str:
+    """The times in words."""
+    return ", ".join(f"{took_s:.2f} s (limit {limit_s:.1f})" for took_s, limit_s in times)
