@@ -50,9 +50,7 @@ class Laboratory:
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self._mount = np.eye(3)  # from the flange's frame to the item's
         self._laid_in: set[str] = set()  # parts of a series
-        self._mounted = WeakSet[
-            SensorTruth | MountedMagnetometer
-        ]()  # all on the item, while it is there
+        self._mounted = WeakSet[SensorTruth | MountedMagnetometer]()  # all on the item, while it is there
         # By the sensor's name; an autopilot, which may have several, by its port.
         self.instruments: Mapping[str, Place] = {
             **mounts(config, world),
