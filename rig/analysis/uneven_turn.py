@@ -22,8 +22,6 @@ CLOCK = 3e-3
 TURNS = 8  # made up, each with noise of its own, and with its readings at places of their own
 ITERATIONS = 5  # the encoder's error is inverted to 1e-9 of it by then
 ROUNDED = 0.01  # of the noise: a step of the readings
-
-
 WORST_OF_THREE = 0.846  # standard deviations that the largest of three normal numbers lies over their mean
 
 
