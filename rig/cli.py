@@ -58,6 +58,7 @@ _AT_ONCE = {  # what a command that begins by loading libraries for a second say
     "solve": "reading the recording",
     "allan": "reading the recording",
     "report": "reading the result",
+    "show": "reading the result",
     "verify": "looking at the signatures",
     "export": "reading the run",
     "history": "opening the history",
