@@ -71,7 +71,7 @@ FAULTS: dict[str, tuple[Act, int, str]] = {
     "every reply lost": (asked(do="servo_fault", lose=1000000), 3, "servo_link_lost"),
     "the board's cable pulled": (asked(do="unplug_board"), 3, "board"),
     "the board silent": (asked(do="silence_board", on=True), 3, "board"),
-    "the sensor silent": (asked(do="sensor_fault", sensor="gyro", fault="silent"), 3, "gyro"),
+    "the sensor silent": (asked(do="sensor_fault", sensor="gyro", fault="silent"), 3, "sensor_silent"),
 }
 MOMENTS = {"in the first turn": (1, 0.8), "in the second mounting": (2, 0.8), "as a turn begins": (2, 0.0),
            "braking": (3, 2.0), "in the last mounting": (3, 0.5)}  # fmt: skip
