@@ -76,7 +76,9 @@ FAULTS: dict[str, tuple[Act, int, str]] = {
 MOMENTS = {"in the first turn": (1, 0.8), "in the second mounting": (2, 0.8), "as a turn begins": (2, 0.0),
            "braking": (3, 2.0), "in the last mounting": (3, 0.5)}  # fmt: skip
 UNANSWERED = ("servo_link_lost", "servo_replies_damaged")  # of an instruction: the servo does not hear
-KNOWN_S = {"shaft held fast": 2.0}  # an overload is known when it has lasted
+# An overload is known when it has lasted; of a board that is silent either for 2 s of a turn, or when the turn has ended
+# meanwhile, and 4 s of no answer have followed.
+KNOWN_S = {"shaft held fast": 2.0, "the board silent": 5.0}
 
 
 @pytest.mark.proof
