@@ -76,8 +76,8 @@ FAULTS: dict[str, tuple[Act, int, str]] = {
 MOMENTS = {"in the first turn": (1, 0.8), "in the second mounting": (2, 0.8), "as a turn begins": (2, 0.0),
            "braking": (3, 2.0), "in the last mounting": (3, 0.5)}  # fmt: skip
 UNANSWERED = ("servo_link_lost", "servo_replies_damaged")  # of an instruction: the servo does not hear
-# An overload is known when it has lasted; of a board that is silent either for 2 s of a turn, or when the turn has ended
-# meanwhile, and 4 s of no answer have followed.
+# An overload is known when it has lasted; that a board is silent, after 2 s of a turn, or where the turn has ended
+# meanwhile, after 4 s without an answer.
 KNOWN_S = {"shaft held fast": 2.0, "the board silent": 5.0}
 
 
