@@ -52,9 +52,9 @@ class Allowed:
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; and of its
     angle about what its encoder tells at one mark, `encoder_rad`, zero where all sweeps are whole turns; `jitter_s` of
-    the times of the arm's states; `mount_rad` of an item that was mounted anew, about each axis; `earth_rad_s` (3, k)
-    of the Earth's rate in the base's frame, for each way in which it is not known; `curve` is the sensor's
-    nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
+    the times of the arm's states, `stamp_s` of those of the sensor's samples; `mount_rad` of an item that was mounted
+    anew, about each axis; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which it is not
+    known; `curve` is the sensor's nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
     """
 
     angles_rad: Array
@@ -66,16 +66,18 @@ class Allowed:
     curve: Curve
     sensor: KnownSensor | None
     at_s: Array
+    stamp_s: float = 0.0
 
 
-def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
+def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_std_s: float | None = None) -> Allowed:
     """What is allowed of a gyroscope and the arm, by what the configuration states and the recording tells.
 
     A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed states one
     scale factor for either way, which an even part makes two: it excuses no more than what is stated of that alone.
+    `stamp_std_s` is as of `RecordedSensor`.
     """
     sensor, explained = result.sensor, result.explained
-    return allowed_of(
+    known = allowed_of(
         surroundings.uncertainty,
         (name, sensor.part, sensor.range_rad_s or 0.0),
         finds_curve=explained is not None and explained.nonlinearity is not None,
@@ -85,6 +87,7 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
     )
+    return replace(known, stamp_s=stamp_std_s or 0.0)
 
 
 def allowed_of(
@@ -145,6 +148,7 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
             _of_angles(pieces, known),
             _of_marks(pieces, known.encoder_rad),
             _of_times(pieces, known.jitter_s),
+            _of_stamps(pieces, known.stamp_s),
             *_of_speeds(pieces),
             *_of_mounts(pieces, known.mount_rad),
             np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
@@ -257,6 +261,15 @@ def _of_times(pieces: Pieces, jitter_s: float) -> Array:
     for place, (sweep, time_s) in enumerate(edges):
         start, end = (np.abs(pieces.times_s - time_s) < 1e-5).T & (pieces.sweep == sweep)
         found[place] = jitter_s * (end.astype(np.float64) - start)[:, None] * pieces.rates_rad_s / lengths
+    return found
+
+
+def _of_stamps(pieces: Pieces, stamp_s: float) -> Array:
+    """Patterns of how long each way lasted by its first and last sample; the mean of a steady turn takes no harm."""
+    ways = np.flatnonzero((pieces.sweep < REST) & (stamp_s > 0))
+    found = np.zeros((len(ways), *pieces.means_rad_s.shape))
+    lasting_s = np.diff(pieces.times_s[ways])
+    found[np.arange(len(ways)), ways] = np.sqrt(2) * stamp_s * pieces.rates_rad_s[ways] / lasting_s
     return found
 
 

@@ -76,7 +76,7 @@ def contradictions(
         pieces = cut(name, recordings, results[name], explained, settings.site)
         allowance = None
         if surroundings is not None and settings.checked_by_model:
-            known = allowed(surroundings, name, results[name])
+            known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
             allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
         gyroscope = recordings[0].run.sensors[name].channel(RATE)
