@@ -181,7 +181,7 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
         ("program_stopped", {"do": "stop_program"}),
         ("speed_slider", {"do": "speed_slider", "fraction": 0.5}),
         ("arm_link_lost", {"do": "close_arm"}),
-        ("arm_link_lost", {"do": "silence_arm", "duration_s": 4.0}),
+        ("arm_link_lost", {"do": "silence_arm", "duration_s": 8.0}),  # a crowd stretches how long it may be silent
         ("arm_link_lost", {"do": "hold"}),  # the controller's time stands still
     ],
 )
