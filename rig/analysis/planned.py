@@ -10,7 +10,7 @@ from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
-from rig.analysis.planned_reference import planned_read
+from rig.analysis.planned_reference import planned_accelerometers, planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference
 from rig.analysis.vector_inputs import known_sensor
@@ -52,14 +52,8 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
             name: _told_from(name, each, turned, settings, rate, site=site, known=known)
             for name, each in config.to_calibrate.items()
         }
-    attitudes = plan.dwells if isinstance(config.turner, ArmSection) else ()
-    read = {
-        name: planned_read(
-            name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g, arm=turner
-        )
-        for name, each in config.to_calibrate.items()
-        if attitudes and each.acceleration is not None and each.acceleration.range_g is not None
-    }
+    on_arm = isinstance(config.turner, ArmSection) and plan.dwells
+    read = {each.name: planned_read(each) for each in planned_accelerometers(config, plan, turner)} if on_arm else {}
     found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
 
