@@ -20,6 +20,7 @@ from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Dwells,
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.imu import ImuSolution, solve_imu
+from rig.estimation.magnetometer import MagnetometerSolution
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
@@ -159,7 +160,7 @@ def _calibrated(
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
-    weighted = _beside(partial(solve, method="attitude_weighted"))
+    weighted = fit_or_fault(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
         check_axes(SensorAxes.of(weighted.matrix).axes, np.eye(3))
     elif movement.own is None:
@@ -178,6 +179,7 @@ def _calibrated(
     check_axes(axes.axes, np.eye(3))
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+    others = {each: fit_or_fault(partial(solve, method=each)) for each in BESIDE[1:]}
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
@@ -198,7 +200,7 @@ def _calibrated(
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
-        beside={"attitude_weighted": weighted, **{each: _beside(partial(solve, method=each)) for each in BESIDE[1:]}},
+        beside={"attitude_weighted": weighted, **others},
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
@@ -274,7 +276,8 @@ def _repeatability_rad(settings: RunSettings) -> float:
     return float(np.radians(settings.uncertainty.repeatability_deg) / np.sqrt(3))
 
 
-def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fault:
+def fit_or_fault(solve: Callable[[], AccelerometerSolution | MagnetometerSolution]) -> TriaxialSolution | Fault:
+    """The fit of another method's solution, or the Fault it ends in."""
     found = or_fault(solve)
     return found if isinstance(found, Fault) else found.fit
 

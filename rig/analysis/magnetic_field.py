@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.acceleration import AccelerometerResult, fit_or_fault
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
 from rig.data.quantity import FIELD
@@ -32,7 +32,7 @@ from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
-from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method
+from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution
 from rig.observation.field import FieldReading, beside, field_readings, field_tests
 from rig.observation.observed_run import ObservedRun
 
@@ -63,7 +63,7 @@ class MagnetometerResult:
     budget: Budget
     non_orthogonality_rad: Array
     non_orthogonality_std_rad: Array
-    beside: Mapping[Method, MagnetometerSolution | Fault]
+    beside: Mapping[Method, TriaxialSolution | Fault]
     dwells: tuple[FieldReading, ...]
     seen: Dwells
 
@@ -130,7 +130,7 @@ def _calibrated(
         ),
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
-        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
+        beside={method: fit_or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,
         seen=Dwells(means, variances, attitudes),
     )
