@@ -7,10 +7,11 @@ import numpy as np
 
 from rig.analysis.arm_patterns import Stood, arm_turns
 from rig.analysis.vector_inputs import since_first_s
+from rig.config.judged_by import OfSensor
 from rig.data.budget_entries import IN_U
 from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.settings import OfSensor, Uncertainty
+from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array

@@ -180,11 +180,11 @@ def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing
     range_m_s2 = sensor.channel(ACCELERATION).range
     assert known is not None and range_m_s2 is not None
     assert sheet_of(known, "gyro", sensor.part, range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
-    said = replace(
-        known, acceleration_nonlinearity_percent={"gyro": 0.1}, acceleration_nonlinear_over_g={"gyro": 1.0},
-        acceleration_bias_mg_k={"gyro": 0.2}, acceleration_scale_ppm_k={"gyro": 30.0},
-        acceleration_bias_instability_ug={"gyro": 4.0},
-    )  # fmt: skip
+    said = known.model_copy(update={
+        "acceleration_nonlinearity_percent": {"gyro": 0.1}, "acceleration_nonlinear_over_g": {"gyro": 1.0},
+        "acceleration_bias_mg_k": {"gyro": 0.2}, "acceleration_scale_ppm_k": {"gyro": 30.0},
+        "acceleration_bias_instability_ug": {"gyro": 4.0},
+    })  # fmt: skip
     assert sheet_of(said, "gyro", sensor.part, range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
