@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult, fit_or_fault
+from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
 from rig.data.quantity import FIELD
@@ -22,7 +22,6 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import (
     FieldDrift,
-    MagnetometerSolution,
     Uniformity,
     field_drift,
     solve_magnetometer,
@@ -55,7 +54,7 @@ class MagnetometerResult:
     sensor: RecordedSensor
     field_t: float
     extension_m: tuple[float, float, float]
-    solution: MagnetometerSolution
+    solution: TriaxialSolution
     uniformity: Uniformity
     drift: FieldDrift | None
     scale: Array
@@ -130,7 +129,7 @@ def _calibrated(
         ),
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
-        beside={method: fit_or_fault(partial(solve, method=method)) for method in BESIDE},
+        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,
         seen=Dwells(means, variances, attitudes),
     )
@@ -182,7 +181,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
     return found
 
 
-def _solved(solve: Callable[..., MagnetometerSolution]) -> MagnetometerSolution:
+def _solved(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
     """Raises Fault `field_not_uniform`: the accelerometer has found the same attitudes good."""
     try:
         return solve(method=ESTIMATOR)
@@ -203,8 +202,8 @@ def _attitude_error_rad(
     return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
 
 
-def _not_alike(found: Uniformity, solution: MagnetometerSolution) -> str:
-    left_t = np.sqrt(np.mean(solution.fit.residuals**2))
+def _not_alike(found: Uniformity, solution: TriaxialSolution) -> str:
+    left_t = np.sqrt(np.mean(solution.residuals**2))
     return (
         f"the field is not the same in all attitudes: χ² of what the model leaves is {found.chi_square:.4g}, "
         f"{found.limit:.3g} at most by noise and by attitudes off by {1e3 * found.attitude_error_rad:.2g} mrad; "

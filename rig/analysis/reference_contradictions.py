@@ -101,9 +101,9 @@ def of_magnetometer(
     timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
-    theta = _theta(solution.matrix, solution.field_table_t, solution.bias_t)
+    theta = _theta(solution.matrix, solution.reference, solution.bias)
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
-    off_rad = 0.0 if solution.fit.attitude_error is None else solution.fit.attitude_error.std_rad
+    off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
     of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
     return ReadInReference(

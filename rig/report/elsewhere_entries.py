@@ -63,7 +63,7 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
             arm_field_in_bias=False,
             field_t=site.magnetic_field_t,
             field_base_t=result.solution.reference,
-            hard_iron_t=np.linalg.solve(result.solution.matrix, result.solution.bias),
+            hard_iron_t=magnetometer.hard_iron(result.solution),
             dwells=_dwells(FieldDwellEntry, FIELD, result),
             beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
         )

@@ -82,15 +82,15 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
     solution = solve_magnetometer(
         readings, told, variances, field_t=FIELD_T, side=-np.eye(3)[2], method="attitude_weighted"
     )
-    assert solution.fit.attitude_error is not None
+    assert solution.attitude_error is not None
     tests = [bias, bias + drift] + TEST_NOISE_T / np.sqrt(2) * rng.normal(size=(2, 3))
     tested = (
-        uniformity(solution, readings, told, variances, solution.fit.attitude_error.std_rad),
+        uniformity(solution, readings, told, variances, solution.attitude_error.std_rad),
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
     budget = magnetometer_budget(solution, told, variances, tested, site, field_t=FIELD_T)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias_t - bias])
+    off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias - bias])
     return off / budget.std, budget, off / own_spread(budget)
 
 

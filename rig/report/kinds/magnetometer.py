@@ -19,7 +19,7 @@ from rig.data.magnetometer_entries import (
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
-from rig.estimation.magnetometer import MODEL
+from rig.estimation.magnetometer import MODEL, hard_iron
 from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.six_observation import PARAMETERS
 from rig.report.axes import beside_entries, dwell_entry, triple
@@ -53,11 +53,11 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
     """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
-    solution, error = result.solution, result.solution.fit.attitude_error
+    solution, error = result.solution, result.solution.attitude_error
     assert error is not None, "the method finds it"
-    expected = attitude_residual_std(solution.fit, result.seen)
+    expected = attitude_residual_std(solution, result.seen)
     return entry(
-        MagnetometerEntry, result, result.sensor, solution, solution.fit,
+        MagnetometerEntry, result, result.sensor, solution,
         model=MODEL,
         range_t=result.sensor.channel(FIELD).range,
         estimator=ESTIMATOR,
@@ -68,13 +68,15 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
         arm_field_in_bias=True,
         uniformity=entry(UniformityEntry, result.uniformity),
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
-        field_base_t=solution.field_table_t,
+        bias_t=solution.bias,
+        hard_iron_t=hard_iron(solution),
+        field_base_t=solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
         dwells=[
             dwell_entry(FieldDwellEntry, FIELD, *each)
-            for each in zip(result.dwells, solution.fit.residuals, expected, strict=True)
+            for each in zip(result.dwells, solution.residuals, expected, strict=True)
         ],
         beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
         **more,
