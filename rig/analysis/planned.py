@@ -17,7 +17,7 @@ from rig.analysis.vector_inputs import known_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
-from rig.data.quantity import ACCELERATION
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 from rig.motion.geometry import DenavitHartenberg
@@ -90,4 +90,8 @@ def _told_from(
         at_s=at_s,
     )
     found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))
-    return tuple(ToldFrom(each.what, each.check, found[each.what], each.unit) for each in DAMAGES if each.what in found)
+    return tuple(
+        ToldFrom(each.what, each.check, found[each.what], each.unit or RATE.unit)
+        for each in DAMAGES
+        if each.what in found
+    )
