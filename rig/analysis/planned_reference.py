@@ -13,10 +13,11 @@ from rig.analysis.reference_suspected import Read
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
+from rig.data.recorded_sensor import range_m_s2
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.arrays import Array
-from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
+from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.reference_model import REFERENCE
 from rig.motion.geometry import WRIST_1, DenavitHartenberg, flange_arm, flange_attitude
 from rig.motion.steps import Dwell, Plan, Sweep
@@ -24,11 +25,10 @@ from rig.motion.steps import Dwell, Plan, Sweep
 
 @dataclass(frozen=True, slots=True)
 class PlannedAccelerometer:
-    """An accelerometer, with its full scale, that goes through a plan on an `arm` made so, and what is known there."""
+    """An accelerometer that goes through a plan on an `arm` made so, and what is known there."""
 
     name: str
     sensor: SensorSection
-    range_g: float
     plan: Plan
     settings: RunSettings
     site: Site
@@ -37,14 +37,9 @@ class PlannedAccelerometer:
 
     @property
     def sheet(self) -> Sheet:
-        """What its data sheet lets it do beside the model."""
-        return sheet_of(self.known, self.name, self.sensor.part, self.range_g * STANDARD_GRAVITY_M_S2)
-
-
-def ranges_g(config: RigConfig) -> dict[str, float]:
-    """The full scale of each accelerometer of the sensors to calibrate, by the sensor's name."""
-    named = {name: each.acceleration for name, each in config.to_calibrate.items()}
-    return {name: each.range_g for name, each in named.items() if each is not None and each.range_g is not None}
+        """What the data sheet lets the accelerometer do beside the model."""
+        assert self.sensor.acceleration is not None, "it has an accelerometer"
+        return sheet_of(self.known, self.name, self.sensor.part, range_m_s2(self.sensor.acceleration))
 
 
 def planned_accelerometers(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> list[PlannedAccelerometer]:
@@ -53,13 +48,14 @@ def planned_accelerometers(config: RigConfig, plan: Plan, arm: DenavitHartenberg
     site, known = settings.site, settings.uncertainty
     assert site is not None and known is not None, "as new settings have them"
     return [
-        PlannedAccelerometer(name, config.to_calibrate[name], range_g, plan, settings, site, known, arm)
-        for name, range_g in ranges_g(config).items()
+        PlannedAccelerometer(name, each, plan, settings, site, known, arm)
+        for name, each in config.to_calibrate.items()
+        if each.acceleration is not None
     ]
 
 
 def planned_read(of: PlannedAccelerometer) -> Read:
-    """What it would read, with noise as its data sheet has it.
+    """What an accelerometer would read, with noise as its data sheet has it.
 
     Of attitudes that are gone through several times the last is held out, as in a run.
     """

@@ -12,7 +12,6 @@ from typing import Protocol
 
 import numpy as np
 
-from rig.analysis.planned_reference import ranges_g
 from rig.analysis.predicted import predicted
 from rig.analysis.predicted_accelerations import predicted_accelerations
 from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
@@ -120,7 +119,9 @@ def _not_foretold(what: str) -> Refused:
 def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
     """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
     kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
-    kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and bool(ranges_g(config))
+    kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
+        each.acceleration is not None for each in config.to_calibrate.values()
+    )
     for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
         if not calibrated and any(getattr(wanted, each) < inf for each in sizes):
             raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")
