@@ -28,7 +28,6 @@ from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
-from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.observation.observed_run import ObservedRun
 
@@ -98,7 +97,8 @@ def of_magnetometer(
     channel = result.sensor.channel(FIELD)
     timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
-    theta = _theta(solution.matrix, solution.reference, solution.bias)
+    theta = np.zeros(PARAMETERS)
+    theta[: LEVER.start] = solution.theta
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
     off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
@@ -130,10 +130,3 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
         **judge_readings(held.counts, windows, rate, has_bits=held.has_bits),
     }
     return ReferenceStatistics(statistics, found.told_from)
-
-
-def _theta(matrix: Array, reference: Array, bias: Array) -> Array:
-    """(22,) parameters that dwells tell, as `rig.estimation.accelerometer_model` orders them."""
-    theta = np.zeros(PARAMETERS)
-    theta[: LEVER.start] = np.concatenate([matrix.ravel(), reference, bias])
-    return theta
