@@ -1,6 +1,6 @@
 """Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -15,7 +15,7 @@ from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
 from rig.errors import Fault
-from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
+from rig.estimation.accelerometer import solve_accelerometer, specific_force
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
@@ -159,7 +159,7 @@ def _calibrated(
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
-    weighted = _beside(partial(solve, method="attitude_weighted"))
+    weighted = or_fault(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
         check_axes(SensorAxes.of(weighted.matrix).axes, np.eye(3))
     elif movement.own is None:
@@ -178,6 +178,7 @@ def _calibrated(
     check_axes(axes.axes, np.eye(3))
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE[1:]}
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
@@ -198,7 +199,7 @@ def _calibrated(
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
-        beside={"attitude_weighted": weighted, **{each: _beside(partial(solve, method=each)) for each in BESIDE[1:]}},
+        beside={"attitude_weighted": weighted, **others},
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
@@ -274,11 +275,6 @@ def _repeatability_rad(settings: RunSettings) -> float:
     return float(np.radians(settings.uncertainty.repeatability_deg) / np.sqrt(3))
 
 
-def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fault:
-    found = or_fault(solve)
-    return found if isinstance(found, Fault) else found.fit
-
-
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:
     """How a gyroscope and its accelerometer are aligned, in the flange's axes; None without a vector solution."""
     vector = gyroscope.vector_model
@@ -294,5 +290,6 @@ def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) 
 
 
 def _held_out(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> HeldOut:
-    found = specific_force(np.array([dwell.reading.mean for dwell in dwells]), solution)
+    means = np.array([dwell.reading.mean for dwell in dwells])
+    found = specific_force(means, solution.matrix, solution.bias_m_s2, solution.second_order_s2_m)
     return HeldOut(dwells, np.linalg.norm(found, axis=1) - gravity_m_s2)

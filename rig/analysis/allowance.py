@@ -15,7 +15,8 @@ from rig.analysis.consistency import Allowance
 from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import WAVE_SHARE, unknown_of
-from rig.data.settings import OfSensor, Uncertainty
+from rig.config.judged_by import OfSensor
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate

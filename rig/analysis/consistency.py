@@ -8,7 +8,7 @@ a wrong sweep does not excuse itself.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,23 +35,9 @@ from rig.analysis.suspected import (
     of_one_axis,
     of_sweep,
 )
-from rig.analysis.suspicion import Statistic, Suspected, basis, explained, told_by, unlike_the_others
+from rig.analysis.suspicion import Consistency, Statistic, Suspected, basis, explained, told_by, unlike_the_others
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, likeliest_bias_process
-
-
-@dataclass(frozen=True, slots=True)
-class Consistency:
-    """The statistics of one sensor by the name of their check, each with its limit.
-
-    `sweep` is that of the sweep least like the others; `disturbed` are those beyond the limit, by place. `told_from` is
-    the size from which on each damage is told, by what happens; there where an allowance says what is legitimate.
-    """
-
-    statistics: dict[str, Statistic]
-    sweep: Statistic
-    disturbed: dict[int, Statistic]
-    told_from: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

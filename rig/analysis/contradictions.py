@@ -83,7 +83,7 @@ def contradictions(
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = [fitness(name, "rate", f"{DISTURBED}.{sweep}", *named[sweep], sweep=sweep) for sweep in sorted(named)]
-        checks += sweeps or [fitness(name, "rate", DISTURBED, *found.sweep)]
+        checks += sweeps or [fitness(name, "rate", DISTURBED, *found.piece)]
         usual, has_bits = np.median if settings.holds_all_kinds else np.min, gyroscope.step is None
         of_readings = judge_readings(counts, pieces.windows, rate, usual, has_bits=has_bits)
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]

@@ -70,9 +70,8 @@ def of_field_angles(result: MagnetometerResult) -> Array | None:
     if not result.budget.by_freedom:
         return None
     solution, seen = result.solution, result.seen
-    error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
-    theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
-    response = response_in_attitudes(theta, seen.attitudes, seen.variances_m2_s4, error.std_rad)[F]
+    error = solution.attitude_error or AttitudeError(0.0, 0.0)
+    response = response_in_attitudes(solution.theta, seen.attitudes, seen.variances_m2_s4, error.std_rad)[F]
     noise = (_to_angles(solution.matrix)[:3].reshape(3, 9) @ response) ** 2 @ seen.variances_m2_s4.ravel()
     whole = result.non_orthogonality_std_rad**2
     return _split(whole, {NOISE: noise, ATTITUDES: whole - noise}, result.budget)

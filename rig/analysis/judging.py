@@ -37,10 +37,11 @@ from rig.analysis.verdict import (
     verification_checks,
 )
 from rig.analysis.verification import Verification, verify
+from rig.config.judged_by import DecisionRule
 from rig.data.motion_file import ReadElsewhere
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.run_file import RunData
-from rig.data.settings import DecisionRule, RunSettings
+from rig.data.settings import RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature

@@ -22,7 +22,6 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import (
     FieldDrift,
-    MagnetometerSolution,
     Uniformity,
     field_drift,
     solve_magnetometer,
@@ -32,7 +31,7 @@ from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
-from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method
+from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution
 from rig.observation.field import FieldReading, beside, field_readings, field_tests
 from rig.observation.observed_run import ObservedRun
 
@@ -55,7 +54,7 @@ class MagnetometerResult:
     sensor: RecordedSensor
     field_t: float
     extension_m: tuple[float, float, float]
-    solution: MagnetometerSolution
+    solution: TriaxialSolution
     uniformity: Uniformity
     drift: FieldDrift | None
     scale: Array
@@ -63,7 +62,7 @@ class MagnetometerResult:
     budget: Budget
     non_orthogonality_rad: Array
     non_orthogonality_std_rad: Array
-    beside: Mapping[Method, MagnetometerSolution | Fault]
+    beside: Mapping[Method, TriaxialSolution | Fault]
     dwells: tuple[FieldReading, ...]
     seen: Dwells
 
@@ -182,7 +181,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
     return found
 
 
-def _solved(solve: Callable[..., MagnetometerSolution]) -> MagnetometerSolution:
+def _solved(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
     """Raises Fault `field_not_uniform`: the accelerometer has found the same attitudes good."""
     try:
         return solve(method=ESTIMATOR)
@@ -203,8 +202,8 @@ def _attitude_error_rad(
     return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
 
 
-def _not_alike(found: Uniformity, solution: MagnetometerSolution) -> str:
-    left_t = np.sqrt(np.mean(solution.fit.residuals**2))
+def _not_alike(found: Uniformity, solution: TriaxialSolution) -> str:
+    left_t = np.sqrt(np.mean(solution.residuals**2))
     return (
         f"the field is not the same in all attitudes: χ² of what the model leaves is {found.chi_square:.4g}, "
         f"{found.limit:.3g} at most by noise and by attitudes off by {1e3 * found.attitude_error_rad:.2g} mrad; "

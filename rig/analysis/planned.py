@@ -10,14 +10,14 @@ from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
-from rig.analysis.planned_reference import planned_read
+from rig.analysis.planned_reference import planned_accelerometers, planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference
 from rig.analysis.vector_inputs import known_sensor
 from rig.config.models import ArmSection, RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
-from rig.data.quantity import ACCELERATION
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 from rig.motion.geometry import DenavitHartenberg
@@ -52,14 +52,8 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
             name: _told_from(name, each, turned, settings, rate, site=site, known=known)
             for name, each in config.to_calibrate.items()
         }
-    attitudes = plan.dwells if isinstance(config.turner, ArmSection) else ()
-    read = {
-        name: planned_read(
-            name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g, arm=turner
-        )
-        for name, each in config.to_calibrate.items()
-        if attitudes and each.acceleration is not None and each.acceleration.range_g is not None
-    }
+    on_arm = isinstance(config.turner, ArmSection) and plan.dwells
+    read = {each.name: planned_read(each) for each in planned_accelerometers(config, plan, turner)} if on_arm else {}
     found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
 
@@ -96,4 +90,8 @@ def _told_from(
         at_s=at_s,
     )
     found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))
-    return tuple(ToldFrom(each.what, each.check, found[each.what], each.unit) for each in DAMAGES if each.what in found)
+    return tuple(
+        ToldFrom(each.what, each.check, found[each.what], each.unit or RATE.unit)
+        for each in DAMAGES
+        if each.what in found
+    )

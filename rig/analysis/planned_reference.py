@@ -1,65 +1,88 @@
 """What an accelerometer would read in a plan's dwells and sweeps, with nothing wrong with it. Pure."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import Piece, errors_of, sheet_of
+from rig.analysis.accelerometer_errors import Piece, Sheet, errors_of, sheet_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.planned_motion import Timed, timed_of
 from rig.analysis.reference_budgets import lag_pattern
 from rig.analysis.reference_suspected import Read
+from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
-from rig.data.settings import RunSettings, Site, Uncertainty
+from rig.data.recorded_sensor import range_m_s2
+from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.arrays import Array
-from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
+from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.reference_model import REFERENCE
 from rig.motion.geometry import WRIST_1, DenavitHartenberg, flange_arm, flange_attitude
 from rig.motion.steps import Dwell, Plan, Sweep
 
 
-def planned_read(
-    name: str,
-    sensor: SensorSection,
-    plan: Plan,
-    settings: RunSettings,
-    *,
-    site: Site,
-    known: Uncertainty,
-    range_g: float,
-    arm: DenavitHartenberg,
-) -> Read:
-    """What the accelerometer of that sensor would read, with noise as its data sheet has it, on an arm made so.
+@dataclass(frozen=True, slots=True)
+class PlannedAccelerometer:
+    """An accelerometer that goes through a plan on an `arm` made so, and what is known there."""
+
+    name: str
+    sensor: SensorSection
+    plan: Plan
+    settings: RunSettings
+    site: Site
+    known: Uncertainty
+    arm: DenavitHartenberg
+
+    @property
+    def sheet(self) -> Sheet:
+        """What the data sheet lets the accelerometer do beside the model."""
+        assert self.sensor.acceleration is not None, "it has an accelerometer"
+        return sheet_of(self.known, self.name, self.sensor.part, range_m_s2(self.sensor.acceleration))
+
+
+def planned_accelerometers(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> list[PlannedAccelerometer]:
+    """The accelerometers of the sensors to calibrate, as the plan moves them."""
+    settings = settings_of(config, plan)
+    site, known = settings.site, settings.uncertainty
+    assert site is not None and known is not None, "as new settings have them"
+    return [
+        PlannedAccelerometer(name, each, plan, settings, site, known, arm)
+        for name, each in config.to_calibrate.items()
+        if each.acceleration is not None
+    ]
+
+
+def planned_read(of: PlannedAccelerometer) -> Read:
+    """What an accelerometer would read, with noise as its data sheet has it.
 
     Of attitudes that are gone through several times the last is held out, as in a run.
     """
+    sensor, plan, settings, arm = of.sensor, of.plan, of.settings, of.arm
     mounting, noise = mounting_matrix(sensor.mounting), PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
     repeats = {dwell.index: dwell.repeat for dwell in settings.planned_dwells}
     last = max(repeats.values())
     dwells = [each for each in timed_of(plan, Dwell) if last == 0 or repeats[each.step.index] < last]
     sweeps = timed_of(plan, Sweep)
     theta = np.zeros(PARAMETERS)
-    theta[:9], theta[REFERENCE] = np.eye(3).ravel(), site.gravity_m_s2 * np.array(site.up)
-    repeatability_rad = float(np.radians(known.repeatability_deg) / np.sqrt(3))
+    theta[:9], theta[REFERENCE] = np.eye(3).ravel(), of.site.gravity_m_s2 * np.array(of.site.up)
+    repeatability_rad = float(np.radians(of.known.repeatability_deg) / np.sqrt(3))
     movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise, arm), repeatability_rad)
-    stood = [
-        *(Stood(np.array(each.step.q_rad), None) for each in dwells),
-        *(Stood(_began(each.step), each.step.joint - WRIST_1) for each in sweeps),
-    ]
-    windows_s = [*(each.window_s for each in dwells), *(each.window_s for each in sweeps)]
     # At a temperature that stays.
-    pieces = [Piece(window_s, 1, 0.0, at) for window_s, at in zip(windows_s, stood, strict=True)]
-    sheet = sheet_of(known, name, sensor.part, range_g * STANDARD_GRAVITY_M_S2)
+    pieces = [Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.q_rad))) for each in dwells]
+    pieces += [
+        Piece(each.step.index, each.window_s, 1, 0.0, Stood(_began(each.step), each.step.joint - WRIST_1))
+        for each in sweeps
+    ]
+    stood = [each.stood for each in pieces]
     movement = replace(
         _reading(theta, movement),
-        own=errors_of(sheet, pieces, 0.0, second_order=settings.second_order),
+        own=errors_of(of.sheet, pieces, 0.0, second_order=settings.second_order),
         arm_turns=arm_turns(stood, arm, mounting),
     )
-    lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
-    off = arm_patterns(theta, movement, stood, Known(arm, known.axis_deg, mounting, 0.0))
+    lag = lag_pattern(movement, 1e-3 * of.known.acceleration_lag_ms) / np.sqrt(3)
+    off = arm_patterns(theta, movement, stood, Known(arm, of.known.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(each.window_s) / 2 for each in pieces])
     return Read(theta, movement, np.concatenate([lag, off]), middles_s, second_order=settings.second_order)
 

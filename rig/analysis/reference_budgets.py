@@ -14,7 +14,7 @@ from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.estimation.imu import ImuSolution
-from rig.estimation.magnetometer import FieldDrift, MagnetometerSolution, Uniformity
+from rig.estimation.magnetometer import FieldDrift, Uniformity
 from rig.estimation.reference_budget import (
     KnownSize,
     Spread,
@@ -23,6 +23,7 @@ from rig.estimation.reference_budget import (
     response_in_attitudes,
     scale_and_bias,
 )
+from rig.estimation.triaxial import TriaxialSolution
 
 # What gravity by latitude and height alone may be off by: the anomalies of rocks and terrain, 50 mGal.
 LOCAL_GRAVITY_M_S2: Final = 0.0005
@@ -72,7 +73,7 @@ def accelerometer_lines(
 
 
 def magnetometer_budget(
-    solution: MagnetometerSolution,
+    solution: TriaxialSolution,
     attitudes: Array,
     variances_t2: Array,
     tested: tuple[Uniformity, FieldDrift | None],
@@ -83,9 +84,8 @@ def magnetometer_budget(
 ) -> Budget:
     """The budget of a solution found in attitudes (N, 3, 3), flange to base, with variances (N, 3) of the means."""
     alike, drift = tested
-    error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
-    theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
-    response = response_in_attitudes(theta, attitudes, variances_t2, error.std_rad)
+    error = solution.attitude_error or AttitudeError(0.0, 0.0)
+    response = response_in_attitudes(solution.theta, attitudes, variances_t2, error.std_rad)
     left = alike.chi_square, alike.degrees_of_freedom
     spread = _spread(
         solution,
@@ -99,7 +99,7 @@ def magnetometer_budget(
 
 
 def _spread(
-    solution: ImuSolution | MagnetometerSolution,
+    solution: ImuSolution | TriaxialSolution,
     response: Array,
     noise: Array,
     error: AttitudeError,

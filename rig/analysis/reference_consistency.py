@@ -7,31 +7,17 @@ not excuse itself: a suspicion is told by how much likelier it makes the reading
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from rig.analysis.reference_suspected import DAMAGES, Read, bias_over_time, of_piece, suspicions
-from rig.analysis.suspicion import Statistic, basis, told_beside, told_by, told_from, unlike_the_others
+from rig.analysis.suspicion import Consistency, Statistic, basis, told_beside, told_by, told_from, unlike_the_others
 from rig.estimation.accelerometer_model import effects, predicted
 from rig.estimation.arrays import Array
 from rig.estimation.imu_fit import slopes
 from rig.estimation.reading_errors import noise
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
-
-
-@dataclass(frozen=True, slots=True)
-class ReferenceConsistency:
-    """The statistics by the name of their check; `piece` is that of the dwell or sweep least like the others.
-
-    `disturbed` are those beyond the limit, by place: the dwells, then the sweeps. `told_from` is the size from which on
-    each of `DAMAGES` is told, by what happens.
-    """
-
-    statistics: dict[str, Statistic]
-    piece: Statistic
-    disturbed: dict[int, Statistic]
-    told_from: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +114,7 @@ class HeldReadings:
         return float(np.mean(np.sum((1 - 1 / variance)[:, None] * told**2, axis=0)))
 
 
-def reference_consistency(read: Read, rate: float, *, drifting: bool = False) -> ReferenceConsistency:
+def reference_consistency(read: Read, rate: float, *, drifting: bool = False) -> Consistency:
     """Every statistic with its critical value; `rate` is that of false alarms for each.
 
     The bias may change steadily where it is `drifting`.
@@ -136,7 +122,7 @@ def reference_consistency(read: Read, rate: float, *, drifting: bool = False) ->
     held, suspected = _held(read, drifting=drifting), suspicions(read)
     pieces = range(read.dwells + read.sweeps)
     ranked = unlike_the_others(held, pieces, lambda piece: of_piece(read, piece), rate)
-    return ReferenceConsistency(
+    return Consistency(
         told_by(held, suspected, rate),
         ranked[0][1],
         {piece: statistic for piece, statistic in ranked if statistic[0] > statistic[1]},

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.suspicion import Suspicions
+from rig.analysis.suspicion import Damage, Suspicions
 from rig.estimation.accelerometer_model import SECOND, Movement, cross, felt, jacobian
 from rig.estimation.arrays import Array
 from rig.estimation.reading_errors import in_sweeps, of_pieces, of_sensor, per_axis
@@ -104,42 +104,29 @@ def _bent(change: Callable[[Array], Array]) -> Callable[[Read], Array]:
     return patterns
 
 
-@dataclass(frozen=True, slots=True)
-class ReferenceDamage:
-    """What happens, the `check` that is to tell it, and what its size is counted in; None is the reading's own unit.
-
-    `patterns` (3 K, k) are what one of that unit adds to the readings, for each way in which it may happen.
-    """
-
-    what: str
-    check: str
-    unit: str | None
-    patterns: Callable[[Read], Array]
-
-
-DAMAGES = (
-    ReferenceDamage(
+DAMAGES: tuple[Damage[Read], ...] = (  # (3 K, k) each
+    Damage(
         "the bias changes half-way", "bias_changed", None,
         lambda read: per_axis(_later(read) * read.movement.constant()[:, None] * np.ones(3)),
     ),
-    ReferenceDamage(
+    Damage(
         "all scale factors change half-way", "scale_changed", "1",
         lambda read: (_along(read) * _later(read)).reshape(-1, 1),
     ),
-    ReferenceDamage(
+    Damage(
         "one scale factor changes half-way", "scale_changed", "1", lambda read: per_axis(_along(read) * _later(read))
     ),
-    ReferenceDamage(
+    Damage(
         "the sensor turns on the flange half-way", "loose_mounting", "rad",
         lambda read: (
             (matrix(read.theta) @ -cross(felt(read.theta, read.movement))) * _later(read)[:, :, None]
         ).reshape(-1, 3),
     ),
-    ReferenceDamage("an even part, of v²/g", "even_term", "1", _bent(np.square)),
-    ReferenceDamage("an odd part, of v³/g²", "odd_term", "1", _bent(lambda along: along**3)),
-    ReferenceDamage("another scale upwards than downwards", "asymmetry", "1", _bent(lambda along: np.abs(along) / 2)),
-    ReferenceDamage(
+    Damage("an even part, of v²/g", "even_term", "1", _bent(np.square)),
+    Damage("an odd part, of v³/g²", "odd_term", "1", _bent(lambda along: along**3)),
+    Damage("another scale upwards than downwards", "asymmetry", "1", _bent(lambda along: np.abs(along) / 2)),
+    Damage(
         "another bias in sweeps than in dwells", "sweeps_against_dwells", None, lambda read: in_sweeps(read.movement)
     ),
-    ReferenceDamage("another reading in one dwell", "disturbed_dwell", None, _in_dwells),
+    Damage("another reading in one dwell", "disturbed_dwell", None, _in_dwells),
 )  # fmt: skip

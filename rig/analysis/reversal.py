@@ -66,7 +66,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
                 raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
     results = [each.result for each in runs]
     found = separate(
-        np.array([each.solution.bias_t for each in results]),
+        np.array([each.solution.bias for each in results]),
         np.array([each.budget.covariance[3:, 3:] for each in results]),
         np.array([each.solution.matrix for each in results]),
         np.array([each.sensor.mounting for each in results]),

@@ -4,14 +4,13 @@ A check asks how much its columns explain of what the model leaves. A damage is 
 is to tell it has columns that are like it, not the same.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.pieces import REST, Pieces
-from rig.analysis.suspicion import Suspicions
+from rig.analysis.suspicion import Damage, Suspicions
 from rig.estimation.arrays import Array
 
 
@@ -37,20 +36,6 @@ class Means:
         return sweeps
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """What happens, the `check` that is to tell it, and what its size is counted in.
-
-    `patterns` (k, N, 3) are what one of that unit adds to the means, for each way in which it may happen, less what a
-    calibration is to take up: of what changes half-way the mean is meant.
-    """
-
-    what: str
-    check: str
-    unit: str
-    patterns: Callable[[Means], Array]
-
-
 def _of_each_axis(columns: Array) -> Array:
     """(3, N, 3) columns made of (N, 3): what happens on one axis alone."""
     return np.moveaxis(per_axis(columns), -1, 0).swapaxes(1, 2)
@@ -61,7 +46,7 @@ def _in_each_sweep(means: Means) -> Array:
     return np.asarray(alone.reshape(-1, len(means.sweep), 3), dtype=np.float64)
 
 
-DAMAGES = (
+DAMAGES: tuple[Damage[Means], ...] = (  # (k, N, 3) each
     Damage(
         "all scale factors change half-way", "scale_changed", "1",
         lambda means: (means.felt_rad_s * (means.later - 0.5))[None],
@@ -79,14 +64,14 @@ DAMAGES = (
         lambda means: np.abs(means.felt_rad_s)[None] / 2,
     ),
     Damage(
-        "another bias in sweeps than in rests", "sweeps_against_rests", "rad/s",
+        "another bias in sweeps than in rests", "sweeps_against_rests", None,
         lambda means: _of_each_axis(means.sweeps.sum(axis=1, keepdims=True) * np.ones(3)),
     ),
     Damage(
-        "the bias jumps half-way", "bias_jumped", "rad/s",
+        "the bias jumps half-way", "bias_jumped", None,
         lambda means: _of_each_axis((means.later - 0.5) * np.ones(3)),
     ),
-    Damage("another reading in one sweep", "disturbed_sweep", "rad/s", _in_each_sweep),
+    Damage("another reading in one sweep", "disturbed_sweep", None, _in_each_sweep),
 )  # fmt: skip
 
 

@@ -5,7 +5,8 @@ they explain is χ² with as many degrees of freedom as they are beside the mode
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,9 +17,38 @@ SEEN = 1e-6  # of a damage, what a check must see of it: less is rounding
 TOLD_IN = 0.95  # of recordings, a damage of the size from which on it is told
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 
+Seen = TypeVar("Seen")
 Statistic = tuple[float, float]  # and its limit
 Suspected = tuple[Array, Callable[[int], float]]  # white columns, and what so many of them are beyond if they tell
 Suspicions = Mapping[str, Array | None]  # by name of the check; None is anything at all
+
+
+@dataclass(frozen=True, slots=True)
+class Damage(Generic[Seen]):
+    """What happens, the `check` that is to tell it, and what its size is counted in; None is the reading's own unit.
+
+    `patterns` are what one of that unit adds to the readings, for each way in which it may happen, less what a
+    calibration is to take up: of what changes half-way the mean is meant.
+    """
+
+    what: str
+    check: str
+    unit: str | None
+    patterns: Callable[[Seen], Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """The statistics of one sensor by the name of their check, each with its limit.
+
+    `piece` is that of the sweep or dwell least like the others; `disturbed` are those beyond the limit, by place.
+    `told_from` is the size from which on each damage is told, by what happens, where that is known.
+    """
+
+    statistics: dict[str, Statistic]
+    piece: Statistic
+    disturbed: dict[int, Statistic]
+    told_from: dict[str, float] = field(default_factory=dict)
 
 
 class Held(Protocol):

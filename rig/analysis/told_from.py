@@ -11,7 +11,7 @@ from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
 from rig.analysis.vector_inputs import unknown_of
-from rig.data.quantity import Quantity
+from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
@@ -48,7 +48,7 @@ def of_gyroscope(
         off_by = None
         if np.isfinite(size) and result.uncertainty is not None:
             off_by = _off_by(size * each.patterns(means), explained, mounting, unknown)
-        yield ToldFrom(each.what, each.check, size, each.unit, off_by)
+        yield ToldFrom(each.what, each.check, size, each.unit or RATE.unit, off_by)
 
 
 def of_reference(sizes: Mapping[str, float], quantity: Quantity) -> tuple[ToldFrom, ...]:

@@ -12,10 +12,10 @@ from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.check import Check
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
+from rig.config.judged_by import DecisionRule
 from rig.config.limits import Limits, Parameter, limit_of
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
-from rig.data.settings import DecisionRule
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors

@@ -1,47 +1,15 @@
-"""The sections by which a recording is judged and its result stated: thresholds, site, uncertainty."""
+"""The sections that say where a measurement is made, and what becomes of its result: site, certificate, history."""
 
 from datetime import date
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.history_address import history_url
-from rig.config.section import (
-    RATIO,
-    Positive,
-    Section,
-    Vector3,
-    Words,
-)
+from rig.config.section import RATIO, Section, Vector3, Words
 
 MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
-
-
-class ObservationSection(Section):
-    """What an averaged revolution must fulfil, so that it is used."""
-
-    max_lost_fraction: float = Field(
-        default=0.001,
-        ge=0,
-        lt=1,
-        description="fraction of a sweep's samples that may be missing",
-        json_schema_extra=RATIO,
-    )
-    max_speed_deviation: float = Field(
-        default=0.25,
-        gt=0,
-        lt=1,
-        description="how much the joint's rate, smoothed over 50 ms, may differ from its mean, as a fraction of "
-        "the mean",
-        json_schema_extra=RATIO,
-    )
-    max_axis_deviation_deg: float = Field(
-        default=20.0,
-        gt=0,
-        lt=45,
-        description="angle that is allowed between the measured rotation and the nominal axis of the sensor",
-    )
 
 
 class SiteSection(Section):
@@ -149,158 +117,6 @@ class SiteSection(Section):
         """Unit vector that points up, in the base's frame."""
         x, y, z = (np.array(self.base_up) / np.linalg.norm(self.base_up)).tolist()
         return x, y, z
-
-
-class UncertaintySection(Section):
-    """Sizes of errors that no recording shows. They are half-widths: every value within is equally likely."""
-
-    controller_clock_ppm: Positive = Field(
-        default=50.0, description="error of the arm controller's clock, which its maker does not state"
-    )
-    computer_clock_ppm: Positive = Field(
-        default=1.0,
-        description="error of this computer's clock during a run if a time server corrects it; set "
-        "50 without a time server",
-    )
-    crystal_ppm: Positive = Field(
-        default=20.0,
-        description="error of the board's 32768 Hz crystal at room temperature; by hand also of the clock of a device "
-        "that prints lines or of an autopilot, and then it must be stated",
-    )
-    axis_deg: float = Field(
-        default=0.06,
-        ge=0,
-        le=5,
-        description="error of the direction of each wrist's axis in the kinematics that are used; the usual value "
-        "is 1 mrad, as for calibrated arms of this size (Slamani, Nubiola and Bonev, 2012)",
-    )
-    repeatability_deg: float = Field(
-        default=0.005,
-        ge=0,
-        le=5,
-        description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
-        "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
-    )
-    thermometer_gradient_k: float = Field(
-        default=0.1,
-        ge=0,
-        le=20,
-        description="of a calibration over temperature: by how much the part's thermometer and what it is beside may "
-        "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
-        json_schema_extra={"unit": "K"},
-    )
-    angle_std_deg: float | None = Field(
-        default=None,
-        ge=0,
-        le=5,
-        description="standard deviation of a joint's angle about the angle of its encoder: for sweeps that are no "
-        "whole turns. No default, for no maker of these arms states it; whole turns do not need it",
-    )
-    mount_deg: float = Field(
-        default=1.0,
-        ge=0,
-        le=10,
-        description="how far the item may sit off the mounting that each of `procedure.stages` states, about each axis",
-    )
-    sensor_offset_mm: float = Field(
-        default=50.0,
-        ge=0,
-        le=1000,
-        description="how far the sensor may be from the flange's centre, or from the end of `arm.extension_mm`, "
-        "along each axis, in either direction",
-    )
-    acceleration_lag_ms: float = Field(
-        default=5.0,
-        ge=0,
-        le=100,
-        description="delay of an accelerometer's own filter, at most; it makes the wave of a sweep smaller by "
-        "half the square of the angle (in rad) that the arm turns in this time",
-        json_schema_extra={"unit": "ms"},
-    )
-    g_sensitivity_deg_s_g: float | None = Field(
-        default=None,
-        ge=0,
-        description="change of a reading for 1 g, if attitudes do not determine it; if left out, the part's value",
-        json_schema_extra={"unit": "°/s/g"},
-    )
-    nonlinearity_percent: float | None = Field(
-        default=None,
-        ge=0,
-        description="largest distance of a gyroscope's curve from the best straight line, in per cent of full "
-        "scale, for the odd part of the curve and for the even part; used if there is only one speed; "
-        "if left out, the part's value",
-        json_schema_extra={"unit": "%"},
-    )
-    asymmetry_percent: float | None = Field(
-        default=None,
-        ge=0,
-        description="even part of a gyroscope's curve, in per cent of full scale, that is allowed although one "
-        "scale factor is stated for both directions; more of it fails the check `cw_against_ccw`; if "
-        "left out, the part's value",
-        json_schema_extra={"unit": "%"},
-    )
-    bias_deg_s_k: float | None = Field(
-        default=None,
-        ge=0,
-        description="change of a gyroscope's bias for 1 K; if left out, the part's value",
-        json_schema_extra={"unit": "°/s/K"},
-    )
-    scale_ppm_k: float | None = Field(
-        default=None,
-        ge=0,
-        description="change of a gyroscope's scale factor for 1 K; if left out, the part's value",
-        json_schema_extra={"unit": "ppm/K"},
-    )
-    bias_instability_deg_h: float | None = Field(
-        default=None,
-        ge=0,
-        description="smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias "
-        "wanders, even with the longest average; if left out, the part's value",
-        json_schema_extra={"unit": "°/h"},
-    )
-    non_orthogonality_deg: float | None = Field(
-        default=None,
-        ge=0,
-        description="how much the angle between two axes of a gyroscope may differ from 90°; if left out, the "
-        "part's value",
-    )
-    acceleration_nonlinearity_percent: float | None = Field(
-        default=None,
-        ge=0,
-        description="largest distance of an accelerometer's curve from the best straight line, in per cent of "
-        "`acceleration_nonlinear_over_g`; if left out, the part's value",
-        json_schema_extra={"unit": "%"},
-    )
-    acceleration_nonlinear_over_g: float | None = Field(
-        default=None,
-        ge=0,
-        description="acceleration in either direction for which this nonlinearity is stated; 0 means the range "
-        "that is set; if left out, the part's value",
-        json_schema_extra={"unit": "g"},
-    )
-    acceleration_bias_mg_k: float | None = Field(
-        default=None,
-        ge=0,
-        description="change of an accelerometer's bias for 1 K; if left out, the part's value",
-        json_schema_extra={"unit": "mg/K"},
-    )
-    acceleration_scale_ppm_k: float | None = Field(
-        default=None,
-        ge=0,
-        description="change of an accelerometer's scale factor for 1 K; if left out, the part's value",
-        json_schema_extra={"unit": "ppm/K"},
-    )
-    acceleration_bias_instability_ug: float | None = Field(
-        default=None,
-        ge=0,
-        description="smallest Allan deviation of an accelerometer at rest; if left out, the part's value",
-        json_schema_extra={"unit": "µg"},
-    )
-    decision_rule: Literal["simple", "guard_band"] = Field(
-        default="simple",
-        description="what is compared with a limit: `simple`, the value alone; `guard_band`, the value together "
-        "with its expanded uncertainty, so that at most one in forty is accepted wrongly",
-    )
 
 
 class CertificateSection(Section):

@@ -9,12 +9,11 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from rig.config.judged_by import ObservationSection, UncertaintySection
 from rig.config.judging_sections import (
     CertificateSection,
     HistorySection,
-    ObservationSection,
     SiteSection,
-    UncertaintySection,
 )
 from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget

@@ -14,6 +14,7 @@ motion tells).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 from rig.config.written_file import PART
 from rig.data.checked import parsed, seen
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
-from rig.data.recorded_turner import turner_of
+from rig.data.recorded_turner import RecordedTurner, turner_of
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, states_name
 from rig.data.sensor_of_run_2 import described_in_channels
 from rig.motion.state import ARM_STATE_DTYPE
@@ -33,7 +34,7 @@ CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Contents:
     """What a run file holds, as it stands there: nothing of it is judged yet.
 
@@ -50,18 +51,27 @@ class Contents:
     events: NDArray[Any]
     tables: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
+    @cached_property
+    def sensors(self) -> dict[str, RecordedSensor]:
+        """The sensors that the attributes of their samples describe, by name. Raises ValueError."""
+        return {name: recorded_sensor(self.schema, name, each) for name, each in self.described.items()}
 
-def empty(schema: str, texts: Mapping[str, str], sensors: Mapping[str, RecordedSensor]) -> Contents:
-    """The contents of a recording of these sensors that begins. Raises ValueError for a turner that cannot be."""
+    @cached_property
+    def turner(self) -> RecordedTurner | None:
+        """The turner that its text describes, None in a schema without one. Raises ValueError."""
+        return turner_of(self.texts["turner"]) if self.schema == SCHEMA else None
+
+
+def empty(
+    schema: str,
+    texts: Mapping[str, str],
+    sensors: Mapping[str, RecordedSensor],
+    states_dtype: np.dtype[Any] = ARM_STATE_DTYPE,
+) -> Contents:
+    """The contents of a recording of these sensors that begins, with states of that type."""
     described = {name: sensor.attributes() for name, sensor in sensors.items()}
     samples = {name: np.empty(0, sensor.sample_dtype) for name, sensor in sensors.items()}
-    states = np.empty(0, states_dtype(schema, texts))
-    return Contents(schema, texts, described, samples, states, np.empty(0, EVENTS_DTYPE))
-
-
-def states_dtype(schema: str, texts: Mapping[str, str]) -> np.dtype[Any]:
-    """The type of the rows of states in a file of that schema with these texts. Raises ValueError."""
-    return turner_of(texts["turner"]).dtype if schema == SCHEMA else ARM_STATE_DTYPE
+    return Contents(schema, texts, described, samples, np.empty(0, states_dtype), np.empty(0, EVENTS_DTYPE))
 
 
 def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
@@ -77,10 +87,9 @@ def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> Re
 
 def check_rows(contents: Contents) -> None:
     """Raises ValueError where rows are not of the type that the texts and descriptions beside them say."""
-    schema, states = contents.schema, states_name(contents.schema)
-    sensors = {name: recorded_sensor(schema, name, each) for name, each in contents.described.items()}
-    rows = {f"samples/{name}": (contents.samples[name], sensor.sample_dtype) for name, sensor in sensors.items()}
-    rows |= {states: (contents.states, states_dtype(schema, contents.texts)), "events": (contents.events, EVENTS_DTYPE)}
+    states_dtype = contents.turner.dtype if contents.turner else ARM_STATE_DTYPE
+    rows = {f"samples/{name}": (contents.samples[name], each.sample_dtype) for name, each in contents.sensors.items()}
+    rows |= {states_name(contents.schema): (contents.states, states_dtype), "events": (contents.events, EVENTS_DTYPE)}
     rows |= {name: (table, table_dtype(table.dtype.names or ())) for name, table in contents.tables.items()}
     for name, (found, meant) in rows.items():
         if found.dtype != meant:

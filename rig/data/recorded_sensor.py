@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from rig.config.sensor_sections import MountingSection, mounting_matrix
+from rig.config.sensor_sections import AccelerationSection, ConfiguredSensor, mounting_matrix
 from rig.data.channel import MAX_CHANNELS, Channel, sample_dtype
 from rig.data.checked import Finite, Positive, checked
 from rig.data.installed_kinds import measured
 from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.errors.quoting import quote
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 MOUNTING_TOLERANCE = 1e-6
 
@@ -86,9 +87,23 @@ class RecordedSensor:
         return {**document, "channels": json.dumps(channels)}
 
 
-def recorded_mounting(section: MountingSection) -> Mounting:
-    """The mounting that a configuration states, as it is recorded."""
-    return tuple(tuple(row) for row in mounting_matrix(section).tolist())
+def recorded_as(
+    section: ConfiguredSensor,
+    *channels: Channel,
+    part: str | None = None,
+    rate_hz: float | None = None,
+    clock: str | None = None,
+) -> RecordedSensor:
+    """The sensor of a section, whose samples hold these channels; `part` and rate are the section's where left out."""
+    mounting = tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist())
+    rate_hz = section.rate_hz if rate_hz is None else rate_hz
+    return RecordedSensor(part or section.part, section.serial_number, rate_hz, channels, mounting, clock=clock)
+
+
+def range_m_s2(section: AccelerationSection) -> float:
+    """The full scale of an accelerometer, which its sensor's section has filled in where it was left out."""
+    assert section.range_g is not None, "of a sensor that was checked"
+    return section.range_g * STANDARD_GRAVITY_M_S2
 
 
 def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:

@@ -25,20 +25,12 @@ from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, checked, parsed
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
-from rig.data.layout import (
-    Contents,
-    append,
-    check_rows,
-    empty,
-    lay_out,
-    recorded_sensor,
-    table_of,
-)
+from rig.data.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.recorded_turner import RecordedTurner, check_joints, turner_of
+from rig.data.recorded_turner import RecordedTurner, check_joints
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
@@ -118,7 +110,7 @@ class RunRecorder:
                 raise FileExistsError(f"{path.name} is there already")
             texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
             texts["turner"] = turner.to_json()
-            lay_out(path, empty(SCHEMA, texts, sensors), swmr=True)
+            lay_out(path, empty(SCHEMA, texts, sensors, turner.dtype), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
@@ -218,7 +210,7 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
     try:
         checked(_Named, {"sensors": [*contents.described]}, "samples")
         elsewhere = _elsewhere(contents) if contents.tables else None
-        sensors = {name: recorded_sensor(contents.schema, name, each) for name, each in contents.described.items()}
+        sensors = contents.sensors
         samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
         if elsewhere is not None:
             sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
@@ -357,9 +349,9 @@ def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunS
 
 
 def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
-    if contents.schema != SCHEMA:
+    turner = contents.turner
+    if turner is None:
         return turner_of_provenance(provenance)
-    turner = turner_of(contents.texts["turner"])
     if provenance.arm_kinematics not in (None, turner.geometry):
         raise ValueError("its provenance has another geometry than its turner")
     return turner

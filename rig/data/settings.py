@@ -7,13 +7,14 @@ the next; these do not, so that an old recording is judged as it was, or by what
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from rig.config.judged_by import OF_SENSORS, NonNegative, ObservationKeys, OfSensor, UncertaintyKeys, as_recorded
 from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, Positive, checked, parsed
@@ -34,36 +35,21 @@ SCHEMA = "rig.settings/7"
 SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
 RECKONING = 2  # of new recordings; see `RunSettings`
 
-DecisionRule = Literal["simple", "guard_band"]
-OfSensor = Literal[
-    "g_sensitivity_deg_s_g",
-    "nonlinearity_percent",
-    "asymmetry_percent",
-    "bias_deg_s_k",
-    "scale_ppm_k",
-    "bias_instability_deg_h",
-    "non_orthogonality_deg",
-    "acceleration_nonlinearity_percent",
-    "acceleration_nonlinear_over_g",
-    "acceleration_bias_mg_k",
-    "acceleration_scale_ppm_k",
-    "acceleration_bias_instability_ug",
-]
-OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 Vector3 = tuple[Finite, Finite, Finite]
 
 
-@dataclass(frozen=True, slots=True)
-class ObservationThresholds:
+class ObservationThresholds(ObservationKeys):
     """What an averaged revolution must satisfy to be used.
 
     Of its samples `max_lost_fraction` may be missing; the joint's rate, smoothed, may stray from its mean by the
     fraction `max_speed_deviation`; the reading may point `max_axis_deviation_deg` away from the turn.
     """
 
-    max_lost_fraction: Annotated[float, Field(ge=0, lt=1)]
-    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)]
-    max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)]
+    @model_validator(mode="before")
+    @classmethod
+    def older_too(cls, document: Any) -> Any:
+        """What a recording says, of whatever age."""
+        return as_recorded(cls, document)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +85,7 @@ class Site:
         return -self.gravity_m_s2 * np.array(self.up)
 
 
-@dataclass(frozen=True, slots=True)
-class Uncertainty:
+class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
     """Half-widths of what no recording shows: all values between, either way, are equally likely.
 
     But `angle_std_deg`, which is a standard deviation, None where nobody stated it: of a joint's angle about what its
@@ -111,29 +96,11 @@ class Uncertainty:
     expanded uncertainty ("guard_band").
     """
 
-    controller_clock_ppm: Positive
-    computer_clock_ppm: Positive
-    crystal_ppm: Positive
-    axis_deg: Annotated[float, Field(ge=0)]
-    sensor_offset_mm: Annotated[float, Field(ge=0)]
-    g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
-    decision_rule: DecisionRule
-    repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
-    mount_deg: Annotated[float, Field(ge=0)] = 0.0  # … which know no stages
-    acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
-    angle_std_deg: Annotated[float, Field(ge=0)] | None = None
-    thermometer_gradient_k: Annotated[float, Field(ge=0)] = 0.1
-    nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    asymmetry_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    bias_instability_deg_h: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    acceleration_nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    acceleration_nonlinear_over_g: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    acceleration_bias_mg_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    acceleration_scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
-    acceleration_bias_instability_ug: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    @model_validator(mode="before")
+    @classmethod
+    def older_too(cls, document: Any) -> Any:
+        """What a recording says, of whatever age."""
+        return as_recorded(cls, document)
 
     @property
     def angle_std_rad(self) -> float:
@@ -331,7 +298,8 @@ class RunSettings:
 
     def document(self) -> dict[str, Any]:
         """The settings as plain values, by key."""
-        document = {**asdict(self), "limits": None if self.limits is None else self.limits.model_dump()}
+        judging = {"observation": self.observation, "limits": self.limits, "uncertainty": self.uncertainty}
+        document = asdict(self) | {key: None if each is None else each.model_dump() for key, each in judging.items()}
         if self.elsewhere is None:
             del document["elsewhere"]
         if self.by_hand is None:
@@ -512,5 +480,5 @@ def setting(key: str) -> str:
 
 
 def _settable() -> tuple[str, ...]:
-    thresholds = (f"observation.{field.name}" for field in fields(ObservationThresholds))
+    thresholds = (f"observation.{key}" for key in ObservationThresholds.model_fields)
     return (*thresholds, *(f"limits.{key}" for key in LIMITS), "uncertainty.angle_std_deg", "reckoning")

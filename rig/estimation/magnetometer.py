@@ -23,22 +23,6 @@ FREE = 14  # F and b, and the field's direction: its size is given
 FALSE_ALARM = 1e-3  # in which a steady, uniform field is refused for one of the two
 
 
-@dataclass(frozen=True, slots=True)
-class MagnetometerSolution:
-    """F (3, 3), b (3,) in tesla, and the field in table coordinates (3,) in tesla.
-
-    `hard_iron_t` (3,) = F⁻¹ b: the field that would read as b. `covariance` (15, 15): the rows of F, the field, b.
-    `fit` has residuals, rank, condition, warnings.
-    """
-
-    matrix: Array
-    bias_t: Array
-    field_table_t: Array
-    hard_iron_t: Array
-    covariance: Array
-    fit: TriaxialSolution
-
-
 def solve_magnetometer(
     readings_t: ArrayLike,
     attitudes: ArrayLike,
@@ -47,15 +31,18 @@ def solve_magnetometer(
     field_t: float,
     side: ArrayLike = (0.0, 0.0, 1.0),
     method: Method = "as_published",
-) -> MagnetometerSolution:
+) -> TriaxialSolution:
     """Calibrate from mean readings (N, 3) with their variances (N, 3) in attitudes R (N, 3, 3), body to table.
 
     `field_t` is the known size of the field; `side` (3,) a table vector with which it makes less than a right angle
     (down, in the northern hemisphere). Needs 5 attitudes (rank 14). Raises what `solve_triaxial` raises.
     """
-    fit = solve_triaxial(readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method)
-    hard_iron = np.asarray(np.linalg.solve(fit.matrix, fit.bias), dtype=np.float64)
-    return MagnetometerSolution(fit.matrix, fit.bias, fit.reference, hard_iron, fit.covariance, fit)
+    return solve_triaxial(readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method)
+
+
+def hard_iron(solution: TriaxialSolution) -> Array:
+    """(3,) F⁻¹ b: the field that would read as b."""
+    return np.asarray(np.linalg.solve(solution.matrix, solution.bias), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +65,7 @@ class Uniformity:
 
 
 def uniformity(
-    solution: MagnetometerSolution,
+    solution: TriaxialSolution,
     readings_t: ArrayLike,
     attitudes: ArrayLike,
     variances_t2: ArrayLike,
@@ -92,7 +79,7 @@ def uniformity(
 
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings_t, attitudes, variances_t2))
     v_bar = np.zeros_like(m)
-    start = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
+    start = solution.theta
     with converging():
         white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
         theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)

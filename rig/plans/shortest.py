@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from rig.analysis.predicted import predicted
-from rig.analysis.predicted_accelerations import accelerometers_of, predicted_accelerations
+from rig.analysis.predicted_accelerations import predicted_accelerations
 from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
 from rig.analysis.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
 from rig.config.hand_sections import ByHandSection
@@ -119,7 +119,9 @@ def _not_foretold(what: str) -> Refused:
 def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
     """Raise Refused `not_foretold` where something is wanted of a kind of sensor that is not calibrated."""
     kinds = {"gyroscope": not isinstance(config.procedure, StaticAttitudesSection)}
-    kinds["accelerometer"] = bool(accelerometers_of(config))
+    kinds["accelerometer"] = config.procedure.accelerometer_order > 0 and any(
+        each.acceleration is not None for each in config.to_calibrate.values()
+    )
     for (kind, calibrated), sizes in zip(kinds.items(), (SIZES[:2], SIZES[2:]), strict=True):
         if not calibrated and any(getattr(wanted, each) < inf for each in sizes):
             raise _not_foretold(f"the procedure calibrates no {kind} whose uncertainty could be wanted")

@@ -73,8 +73,8 @@ def of_accelerometer(result: AccelerometerResult) -> HeldStill:
 
 def of_magnetometer(result: MagnetometerResult) -> HeldStill:
     """What a magnetometer's plots are made of."""
-    fit = result.solution.fit
-    return _held(FIELD, result, fit.residuals, attitude_residual_std(fit, result.seen), result.solution.field_table_t)
+    fit = result.solution
+    return _held(FIELD, result, fit.residuals, attitude_residual_std(fit, result.seen), fit.reference)
 
 
 def of_file(quantity: Quantity, result: InAttitudes) -> HeldStill:

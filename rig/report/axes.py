@@ -1,16 +1,18 @@
 """What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 from rich.table import Table
 
 from rig.data.quantity import Quantity
-from rig.data.result_types import Freedom
-from rig.estimation.arrays import Array
+from rig.data.result_types import ErrorEntry, Freedom
+from rig.errors import Fault
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.sensor_axes import SensorAxes
+from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.mean import Mean
 from rig.observation.windows import Window
 from rig.report.entry import EntryT, entry
@@ -100,6 +102,18 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     angles = zip(1e3 * axes.non_orthogonality_rad, 1e3 * factor * stds, strict=True)
     told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
     yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
+
+
+def beside_entries(
+    kind: type[EntryT], quantity: Quantity, beside: Mapping[Method, TriaxialSolution | Fault]
+) -> dict[str, EntryT | ErrorEntry]:
+    """The other methods' solutions as entries whose bias ends with its unit, or why a method has none."""
+    return {
+        method: ErrorEntry(error=str(found))
+        if isinstance(found, Fault)
+        else entry(kind, found, scale=scale_of(found.matrix), **{quantity.named("bias"): found.bias})
+        for method, found in beside.items()
+    }
 
 
 def dwell_entry(kind: type[EntryT], quantity: Quantity, dwell: Dwelled, residual: Array, residual_std: Array) -> EntryT:

@@ -1,6 +1,5 @@
 """Entries of `result.json` for readings recorded elsewhere: what attitudes of a file told."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triaxial import TriaxialSolution
-from rig.report.axes import dwell_entry
+from rig.report.axes import beside_entries, dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 
@@ -50,7 +49,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
             sweeps=0,
             temperature_c=None,
             dwells=_dwells(DwellEntry, ACCELERATION, result),
-            beside=_beside(InAttitudesEntry, ACCELERATION, result),
+            beside=beside_entries(InAttitudesEntry, ACCELERATION, result.beside),
         )
         for name, item, site, result in _placed(outcome, ACCELERATION)
     }  # fmt: skip
@@ -64,9 +63,9 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
             arm_field_in_bias=False,
             field_t=site.magnetic_field_t,
             field_base_t=result.solution.reference,
-            hard_iron_t=np.linalg.solve(result.solution.matrix, result.solution.bias),
+            hard_iron_t=magnetometer.hard_iron(result.solution),
             dwells=_dwells(FieldDwellEntry, FIELD, result),
-            beside=_beside(FieldSolutionEntry, FIELD, result),
+            beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
         )
         for name, item, site, result in _placed(outcome, FIELD)
     }  # fmt: skip
@@ -136,7 +135,7 @@ def _rates_beside(found: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
     return {
         method: ErrorEntry(error=str(other))
         if isinstance(other, Fault)
-        else entry(BesideEntry, other, scale=_scale(other), bias_rad_s=-other.bias)
+        else entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
         for method, other in found.beside.items()
     }
 
@@ -191,18 +190,5 @@ def _dwells(kind: Any, quantity: Quantity, found: InAttitudes) -> list[Any]:
     return [dwell_entry(kind, quantity, *each) for each in rows]
 
 
-def _beside(kind: Any, quantity: Quantity, found: InAttitudes) -> Mapping[str, Any]:
-    return {
-        method: ErrorEntry(error=str(other))
-        if isinstance(other, Fault)
-        else entry(kind, other, scale=_scale(other), **{quantity.named("bias"): other.bias})
-        for method, other in found.beside.items()
-    }
-
-
 def _second_order_std(solution: TriaxialSolution) -> Any:
     return None if solution.second_order is None else np.sqrt(np.diag(solution.covariance)[SECOND])
-
-
-def _scale(solution: TriaxialSolution) -> Any:
-    return scale_of(solution.matrix)

@@ -72,5 +72,6 @@ def _as_mounted(run: AsMounted) -> AsMountedEntry:
         AsMountedEntry, run, run.result.sensor, solution,
         started_utc=run.outcome.provenance.recorded.started_utc,
         bias_std_t=np.sqrt(np.diag(solution.covariance))[12:],
-        field_base_t=solution.field_table_t,
+        bias_t=solution.bias,
+        field_base_t=solution.reference,
     )  # fmt: skip

@@ -11,10 +11,10 @@ from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibrat
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
 from rig.config.models import SensorsConfig
-from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
-from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.config.sensor_sections import MagnetometerSection, SensorSection
+from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor, recorded_as
 from rig.sensors.source import OnSamples
 
 
@@ -93,12 +93,7 @@ def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> Boar
     info = find_sensor(board.identity, name, section)
     setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
     field = of_three_axes(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
-    return BoardSensor(info.index, _described(section, setup.rate_hz, field))
-
-
-def _described(section: ConfiguredSensor, rate_hz: float, *channels: Channel) -> RecordedSensor:
-    mounting = recorded_mounting(section.mounting)
-    return RecordedSensor(section.part, section.serial_number, rate_hz, channels, mounting)
+    return BoardSensor(info.index, recorded_as(section, field, rate_hz=setup.rate_hz))
 
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
@@ -111,7 +106,7 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     ]
     if setup.sensitivity_m_s2:
         channels.append(of_three_axes(ACCELERATION, setup.sensitivity_m_s2, FULL_SCALE_COUNTS, setup.range_m_s2))
-    return BoardSensor(info.index, _described(section, setup.rate_hz, *channels))
+    return BoardSensor(info.index, recorded_as(section, *channels, rate_hz=setup.rate_hz))
 
 
 def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:

@@ -17,7 +17,14 @@ from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = Uncertainty(50.0, 1.0, 20.0, 0.06, 50.0, {}, "simple")
+KNOWN = Uncertainty(
+    controller_clock_ppm=50.0,
+    computer_clock_ppm=1.0,
+    crystal_ppm=20.0,
+    axis_deg=0.06,
+    sensor_offset_mm=50.0,
+    decision_rule="simple",
+)
 
 
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"

@@ -35,9 +35,9 @@ def read_of(seed: int) -> Read:
         means, told, variances, field_t=norm_t, side=(0.0, 0.0, -1.0), method="attitude_weighted"
     )
     theta = np.zeros(PARAMETERS)
-    theta[: LEVER.start] = np.concatenate([found.matrix.ravel(), found.field_table_t, found.bias_t])
+    theta[: LEVER.start] = found.theta
     movement = Movement(Dwells(means, variances, told), NO_SWEEPS)
-    off_rad = 0.0 if found.fit.attitude_error is None else found.fit.attitude_error.std_rad
+    off_rad = 0.0 if found.attitude_error is None else found.attitude_error.std_rad
     known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), off_rad)
     drift, _ = drift_patterns(found.matrix, told, None)
     of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], known)

@@ -112,11 +112,10 @@ def test_a_ramp_that_a_step_of_the_thermometer_hides_is_no_walk_of_the_bias() ->
     ramp = _ramping(synthetic_run(setup), per_k / 16)
     known = ramp.settings.uncertainty
     assert known is not None
+    said_of = (known.model_copy(update={"bias_deg_s_k": {"gyro": said}}) for said in (PARTS[part].bias_deg_s_k, 0.0))
     found, without = (
-        calibrated(
-            [replace(ramp, settings=replace(ramp.settings, uncertainty=replace(known, bias_deg_s_k={"gyro": said})))]
-        ).results["gyro"]
-        for said in (PARTS[part].bias_deg_s_k, 0.0)
+        calibrated([replace(ramp, settings=replace(ramp.settings, uncertainty=each))]).results["gyro"]
+        for each in said_of
     )
     assert (np.abs(found.bias_rad_s - setup.bias_rad_s) < stated(found).expanded[3:]).all()
     assert stated(found).of("bias over temperature")[3:].max() > 0

@@ -82,15 +82,15 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
     solution = solve_magnetometer(
         readings, told, variances, field_t=FIELD_T, side=-np.eye(3)[2], method="attitude_weighted"
     )
-    assert solution.fit.attitude_error is not None
+    assert solution.attitude_error is not None
     tests = [bias, bias + drift] + TEST_NOISE_T / np.sqrt(2) * rng.normal(size=(2, 3))
     tested = (
-        uniformity(solution, readings, told, variances, solution.fit.attitude_error.std_rad),
+        uniformity(solution, readings, told, variances, solution.attitude_error.std_rad),
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
     budget = magnetometer_budget(solution, told, variances, tested, site, field_t=FIELD_T)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias_t - bias])
+    off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias - bias])
     return off / budget.std, budget, off / own_spread(budget)
 
 
@@ -180,11 +180,11 @@ def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing
     range_m_s2 = sensor.channel(ACCELERATION).range
     assert known is not None and range_m_s2 is not None
     assert sheet_of(known, "gyro", sensor.part, range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
-    said = replace(
-        known, acceleration_nonlinearity_percent={"gyro": 0.1}, acceleration_nonlinear_over_g={"gyro": 1.0},
-        acceleration_bias_mg_k={"gyro": 0.2}, acceleration_scale_ppm_k={"gyro": 30.0},
-        acceleration_bias_instability_ug={"gyro": 4.0},
-    )  # fmt: skip
+    said = known.model_copy(update={
+        "acceleration_nonlinearity_percent": {"gyro": 0.1}, "acceleration_nonlinear_over_g": {"gyro": 1.0},
+        "acceleration_bias_mg_k": {"gyro": 0.2}, "acceleration_scale_ppm_k": {"gyro": 30.0},
+        "acceleration_bias_instability_ug": {"gyro": 4.0},
+    })  # fmt: skip
     assert sheet_of(said, "gyro", sensor.part, range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 

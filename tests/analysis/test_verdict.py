@@ -17,10 +17,10 @@ from rig.analysis.verdict import (
     verdict,
     verification_checks,
 )
+from rig.config.judged_by import DecisionRule
 from rig.config.limits import Limits
 from rig.data.meaning import Meaning
 from rig.data.quantity import RATE
-from rig.data.settings import DecisionRule
 from rig.estimation.accumulator import Solution
 from rig.estimation.bias_by_repeat import BiasByRepeat
 from rig.estimation.budget import Budget, Contributor

@@ -52,7 +52,7 @@ SENSOR = RecordedSensor(
 SETTINGS = RunSettings(
     procedure="six_observation",
     then_verify=False,
-    observation=ObservationThresholds(0.001, 0.25, 20.0),
+    observation=ObservationThresholds(max_lost_fraction=0.001, max_speed_deviation=0.25, max_axis_deviation_deg=20.0),
     limits=Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.002, condition=100.0),
     to_calibrate=("gyro",),
     reference=None,

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from rig.config.judged_by import OF_SENSORS
 from rig.config.load import load, parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.sensor_catalogue import PARTS
-from rig.data.settings import OF_SENSORS, RunSettings, settings_from_json, settings_of
+from rig.data.settings import RunSettings, settings_from_json, settings_of
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Refused
 from rig.motion.steps import Plan
@@ -40,6 +41,23 @@ def test_what_is_known_of_a_sensor_is_recorded_its_part_s_where_nothing_is_said(
         part = getattr(PARTS["adis16465"], what)
         assert getattr(said, what)["reference"] == (0.7 if what == "acceleration_bias_mg_k" else part)
     assert said.of("acceleration_bias_instability_ug", "another", "adis16465") == 3.6
+
+
+@pytest.mark.parametrize(("section", "key"), [("uncertainty", "axis_deg"), ("observation", "max_lost_fraction")])
+def test_what_every_recording_says_is_refused_where_it_is_lost(section: str, key: str) -> None:
+    document = json.loads(settings().to_json())
+    del document[section][key]
+    with pytest.raises(ValueError, match=rf"settings\.{section}.*lacks {key}"):
+        settings_from_json(json.dumps(document))
+
+
+def test_a_key_that_a_recording_is_too_old_for_is_what_it_was_then_not_what_is_usual_today() -> None:
+    document = json.loads(settings().to_json())
+    del document["uncertainty"]["mount_deg"], document["uncertainty"]["bias_deg_s_k"]
+    read = settings_from_json(json.dumps(document)).uncertainty
+    assert read is not None and read.mount_deg == 0.0 and read.bias_deg_s_k == {}
+    assert parse(VERIFIED).config.uncertainty.mount_deg == 1.0
+    assert read.of("bias_deg_s_k", "gyro", "lsm9ds1") == PARTS["lsm9ds1"].bias_deg_s_k
 
 
 @pytest.mark.parametrize("name", ["calibration", "verified"])

@@ -122,7 +122,7 @@ def test_what_is_expected_is_what_a_fit_reaches() -> None:
             down=-UP,
             method="maximum_likelihood",
         )
-        off.append([*(np.linalg.norm(fit.matrix, axis=1) - 1), *fit.bias_m_s2])
+        off.append([*(np.linalg.norm(fit.matrix, axis=1) - 1), *fit.bias])
     scale, bias = np.sqrt(np.mean(np.square(off).reshape(-1, 2, 3), axis=(0, 2)))
     told = expected(attitudes, G * UP, np.full(18, std), 0.0)
     assert scale == pytest.approx(told.scale_std, rel=0.15)

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.errors import Fault
-from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer
+from rig.estimation.accelerometer import solve_accelerometer
 from rig.estimation.arrays import Array
-from rig.estimation.triaxial import Method
+from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.study.rate_table import ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_MATRIX, MG
 from support.arm_attitudes import attitudes_of, crooked, joints_rad
 
@@ -39,9 +39,7 @@ def geometry(error_rad: float) -> Arm:
     return lambda joints, rng: crooked(joints, error_rad, rng)
 
 
-def solve(
-    m: Array, std: float, method: Method, r: Array, *, attitude_std_rad: Array | None = None
-) -> AccelerometerSolution:
+def solve(m: Array, std: float, method: Method, r: Array, *, attitude_std_rad: Array | None = None) -> TriaxialSolution:
     variances = np.full_like(m, std**2)
     return solve_accelerometer(
         m, r, variances, gravity_m_s2=NORM, down=(0, 0, -1), method=method, attitude_std_rad=attitude_std_rad
@@ -80,11 +78,11 @@ def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOIN
             jacobian[i, 3 * i : 3 * i + 3] = axes[i] / true_scale[i]
             jacobian[3 + i, 12 + i] = 1
         scale.append(size / true_scale - 1)
-        bias.append(solution.bias_m_s2 - ACCELEROMETER_BIAS_M_S2)
+        bias.append(solution.bias - ACCELEROMETER_BIAS_M_S2)
         angles.append((axes @ axes.T - true_axes @ true_axes.T)[AXIS_PAIRS])
         covariance = np.diag(jacobian @ solution.covariance @ jacobian.T)
         stated.append(np.concatenate([scale[-1], bias[-1]]) / np.sqrt(covariance))
-        found.append(0.0 if solution.fit.attitude_error is None else solution.fit.attitude_error.std_rad)
+        found.append(0.0 if solution.attitude_error is None else solution.attitude_error.std_rad)
     rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (scale, angles, bias, stated)]
     return Errors(rms[0], rms[1], rms[2], rms[3], np.array(found))
 
@@ -118,7 +116,7 @@ def test_it_is_never_worse_than_equal_weights_or_than_the_size_of_gravity_alone(
     alike = errors(arm, KVH_10_S, "maximum_likelihood", 30)
     r, loose = attitudes_of(JOINTS), np.full(len(JOINTS), 0.03)
     size_alone = [
-        solve(recorded(arm, KVH_10_S, seed), KVH_10_S, "attitude_weighted", r, attitude_std_rad=loose).bias_m_s2
+        solve(recorded(arm, KVH_10_S, seed), KVH_10_S, "attitude_weighted", r, attitude_std_rad=loose).bias
         for seed in range(30)
     ]
     size_alone_bias = np.sqrt(np.mean(np.square(np.array(size_alone) - ACCELEROMETER_BIAS_M_S2)))
@@ -137,7 +135,7 @@ def test_exact_attitudes_are_found_exact_and_cost_nothing() -> None:
 def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
     found = [solve(recorded(independent(1e-3), KVH_10_S, seed), KVH_10_S, "attitude_weighted", attitudes_of(JOINTS))
              for seed in range(60)]  # fmt: skip
-    told = [each.fit.attitude_error for each in found]
+    told = [each.attitude_error for each in found]
     std = np.std([each.std_rad for each in told if each is not None])
     stated = np.mean([each.uncertainty_rad for each in told if each is not None])
     assert stated == pytest.approx(std, rel=0.3)
@@ -154,7 +152,7 @@ def test_what_is_said_of_the_attitudes_is_believed() -> None:
     m, r = recorded(independent(1e-3), KVH_10_S, 3), attitudes_of(JOINTS)
     told = solve(m, KVH_10_S, "attitude_weighted", r, attitude_std_rad=np.full(len(r), 1e-3))
     found = solve(m, KVH_10_S, "attitude_weighted", r)
-    assert told.fit.attitude_error is not None and told.fit.attitude_error.std_rad < 5e-4
+    assert told.attitude_error is not None and told.attitude_error.std_rad < 5e-4
     np.testing.assert_allclose(np.diag(told.covariance), np.diag(found.covariance), rtol=0.3)
     worse = np.full(len(r), 1e-6)
     worse[5] = 0.01  # one that slipped, and it is known
@@ -163,7 +161,7 @@ def test_what_is_said_of_the_attitudes_is_believed() -> None:
         ACCELEROMETER_MATRIX @ (r[5].T @ Rotation.from_rotvec([0, 0.01, 0]).as_matrix() @ UP) + ACCELEROMETER_BIAS_M_S2
     )
     slipped = solve(moved, KVH_10_S, "attitude_weighted", r, attitude_std_rad=worse)
-    assert np.abs(slipped.bias_m_s2 - ACCELEROMETER_BIAS_M_S2).max() < 0.1 * MG
+    assert np.abs(slipped.bias - ACCELEROMETER_BIAS_M_S2).max() < 0.1 * MG
 
 
 @pytest.mark.parametrize("method", ["as_published", "maximum_likelihood", "attitude_weighted"])
@@ -179,4 +177,4 @@ def test_one_attitude_that_was_moved_by_two_degrees_is_seen(method: Method) -> N
             with pytest.raises(Fault, match=rf"attitude_untrustworthy: attitude {place + 1} is off by"):
                 solve(m, MPU_3_S, method, wrong)
         else:
-            assert "times what the variances explain" in solve(m, MPU_3_S, method, wrong).fit.warnings[0]
+            assert "times what the variances explain" in solve(m, MPU_3_S, method, wrong).warnings[0]

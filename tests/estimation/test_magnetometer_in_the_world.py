@@ -35,7 +35,7 @@ def housings(seed: int, moment_a_m2: float) -> list[dict[str, object]]:
 
 def test_in_a_uniform_field_no_estimate_is_worse_than_its_bound() -> None:
     found = [seen(seed) for seed in range(SEEDS)]
-    errors = np.array([[*(e.solution.matrix - e.matrix).ravel(), *(e.solution.bias_t - e.bias_t)] for e in found])
+    errors = np.array([[*(e.solution.matrix - e.matrix).ravel(), *(e.solution.bias - e.bias_t)] for e in found])
     told = np.r_[F, BIAS]
     std = np.sqrt(np.diag(found[0].solution.covariance)[told])
     assert np.sqrt(np.mean((errors / std) ** 2)) <= 1.15
@@ -54,7 +54,7 @@ def test_a_room_with_a_gradient_and_an_arm_of_iron_are_refused_in_every_seed() -
 
 def biases(*runs: Seen) -> tuple[np.ndarray, ...]:
     return (
-        np.array([run.solution.bias_t for run in runs]),
+        np.array([run.solution.bias for run in runs]),
         np.array([run.solution.covariance[BIAS, BIAS] for run in runs]),
         np.array([run.solution.matrix for run in runs]),
         np.array([run.mounting for run in runs]),
@@ -70,7 +70,7 @@ def test_turning_over_recovers_the_bias_that_one_mounting_has_wrong(thorough: bo
     for seed in range(SEEDS if thorough else FEW):
         upright, over = (seen(seed + 100 * i, iron=ALONG, mounting=m) for i, m in enumerate((UPRIGHT, OVER)))
         assert upright.uniform.uniform, "no residual shows it"
-        off = np.abs(upright.solution.bias_t - upright.bias_t) / np.sqrt(np.diag(upright.solution.covariance)[BIAS])
+        off = np.abs(upright.solution.bias - upright.bias_t) / np.sqrt(np.diag(upright.solution.covariance)[BIAS])
         assert off.max() >= 5
         found = separate(*biases(upright, over))
         assert found.arm_field_in_bias == (True, False, False)

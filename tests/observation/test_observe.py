@@ -506,7 +506,7 @@ def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool) -> None
 @pytest.mark.slow
 def test_a_few_lost_samples_are_counted_and_allowed() -> None:
     gap = between(USUAL, 3.0, 3.05)
-    seen = look(lose(USUAL, gap), replace(SETTINGS, max_lost_fraction=0.05))
+    seen = look(lose(USUAL, gap), SETTINGS.model_copy(update={"max_lost_fraction": 0.05}))
     assert [observation.lost for observation in seen.revolutions] == [len(gap), 0, 0, 0, 0, 0]
     assert seen.revolutions[0].average.samples + len(gap) == look(USUAL).revolutions[0].average.samples
 

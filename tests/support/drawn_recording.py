@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rig.config.judged_by import OF_SENSORS
 from rig.config.sensor_catalogue import PARTS
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.data.settings import OF_SENSORS, Uncertainty
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.nonlinearity import CUBE_MISSED
@@ -123,7 +124,7 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
     run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
     nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}  # is stated of this sensor beside what is of its kind
-    of_its_kind = replace(known, **nothing)
+    of_its_kind = known.model_copy(update=nothing)
     settings = replace(run.settings, uncertainty=of_its_kind)
     return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.config.judging_sections import UncertaintySection
+from rig.config.judged_by import UncertaintySection
 from rig.config.load import Loaded, parse
 from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.servo_section import ServoSection

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rig.config.judged_by import OF_SENSORS
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.stage_section import rotation_by
 from rig.data.run_file import RunData
-from rig.data.settings import OF_SENSORS
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.motion.geometry import flange_attitude, flange_pose, flange_rate
@@ -69,7 +69,7 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
         read = felt + bias + _wandering(len(time_s), kind, own) + kind.noise_rad_s * own.standard_normal(felt.shape)
         run = _looked_at_late(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
         nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}
-        settings = replace(run.settings, uncertainty=replace(known, **nothing))
+        settings = replace(run.settings, uncertainty=known.model_copy(update=nothing))
         runs.append(replace(run, sensors={"gyro": kind.sensor}, settings=settings))
     return runs, scale
 

@@ -10,8 +10,8 @@ from rig.config.attitude_sets import SETS
 from rig.config.sensor_sections import MountingSection, mounting_matrix
 from rig.config.world_magnetism import IronSection, SimulatedMagnetometerSection
 from rig.config.world_models import SiteSection
-from rig.estimation.magnetometer import MagnetometerSolution, Uniformity, solve_magnetometer, uniformity
-from rig.estimation.triaxial import Method
+from rig.estimation.magnetometer import Uniformity, solve_magnetometer, uniformity
+from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.ur10e.forward_kinematics import frames
@@ -36,7 +36,7 @@ class Seen:
 
     bias_t: np.ndarray
     matrix: np.ndarray
-    solution: MagnetometerSolution
+    solution: TriaxialSolution
     uniform: Uniformity
     mounting: np.ndarray
 

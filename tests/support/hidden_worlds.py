@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from rig.config.judging_sections import UncertaintySection
+from rig.config.judged_by import UncertaintySection
 from rig.config.load import load
 from rig.config.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2

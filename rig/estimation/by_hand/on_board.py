@@ -54,14 +54,13 @@ class TakenMove:
 
 @dataclass(frozen=True, slots=True)
 class BoardsSolution:
-    """What the board's equations give: C (3, 3), b (3,) of g = C (m + b), and G (3, 3).
+    """What the board's equations give: C (3, 3) and b (3,) of g = C (m + b).
 
     `scale_std` is the largest standard uncertainty on the diagonal of C.
     """
 
     matrix: Array
     bias_rad_s: Array
-    g_sensitivity_rad_s: Array
     scale_std: float
 
 
@@ -81,7 +80,6 @@ def solve_as_the_board(moves: Sequence[TakenMove]) -> BoardsSolution:
     return BoardsSolution(
         matrix=centre[MATRIX].reshape(3, 3),
         bias_rad_s=-centre[BIAS],
-        g_sensitivity_rad_s=centre[GRAVITY].reshape(3, 3),
         scale_std=float(np.sqrt(variance[[0, 4, 8]].max())),
     )
 

@@ -12,19 +12,10 @@ from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.bias_by_repeat import largest_change_std
-from rig.report.certificate.tables import AXES, AxisRow, Pair, pair
+from rig.report.certificate.tables import AXES, AxisRow, Pair, pair, rows_of
 from rig.report.expanded import expanded
 
 MICRO = 1e6
-
-
-@dataclass(frozen=True, slots=True)
-class FieldRow:
-    """One axis of a magnetometer."""
-
-    axis: str
-    scale: Pair
-    bias: Pair
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +42,8 @@ class DriftRow:
 
 def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
     """An accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
-    spread, milli = expanded_uncertainties(found.budget, found.covariance), 1000 / found.gravity_m_s2
-    return [
-        AxisRow(
-            axis,
-            pair(found.scale[i], spread[i]),
-            pair(found.bias_m_s2[i], spread[3 + i]),
-            pair(milli * found.bias_m_s2[i], milli * spread[3 + i]),
-        )
-        for i, axis in enumerate(AXES)
-    ]
+    spread = expanded_uncertainties(found.budget, found.covariance)
+    return rows_of(found.scale, found.bias_m_s2, spread, too=1000 / found.gravity_m_s2)
 
 
 def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
@@ -72,13 +55,9 @@ def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
     return [(axis, pair(value, width)) for axis, value, width in each]
 
 
-def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
+def field_rows(found: MagnetometerEntry) -> list[AxisRow]:
     """A magnetometer's axes with U; the bias in µT."""
-    spread = expanded_uncertainties(found.budget, found.covariance)
-    return [
-        FieldRow(axis, pair(found.scale[i], spread[i]), pair(MICRO * found.bias_t[i], MICRO * spread[3 + i]))
-        for i, axis in enumerate(AXES)
-    ]
+    return rows_of(found.scale, found.bias_t, expanded_uncertainties(found.budget, found.covariance), size=MICRO)
 
 
 def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:

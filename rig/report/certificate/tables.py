@@ -29,12 +29,12 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class AxisRow:
-    """One axis: scale factor and bias, the latter in two units."""
+    """One axis: scale factor and bias, the latter in two units where there is another."""
 
     axis: str
     scale: Pair
     bias: Pair
-    bias_too: Pair
+    bias_too: Pair | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +65,24 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
     """A gyroscope's axes with U of the budget; without one, with the noise's deviation, as the page then says."""
-    spread, (_, factor) = _spread(sensor), degrees_of(sensor)
+    return rows_of(sensor.scale, sensor.bias_rad_s, _spread(sensor), too=degrees_of(sensor)[1])
+
+
+def rows_of(
+    scale: Sequence[float],
+    bias: Sequence[float],
+    spread: Sequence[float],
+    *,
+    size: float = 1.0,
+    too: float | None = None,
+) -> list[AxisRow]:
+    """Each axis with U, the `spread` of scale factors and biases; the bias times `size`, and times `too`."""
+
+    def bias_in(unit: float, i: int) -> Pair:
+        return pair(unit * bias[i], unit * spread[3 + i])
+
     return [
-        AxisRow(
-            axis,
-            pair(sensor.scale[i], spread[i]),
-            pair(sensor.bias_rad_s[i], spread[3 + i]),
-            pair(factor * sensor.bias_rad_s[i], factor * spread[3 + i]),
-        )
+        AxisRow(axis, pair(scale[i], spread[i]), bias_in(size, i), None if too is None else bias_in(too, i))
         for i, axis in enumerate(AXES)
     ]
 

@@ -17,17 +17,13 @@ from rig.data.accelerometer_entries import (
     InAttitudesEntry,
 )
 from rig.data.quantity import ACCELERATION
-from rig.data.result_types import ErrorEntry
-from rig.errors import Fault
 from rig.estimation.accelerometer_model import DELAY, SECOND
-from rig.estimation.arrays import scale_of
 from rig.estimation.imu import MODEL
 from rig.estimation.own_errors import NONLINEARITY
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triads import Alignment
-from rig.estimation.triaxial import TriaxialSolution
-from rig.report.axes import dwell_entry, skew_known, triple
+from rig.report.axes import beside_entries, dwell_entry, triple
 from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
@@ -37,7 +33,7 @@ from rig.report.elsewhere_entries import accelerometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.followed import Further
-from rig.report.kinds.triad import Words, angles, attitude_lines, triad_kind
+from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
@@ -79,7 +75,7 @@ def accelerometer_entry(result: AccelerometerResult, **more: Any) -> Acceleromet
             dwell_entry(DwellEntry, ACCELERATION, *each)
             for each in zip(result.dwells, solution.dwell_residuals_m_s2, expected, strict=True)
         ],
-        beside={name: _beside(found) for name, found in result.beside.items()},
+        beside=beside_entries(InAttitudesEntry, ACCELERATION, result.beside),
         non_orthogonality_freedom=counted(of_acceleration_angles(result)),
         second_order_freedom=counted(of_second_order(result)),
         held_out=None if result.held_out is None else _held_out(result.held_out),
@@ -99,16 +95,6 @@ def _held_out(held: HeldOut) -> HeldOutEntry:
     return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
 
 
-def _beside(solution: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry:
-    if isinstance(solution, Fault):
-        return ErrorEntry(error=str(solution))
-    return entry(
-        InAttitudesEntry, solution,
-        scale=scale_of(solution.matrix),
-        bias_m_s2=solution.bias,
-    )  # fmt: skip
-
-
 def _lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     swept = "" if found.laid_down is not None else f", {found.sweeps} sweeps"
@@ -119,8 +105,6 @@ def _lines(found: AccelerometerEntry) -> Iterator[str]:
         yield "k by the readings at 1 g up and down, b at 0 g"
     yield from assumed_lines(found.budget)
     yield from told_lines(found.told_from)
-    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
-    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     yield from attitude_lines(found, ACCELERATION)
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
         terms = triple(found.second_order_s2_m, "+.2e")
@@ -136,12 +120,7 @@ def _lines(found: AccelerometerEntry) -> Iterator[str]:
         turned = triple(np.degrees(found.alignment.rotation_rad), "+.4f")
         std_deg = 2 * np.degrees(max(found.alignment.std_rad))
         yield f"turned against its gyroscope by: {turned} ° (± {std_deg:.4f})"
-    for method, other in found.beside.items():
-        if isinstance(other, ErrorEntry):
-            yield f"{method}, attitudes alone: {other.error}"
-        else:
-            scale, bias = triple(other.scale, ".6f"), triple(other.bias_m_s2, "+.5f")
-            yield f"{method}, attitudes alone: k {scale}, b {bias} m/s²"
+    yield from method_lines(found, ACCELERATION, ", attitudes alone")
     if found.held_out is not None:
         held = found.held_out
         yield (

@@ -19,11 +19,10 @@ from rig.data.magnetometer_entries import (
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
-from rig.estimation.arrays import scale_of
-from rig.estimation.magnetometer import MODEL, MagnetometerSolution
+from rig.estimation.magnetometer import MODEL, hard_iron
 from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.six_observation import PARAMETERS
-from rig.report.axes import dwell_entry, skew_known, triple
+from rig.report.axes import beside_entries, dwell_entry, triple
 from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
@@ -31,7 +30,7 @@ from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.kinds.followed import Further
-from rig.report.kinds.triad import Words, angles, attitude_lines, triad_kind
+from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
@@ -54,11 +53,11 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
     """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
-    solution, error = result.solution, result.solution.fit.attitude_error
+    solution, error = result.solution, result.solution.attitude_error
     assert error is not None, "the method finds it"
-    expected = attitude_residual_std(solution.fit, result.seen)
+    expected = attitude_residual_std(solution, result.seen)
     return entry(
-        MagnetometerEntry, result, result.sensor, solution, solution.fit,
+        MagnetometerEntry, result, result.sensor, solution,
         model=MODEL,
         range_t=result.sensor.channel(FIELD).range,
         estimator=ESTIMATOR,
@@ -69,23 +68,19 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
         arm_field_in_bias=True,
         uniformity=entry(UniformityEntry, result.uniformity),
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
-        field_base_t=solution.field_table_t,
+        bias_t=solution.bias,
+        hard_iron_t=hard_iron(solution),
+        field_base_t=solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
         dwells=[
             dwell_entry(FieldDwellEntry, FIELD, *each)
-            for each in zip(result.dwells, solution.fit.residuals, expected, strict=True)
+            for each in zip(result.dwells, solution.residuals, expected, strict=True)
         ],
-        beside={method: _beside(found) for method, found in result.beside.items()},
+        beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
         **more,
     )  # fmt: skip
-
-
-def _beside(solution: MagnetometerSolution | Fault) -> FieldSolutionEntry | ErrorEntry:
-    if isinstance(solution, Fault):
-        return ErrorEntry(error=str(solution))
-    return entry(FieldSolutionEntry, solution, solution.fit, scale=scale_of(solution.matrix))
 
 
 def _lines(found: MagnetometerEntry) -> Iterator[str]:
@@ -103,15 +98,8 @@ def _lines(found: MagnetometerEntry) -> Iterator[str]:
         yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
         yield from _tests(found)
     yield f"field in the {base}: {triple(np.divide(found.field_base_t, FIELD.bias.size), '+.3f')} µT"
-    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
-    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     yield from attitude_lines(found, FIELD)
-    for method, other in found.beside.items():
-        if isinstance(other, ErrorEntry):
-            yield f"{method}: {other.error}"
-        else:
-            bias = triple(np.divide(other.bias_t, FIELD.bias.size), "+.3f")
-            yield f"{method}: k {triple(other.scale, '.6f')}, b {bias} µT"
+    yield from method_lines(found, FIELD)
     yield from (f"warning: {warning}" for warning in found.warnings)
 
 

@@ -6,6 +6,7 @@ from itertools import chain
 from typing import Any
 from xml.etree.ElementTree import Element
 
+import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
@@ -16,7 +17,7 @@ from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.report.axes import scale_and_bias_table
+from rig.report.axes import scale_and_bias_table, skew_known, triple
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.certificate import dcc_results
 from rig.report.certificate.tables import ANGLES
@@ -96,7 +97,12 @@ def item_words(entry: Any) -> str:
 
 
 def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
-    """How far attitudes were found to be off, and where a file told them what laying down did and what was left out."""
+    """How far the axes are from right angles, and the attitudes from what they were taken to be.
+
+    And, where a file told the attitudes, what laying down did and what was left out.
+    """
+    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     if found.attitude_error_rad is not None:
         known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
         yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
@@ -111,6 +117,16 @@ def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
             yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
     if laid.rows_left_out:
         yield f"left out: not_at_rest: {laid.rows_left_out} rows in which the body moves"
+
+
+def method_lines(found: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
+    """What each of the other methods finds, or why it finds nothing."""
+    for method, other in found.beside.items():
+        if isinstance(other, ErrorEntry):
+            yield f"{method}{from_what}: {other.error}"
+        else:
+            bias = triple(np.divide(bias_of(quantity, other), quantity.bias.size), f"+.{quantity.decimals}f")
+            yield f"{method}{from_what}: k {triple(other.scale, '.6f')}, b {bias} {quantity.bias.name}"
 
 
 def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str]:

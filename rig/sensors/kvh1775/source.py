@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
@@ -166,16 +165,9 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
         of_thermometer(DEGREES_PER_COUNT, 0.0),
     ]
     if section.acceleration is not None:
-        range_m_s2 = (section.acceleration.range_g or PARTS[section.part].ranges_g[0]) * STANDARD_GRAVITY_M_S2
-        channels.append(of_three_axes(ACCELERATION, range_m_s2 / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, range_m_s2))
-    return RecordedSensor(
-        part=section.part,
-        serial_number=section.serial_number,
-        rate_hz=section.rate_hz,
-        channels=tuple(channels),
-        mounting=recorded_mounting(section.mounting),
-        clock=name,
-    )
+        most_m_s2 = range_m_s2(section.acceleration)
+        channels.append(of_three_axes(ACCELERATION, most_m_s2 / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, most_m_s2))
+    return recorded_as(section, *channels, clock=name)
 
 
 def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
@@ -183,14 +175,9 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
     if _line_of(section).message != "C":
         return None
     t_per_count = FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS
-    return RecordedSensor(
-        part="kvh1775_magnetometer",
-        serial_number=section.serial_number,
-        rate_hz=section.rate_hz / MESSAGES_EACH,
-        channels=(of_three_axes(FIELD, t_per_count, FULL_SCALE_COUNTS, FIELD_FULL_SCALE_T),),
-        mounting=recorded_mounting(section.mounting),
-        clock=name,
-    )
+    field = of_three_axes(FIELD, t_per_count, FULL_SCALE_COUNTS, FIELD_FULL_SCALE_T)
+    part, rate_hz = "kvh1775_magnetometer", section.rate_hz / MESSAGES_EACH
+    return recorded_as(section, field, part=part, rate_hz=rate_hz, clock=name)
 
 
 def kvh1775(

@@ -22,7 +22,7 @@ from rig.config.lines_section import (
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
@@ -118,13 +118,11 @@ def _read(name: str, section: SensorSection) -> Iterator[tuple[str, tuple[Record
     _, lines = _parts_of(section)
     own = [_triad(lines, RATE, lines.rate, radians(section.range_deg_s)), _thermometer(lines)]
     if section.acceleration is not None and lines.acceleration is not None:
-        range_m_s2 = (section.acceleration.range_g or 0.0) * STANDARD_GRAVITY_M_S2
-        own.append(_triad(lines, ACCELERATION, lines.acceleration, range_m_s2))
+        own.append(_triad(lines, ACCELERATION, lines.acceleration, range_m_s2(section.acceleration)))
 
     def recorded(part: str, *channels: tuple[Channel, _Printed]) -> tuple[RecordedSensor, tuple[_Printed, ...]]:
         of, printed = zip(*channels, strict=True)
-        mounting = recorded_mounting(section.mounting)
-        return RecordedSensor(part, section.serial_number, section.rate_hz, of, mounting, clock=name), printed
+        return recorded_as(section, *of, part=part, clock=name), printed
 
     gyroscope, printed = recorded(section.part, *own)
     yield name, (replace(gyroscope, stamp_std_s=stamp_std_s(lines, section.rate_hz)), printed)

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.mavlink_section import MavlinkSection
-from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection
 from rig.data.channel import Channel, of_thermometer, of_three_axes
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals
@@ -184,17 +183,9 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
         of_thermometer(DEGREES_PER_COUNT, 0.0),
     ]
     if section.acceleration is not None:
-        range_m_s2 = (section.acceleration.range_g or PARTS[section.part].ranges_g[0]) * STANDARD_GRAVITY_M_S2
         step = MILLI * STANDARD_GRAVITY_M_S2 if cut else None
-        channels.append(_channel(ACCELERATION, range_m_s2, step))
-    return RecordedSensor(
-        part=section.part,
-        serial_number=section.serial_number,
-        rate_hz=section.rate_hz,
-        channels=tuple(channels),
-        mounting=recorded_mounting(section.mounting),
-        clock=name,
-    )
+        channels.append(_channel(ACCELERATION, range_m_s2(section.acceleration), step))
+    return recorded_as(section, *channels, clock=name)
 
 
 @contextmanager

@@ -1,0 +1,216 @@
+"""What a recording is judged by beside limits, a row each key: its range, its usual value, and what it means.
+
+One table for the section of a configuration and for the settings that are recorded. What a row is in recordings that
+are older than itself, it says by `Before`; one that says nothing is in all of them.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from rig.config.section import RATIO, Positive, no_number_is_true
+
+JUDGES = ConfigDict(frozen=True, allow_inf_nan=False)
+NonNegative = Annotated[float, Field(ge=0)]
+DecisionRule = Literal["simple", "guard_band"]
+OfSensor = Literal[
+    "g_sensitivity_deg_s_g",
+    "nonlinearity_percent",
+    "asymmetry_percent",
+    "bias_deg_s_k",
+    "scale_ppm_k",
+    "bias_instability_deg_h",
+    "non_orthogonality_deg",
+    "acceleration_nonlinearity_percent",
+    "acceleration_nonlinear_over_g",
+    "acceleration_bias_mg_k",
+    "acceleration_scale_ppm_k",
+    "acceleration_bias_instability_ug",
+]
+OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
+OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all sensors, a recording of each by its name
+
+
+@dataclass(frozen=True, eq=False)
+class Before:
+    """What a key is in recordings of before there was it."""
+
+    value: object
+
+
+SAID_OF_NONE = Before({})
+
+
+def _the_parts(what: str, unit: str | None = None) -> Any:
+    """A size of each sensor that the catalogue has for its part."""
+    extra: dict[str, Any] | None = None if unit is None else {"unit": unit}
+    return Field(default=None, description=f"{what}; if left out, the part's value", json_schema_extra=extra)
+
+
+class ObservationKeys(BaseModel):
+    """The rows of `observation`."""
+
+    model_config = JUDGES
+
+    max_lost_fraction: float = Field(
+        default=0.001,
+        ge=0,
+        lt=1,
+        description="fraction of a sweep's samples that may be missing",
+        json_schema_extra=RATIO,
+    )
+    max_speed_deviation: float = Field(
+        default=0.25,
+        gt=0,
+        lt=1,
+        description="how much the joint's rate, smoothed over 50 ms, may differ from its mean, as a fraction of "
+        "the mean",
+        json_schema_extra=RATIO,
+    )
+    max_axis_deviation_deg: float = Field(
+        default=20.0,
+        gt=0,
+        lt=45,
+        description="angle that is allowed between the measured rotation and the nominal axis of the sensor",
+    )
+
+
+class UncertaintyKeys(BaseModel, Generic[OfSensors]):
+    """The rows of `uncertainty`; those of sensors are `OfSensors`."""
+
+    model_config = JUDGES
+
+    controller_clock_ppm: Positive = Field(
+        default=50.0, description="error of the arm controller's clock, which its maker does not state"
+    )
+    computer_clock_ppm: Positive = Field(
+        default=1.0,
+        description="error of this computer's clock during a run if a time server corrects it; set "
+        "50 without a time server",
+    )
+    crystal_ppm: Positive = Field(
+        default=20.0,
+        description="error of the board's 32768 Hz crystal at room temperature; by hand also of the clock of a device "
+        "that prints lines or of an autopilot, and then it must be stated",
+    )
+    axis_deg: float = Field(
+        default=0.06,
+        ge=0,
+        le=5,
+        description="error of the direction of each wrist's axis in the kinematics that are used; the usual value "
+        "is 1 mrad, as for calibrated arms of this size (Slamani, Nubiola and Bonev, 2012)",
+    )
+    repeatability_deg: Annotated[float, Before(0.0)] = Field(
+        default=0.005,
+        ge=0,
+        le=5,
+        description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
+        "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
+    )
+    thermometer_gradient_k: Annotated[float, Before(0.1)] = Field(
+        default=0.1,
+        ge=0,
+        le=20,
+        description="of a calibration over temperature: by how much the part's thermometer and what it is beside may "
+        "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
+        json_schema_extra={"unit": "K"},
+    )
+    angle_std_deg: Annotated[float | None, Before(None)] = Field(
+        default=None,
+        ge=0,
+        le=5,
+        description="standard deviation of a joint's angle about the angle of its encoder: for sweeps that are no "
+        "whole turns. No default, for no maker of these arms states it; whole turns do not need it",
+    )
+    mount_deg: Annotated[float, Before(0.0)] = Field(
+        default=1.0,
+        ge=0,
+        le=10,
+        description="how far the item may sit off the mounting that each of `procedure.stages` states, about each axis",
+    )
+    sensor_offset_mm: float = Field(
+        default=50.0,
+        ge=0,
+        le=1000,
+        description="how far the sensor may be from the flange's centre, or from the end of `arm.extension_mm`, "
+        "along each axis, in either direction",
+    )
+    acceleration_lag_ms: Annotated[float, Before(5.0)] = Field(
+        default=5.0,
+        ge=0,
+        le=100,
+        description="delay of an accelerometer's own filter, at most; it makes the wave of a sweep smaller by "
+        "half the square of the angle (in rad) that the arm turns in this time",
+        json_schema_extra={"unit": "ms"},
+    )
+    g_sensitivity_deg_s_g: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "change of a reading for 1 g, if attitudes do not determine it", "°/s/g"
+    )
+    nonlinearity_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "largest distance of a gyroscope's curve from the best straight line, in per cent of full scale, for the "
+        "odd part of the curve and for the even part; used if there is only one speed",
+        "%",
+    )
+    asymmetry_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "even part of a gyroscope's curve, in per cent of full scale, that is allowed although one scale factor is"
+        " stated for both directions; more of it fails the check `cw_against_ccw`",
+        "%",
+    )
+    bias_deg_s_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts("change of a gyroscope's bias for 1 K", "°/s/K")
+    scale_ppm_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "change of a gyroscope's scale factor for 1 K", "ppm/K"
+    )
+    bias_instability_deg_h: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias wanders, even "
+        "with the longest average",
+        "°/h",
+    )
+    non_orthogonality_deg: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "how much the angle between two axes of a gyroscope may differ from 90°"
+    )
+    acceleration_nonlinearity_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "largest distance of an accelerometer's curve from the best straight line, in per cent of "
+        "`acceleration_nonlinear_over_g`",
+        "%",
+    )
+    acceleration_nonlinear_over_g: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "acceleration in either direction for which this nonlinearity is stated; 0 means the range that is set", "g"
+    )
+    acceleration_bias_mg_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "change of an accelerometer's bias for 1 K", "mg/K"
+    )
+    acceleration_scale_ppm_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "change of an accelerometer's scale factor for 1 K", "ppm/K"
+    )
+    acceleration_bias_instability_ug: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+        "smallest Allan deviation of an accelerometer at rest", "µg"
+    )
+    decision_rule: DecisionRule = Field(
+        default="simple",
+        description="what is compared with a limit: `simple`, the value alone; `guard_band`, the value together "
+        "with its expanded uncertainty, so that at most one in forty is accepted wrongly",
+    )
+
+
+class ObservationSection(ObservationKeys, extra="forbid"):
+    """What an averaged revolution must fulfil, so that it is used."""
+
+    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+
+
+class UncertaintySection(UncertaintyKeys[NonNegative | None], extra="forbid"):
+    """Sizes of errors that no recording shows. They are half-widths: every value within is equally likely."""
+
+    _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
+
+
+def as_recorded(cls: type[BaseModel], document: Any) -> Any:
+    """The keys of a recording, with those it is too old for. Raises ValueError where it lacks another."""
+    if not isinstance(document, dict):
+        return document
+    of = cls.model_fields.items()
+    before = {key: each.value for key, field in of for each in field.metadata if isinstance(each, Before)}
+    if lacking := cls.model_fields.keys() - before.keys() - document.keys():
+        raise ValueError(f"lacks {', '.join(sorted(lacking))}")
+    return {**before, **document}
