@@ -123,8 +123,7 @@ class Rig:
     `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
     one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
     `hand` where an operator's turns the item, `warming` where its temperature is to change, and `up` is that direction
-    in the frame of the arm's base. Where there is an `early` end, the steps between it and the last way home are passed
-    over.
+    in the frame of the arm's base. Where there is an `early` end, all that follows it is passed over but a way home.
     """
 
     devices: Devices
