@@ -19,7 +19,7 @@ from rig.config.layers import BASE, SET, Layered, Places, put_together, read_lay
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.servo_section import ServoSection
-from rig.config.shortest_procedure import SHORTEST, WantedSection, turned_otherwise, written_out
+from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, WantedSection, turned_otherwise, written_out
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
@@ -192,7 +192,7 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
     if sections is None:
         return ProcedureSection(name=str(name)), []
     place = ("procedure", "name")
-    if name == SHORTEST and SHORTEST not in sections:
+    if (name == SHORTEST and SHORTEST not in sections) or (name == CARRIED_OUT and "wanted" in data):
         if (otherwise := turned_otherwise(layered.document)) is not None:
             return None, [f"{_where(place, layered.places)}: {otherwise}"]
         wanted, problems = _validate(WantedSection, data.get("wanted", {}), ("procedure", "wanted"), layered)

@@ -17,7 +17,7 @@ from rig.data.run_file import RunData, read_run
 from rig.errors import RigError
 from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
-from rig.station.events import WantedReached
+from rig.station.events import UncertaintySoFar
 
 WRITTEN_S = 0.6  # by then the recorder has written all that it was given
 # Of what is wanted: the whole recording says a little more of clocks and noise than it does before the way home.
@@ -73,14 +73,14 @@ class EndingEarly:
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def found(self, looked: "Future[Reached | None]") -> WantedReached | None:
-        """What was found, where it ends the run; what takes too long ends nothing."""
+    def found(self, looked: "Future[Reached | None]") -> UncertaintySoFar | None:
+        """What was found, which may end the run; what takes too long ends nothing."""
         self._due = False
         reached = looked.result() if looked.done() else None
-        if reached is None or self.wanted.share(reached) > ENOUGH:
+        if reached is None:
             return None
-        self.ended = True
-        return WantedReached(reached.scale, reached.bias_rad_s, self._repeats_left)
+        self.ended = self.wanted.share(reached) <= ENOUGH
+        return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def passes_over(self, motion: Motion) -> bool:
         """Whether the next motion of the plan is not made: after the end, all but the way home."""

@@ -170,7 +170,8 @@ class Rig:
         devices, station = self.devices, self.recording.station
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
-        said = announcement(self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines())
+        told = self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines()
+        said = announcement(*told, early=self.early is not None)
         if not station.ask(said):
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 
