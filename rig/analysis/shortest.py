@@ -79,19 +79,19 @@ SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields
 class Candidate:
     """A procedure that may be run, and how long it takes.
 
-    Those of one `family` differ in `sizes`, of which a larger one never tells less: turns, repeats; and in `waits_s`,
-    how long is stood still. Longer waits may tell less: meanwhile the bias wanders on.
+    Those of one `family` differ in `sizes`, of which a larger one never tells less: turns, repeats, dwells; and
+    in `rests_s` after sweeps. Longer rests may tell less: meanwhile the bias wanders on.
     """
 
     procedure: ProcedureSection
     family: tuple[object, ...]
     sizes: tuple[float, ...]
     duration_s: float
-    waits_s: tuple[float, ...] = ()
+    rests_s: tuple[float, ...] = ()
 
     def within(self, other: "Candidate") -> bool:
         """Whether it tells no more than another."""
-        return (self.family, self.waits_s) == (other.family, other.waits_s) and all(
+        return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             mine <= its for mine, its in zip(self.sizes, other.sizes, strict=True)
         )
 

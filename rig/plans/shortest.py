@@ -41,8 +41,9 @@ from rig.turners.registry import kind_of
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
-ENDLESS_RESTS_S = (1.0, 5.0)  # of those of which the endless run is looked at: shorter ones tell scale, longer bias
-HOPELESS = 2.0  # by so much may other rests make U of an endless run smaller
+# Of the endless run a plan of two repeats is looked at: of one alone, noise would weigh too much beside what repeats have
+# alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
+TWICE, HOPELESS = 2, 2.0
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
@@ -51,7 +52,7 @@ class Tried(Protocol):
     """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run."""
 
     def candidates(self) -> Sequence[Candidate]: ...
-    def largest(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def predict(self, candidate: Candidate) -> Budgets | None: ...
     def endless(self, candidate: Candidate) -> Budgets | None: ...
@@ -67,7 +68,9 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     what = tried(config)
     _refuse_others(wanted, config)
     candidates = what.candidates()
-    floors = [(each.family, floor) for each in what.largest(candidates) if (floor := what.endless(each)) is not None]
+    floors = [
+        (each.family, floor) for each in what.made_endless(candidates) if (floor := what.endless(each)) is not None
+    ]
     able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
     least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
     hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
@@ -188,15 +191,16 @@ class _Swept:
                 )
                 lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * longer_s
                 procedure = self._procedure(**keys, repeats=repeats, **dict(zip(self.waits, waits_s, strict=True)))
-                found.append(Candidate(procedure, family, (turned, repeats), lasting_s, waits_s))
+                rests_s, dwells_s = self._apart(waits_s)
+                found.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
         return found
 
-    def largest(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """The candidate of each family that turns and repeats most, for two lengths of its waits."""
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """The candidate of each family that turns and dwells most, made twice at most, with short rests and long."""
         found = {
-            (each.family, each.waits_s): each
+            (each.family, each.rests_s): each
             for each in sorted(candidates, key=lambda each: each.sizes)
-            if each.waits_s in product(*[ENDLESS_RESTS_S] * len(self.waits))
+            if set(each.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and each.sizes[1] <= TWICE
         }
         return list(found.values())
 
@@ -205,7 +209,7 @@ class _Swept:
 
         By so little that those which stand still longer are taken to tell more.
         """
-        waits_s = best.waits_s
+        waits_s = [float(getattr(best.procedure, key)) for key in self.waits]
         counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
         found = []
         for shorter_s in product(*map(_down_from, waits_s)):
@@ -216,6 +220,14 @@ class _Swept:
             sizes, lasting_s = (*best.sizes, *shorter_s), best.duration_s - less_s
             found.append(Candidate(procedure, best.family, sizes, lasting_s))
         return found
+
+    def _apart(self, waits_s: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The rests among waits, and the dwells, of which longer ones tell more."""
+        rests_s, dwells_s = (
+            tuple(each for key, each in zip(self.waits, waits_s, strict=True) if (key == "dwell_s") == dwells)
+            for dwells in (False, True)
+        )
+        return rests_s, dwells_s
 
     def _counts(self, plan: Plan) -> list[int]:
         """How many waits of each key a plan has."""
@@ -278,7 +290,7 @@ class _ByHand:
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
 
-    def largest(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
         """The candidate of most flips and least rests: without noise, more adds nothing."""
         return [max(candidates, key=lambda each: (each.sizes[0], -each.sizes[1], -each.sizes[2]))]
 

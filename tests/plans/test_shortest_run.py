@@ -221,7 +221,7 @@ def floor_of(config: RigConfig) -> Reached:
 
 
 def coarse(each: Candidate) -> bool:
-    (_, repeats), (rest_s,) = each.sizes, each.waits_s
+    (_, repeats), (rest_s,) = each.sizes, each.rests_s
     return each.family[0] == 3 and each.family[1] in (60.0, 120.0) and repeats in (1, 2, 3, 4) and rest_s <= 10
 
 
