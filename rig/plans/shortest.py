@@ -41,7 +41,7 @@ from rig.turners.registry import kind_of
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
-# Of the endless run a plan of two repeats is looked at: of one alone, noise would weigh too much beside what repeats have
+# Of the endless run a plan of two repeats is looked at: in one alone, noise weighs too much beside what repeats have
 # alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
 TWICE, HOPELESS = 2, 2.0
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
