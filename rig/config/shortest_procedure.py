@@ -56,7 +56,7 @@ class ShortestSection(Section):
 def turned_otherwise(document: Mapping[str, Any]) -> str | None:
     """What to do in place of a procedure of this name where no arm turns the sensors; None where one does."""
     turner = document.get("turner")
-    kind = turner.get("kind") if isinstance(turner, dict) else None
+    kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in OTHERS:
         return None
     why, name = OTHERS[kind]

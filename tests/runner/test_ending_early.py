@@ -28,7 +28,11 @@ from support.synthetic_run import CONFIG, Setup, synthetic_run
 REPEATS = 4
 
 
-def planned(start_q_rad: Joints | None = None, done: Collection[int] = (), **keys: object) -> Plan:
+def planned(**keys: object) -> Plan:
+    return resumed(None, (), **keys)
+
+
+def resumed(start_q_rad: Joints | None, done: Collection[int], /, **keys: object) -> Plan:
     said = [f"procedure.{key}={json.dumps(value)}" for key, value in keys.items()]
     text = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=REPEATS, part="lsm9ds1", procedure="", uncertainty="")
     config = parse(text, overrides=said).config
@@ -66,7 +70,7 @@ def test_resumed_after_whole_repeats_that_are_enough_it_only_goes_home(
 ) -> None:
     """Else the repeat that was begun is completed first, and sweeps that do not count are made again."""
     home = planned().home_q_rad
-    plan = planned(start_q_rad=(home[0] + away_rad, *home[1:]), done=done)
+    plan = resumed((home[0] + away_rad, *home[1:]), done)
     early = EndingEarly(Wanted(scale=1.0), plan, 6 * REPEATS, REPEATS, Path(), [synthetic_run(Setup())], "vector")
     assert early.due() == whole
     if whole:
