@@ -119,6 +119,7 @@ def without_sweeps(run: RunData) -> RunData:
 SHORTEST = {"name": "shortest", "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_interruption(tmp_path: Path) -> None:
     """Interrupted on its way home, it has all that is wanted, and measures nothing more."""
