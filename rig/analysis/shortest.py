@@ -6,6 +6,7 @@ from math import inf
 from types import MappingProxyType
 
 from rig.config.models import ProcedureSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 
@@ -63,6 +64,14 @@ class Wanted:
         return max(shares)
 
 
+def wanted_by(section: ProcedureSection) -> Wanted | None:
+    """The wish at which a run of several repeats ends; None where it makes all of them."""
+    if not isinstance(section, SixObservationSection):
+        return None
+    scale, bias_rad_s = section.wanted_scale_u, section.wanted_bias_u_rad_s
+    return None if scale is bias_rad_s is None else Wanted(scale or inf, bias_rad_s or inf)
+
+
 SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields of both are called
 
 
@@ -70,17 +79,19 @@ SIZES = tuple(Reached.__dataclass_fields__)  # what may be wanted, as the fields
 class Candidate:
     """A procedure that may be run, and how long it takes.
 
-    Those of one `family` differ in `sizes` alone, of which a larger one never tells less: turns, repeats, rests.
+    Those of one `family` differ in `sizes`, of which a larger one never tells less: turns, repeats, dwells; and
+    in `rests_s` after sweeps. Longer rests may tell less: meanwhile the bias wanders on.
     """
 
     procedure: ProcedureSection
     family: tuple[object, ...]
     sizes: tuple[float, ...]
     duration_s: float
+    rests_s: tuple[float, ...] = ()
 
     def within(self, other: "Candidate") -> bool:
         """Whether it tells no more than another."""
-        return self.family == other.family and all(
+        return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             mine <= its for mine, its in zip(self.sizes, other.sizes, strict=True)
         )
 
@@ -100,11 +111,11 @@ class Planned:
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """What a search came to: the shortest that does, None of none; the one that comes nearest; how many were tried."""
+    """What a search came to: the shortest that does, None of none; the one that comes nearest; what all had."""
 
     best: Planned | None = None
     nearest: Planned | None = None
-    tried: int = 0
+    looked: Sequence[Budgets] = ()
     among: int = 0
 
 
@@ -113,8 +124,8 @@ class Shortest:
     """The shortest run for what is wanted.
 
     `before` is the file's own procedure, None where it tells nothing; `nearest` what comes nearest where none does, and
-    `endless` the budgets of the endless runs of each family. `cannot_be_had`: no run of this kind has what is wanted,
-    however long. `directions` (N, 3) are those of the sweeps, None without.
+    `endless` the budgets of the endless runs of each family, and of all plans that were looked at. `cannot_be_had`: no
+    run of this kind has what is wanted, however long. `directions` (N, 3) are those of the sweeps, None without.
     """
 
     wanted: Wanted
@@ -128,12 +139,12 @@ class Shortest:
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """The budgets of the endless run that knows best what is called so in `Reached`."""
+        """The budgets of the run that knows best what is called so in `Reached`."""
         return min(self.endless, key=lambda each: float(getattr(each.reached, size)))
 
     @property
     def at_any_length(self) -> Reached:
-        """The least U that endless runs have, of each size for itself: these may be different runs."""
+        """The least U of all runs, of each size for itself: these may be different runs."""
         return Reached(*(getattr(self.least(each).reached, each) for each in SIZES))
 
 
@@ -148,16 +159,17 @@ def shortest(
     left = sorted(
         (each for each in candidates if each.duration_s <= wanted.at_most_s), key=lambda each: each.duration_s
     )
-    among, tried = len(left), 0
+    among, looked = len(left), list[Budgets]()
     best: Planned | None = None
     nearest: Planned | None = None
     while left:
         middle = len(left) // 2
-        candidate, tried = left[middle], tried + 1
+        candidate = left[middle]
         budgets = predict(candidate)
         if budgets is None:
             del left[middle]
             continue
+        looked.append(budgets)
         planned = Planned(candidate, budgets)
         if nearest is None or wanted.share(planned.reached) < wanted.share(nearest.reached):
             nearest = planned
@@ -165,7 +177,7 @@ def shortest(
             best, left = planned, [each for each in left if each.duration_s < candidate.duration_s]
         else:
             left = [each for each in left if not each.within(candidate)]
-    return Searched(best, nearest, tried, among)
+    return Searched(best, nearest, looked, among)
 
 
 def _worst(budgets: Mapping[str, Budget]) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Passed or failed: every limit beside what was measured. A measurement or a limit that is missing fails."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
@@ -73,6 +73,12 @@ class _Held:
             self.check("bias_std", _largest(std[3:])),
         )
 
+    def wanted(self, **expanded: Array) -> Iterator[Check]:
+        """The checks of expanded uncertainties (3,) by their names, where somebody has said how large they may be."""
+        for what, each in expanded.items():
+            if limit_of(self.limits, self.quantity, what)[1] is not None:
+                yield self.check(what, _largest(each))
+
 
 def fitness(
     sensor: str,
@@ -106,6 +112,8 @@ def judge(
         std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
         spreads = (None, None) if budget is None else _spreads(budget)
         checks += held.calibration(solution.scale, solution.bias_rad_s, std, spreads)
+        expanded = COVERAGE_FACTOR * std if budget is None else budget.expanded
+        checks += held.wanted(scale_u=expanded[:3], bias_u=expanded[3:])
         checks.append(held.check("condition", _largest(np.array([solution.condition]))))
     return tuple(checks)
 

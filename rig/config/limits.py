@@ -52,6 +52,17 @@ class Limits(BaseModel):
     bias_std_rad_s: Annotated[Positive, Limit("rate", "bias_std", "rad/s", "fitness", "bias")] = Field(
         description="largest standard uncertainty of a bias"
     )
+    scale_u: Annotated[Positive | None, Limit("rate", "scale_u", "1", "fitness", "scale")] = Field(
+        default=None,
+        description="largest expanded uncertainty of a scale factor; if it is left out, `procedure.wanted_scale_u` of "
+        "six_observation, where that is given",
+        json_schema_extra=RATIO,
+    )
+    bias_u_rad_s: Annotated[Positive | None, Limit("rate", "bias_u", "rad/s", "fitness", "bias")] = Field(
+        default=None,
+        description="largest expanded uncertainty of a bias; if it is left out, `procedure.wanted_bias_u_rad_s`, where "
+        "that is given",
+    )
     condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(
         description="largest condition number of the equations: how well the sweeps separate the parameters (1 is "
         "best)",

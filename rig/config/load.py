@@ -19,7 +19,7 @@ from rig.config.layers import BASE, SET, Layered, Places, put_together, read_lay
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.servo_section import ServoSection
-from rig.config.shortest_procedure import SHORTEST, written_out, wrong_wish
+from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, WantedSection, turned_otherwise, written_out
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
@@ -191,16 +191,18 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
-    if name == SHORTEST and SHORTEST not in sections:
-        wrong = wrong_wish(data)
-        if wrong is not None:
-            return None, [f"{_where(('procedure', 'wanted'), layered.places)}: {wrong}"]
-        data = written_out(data)
+    place = ("procedure", "name")
+    if (name == SHORTEST and SHORTEST not in sections) or (name == CARRIED_OUT and "wanted" in data):
+        if (otherwise := turned_otherwise(layered.document)) is not None:
+            return None, [f"{_where(place, layered.places)}: {otherwise}"]
+        wanted, problems = _validate(WantedSection, data.get("wanted", {}), ("procedure", "wanted"), layered)
+        if wanted is None:
+            return None, problems
+        data = written_out(data, wanted)
         name = data["name"]
     if isinstance(name, str) and name in sections:
         return _validate(sections[name], data, ("procedure",), layered)
-    place = ("procedure", "name")
-    problems = [_where(place, layered.places) + _not_allowed(name, list(sections))]
+    problems = [_where(place, layered.places) + _not_allowed(name, [*sections, SHORTEST])]
     nearest = difflib.get_close_matches(str(name)[:100], list(sections), n=1)
     if nearest:
         problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), layered)[1]

@@ -168,9 +168,9 @@ class ProcedureSection(Section):
         """Attitudes and verifications have one mounting: say so, and not that a key is unknown."""
         if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
             raise ValueError(
-                "stages are of six_observation alone, which calibrates gyroscopes: accelerometers and magnetometers "
-                "are turned against gravity and field in one mounting, and a verification repeats one movement; "
-                "leave out stages, or use six_observation"
+                "stages are of six_observation and servo_six_observation, which calibrate gyroscopes: accelerometers "
+                "and magnetometers are turned against gravity and field in one mounting, and a verification repeats "
+                "one movement; leave out stages, or use six_observation"
             )
         return data
 

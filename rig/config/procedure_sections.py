@@ -180,11 +180,15 @@ class SixObservationSection(SixSweepsSection):
         gt=0,
         lt=0.1,
         description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
-        "home; without it and `wanted_bias_u_rad_s`, it ends when all repeats are made",
+        "home; without it and `wanted_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
+        "fails the check `scale_u`",
         json_schema_extra=RATIO,
     )
     wanted_bias_u_rad_s: float | None = Field(
-        default=None, gt=0, lt=1, description="the same of the biases; where both are given, both must be reached"
+        default=None,
+        gt=0,
+        lt=1,
+        description="the same of the biases, with the check `bias_u`; where both are given, both must be reached",
     )
 
     @property
@@ -205,8 +209,8 @@ class SixObservationSection(SixSweepsSection):
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.wanted_scale_u or self.wanted_bias_u_rad_s):
             yield (
-                "procedure.wanted_scale_u and wanted_bias_u_rad_s end a run after a repeat, and procedure.stages has "
-                "its repeats in each mounting: leave out one or the other"
+                "procedure.wanted_scale_u and wanted_bias_u_rad_s (or name: shortest) end a run after a repeat, and "
+                "procedure.stages has its repeats in each mounting: leave out one or the other"
             )
         if self.stages and self.verify:
             yield (

@@ -7,8 +7,10 @@ from typing import Any
 from rig.config import layers, yaml_text
 from rig.config.models import ArmSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.section import Section
 from rig.config.sensor_catalogue import PARTS
 from rig.config.servo_section import ServoSection
+from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, ShortestSection
 from rig.config.world_models import WorldSection
 
 Schema = Mapping[str, Any]
@@ -131,7 +133,10 @@ def _procedures() -> Iterator[str]:
         "[A procedure of your own](how-to/own-procedure.md) has its own section.",
         "",
     )
-    for name, section in STOCK_SECTIONS.items():
+    sections: dict[str, type[Section]] = {}
+    for name, stock in STOCK_SECTIONS.items():
+        sections |= {name: stock, SHORTEST: ShortestSection} if name == CARRIED_OUT else {name: stock}
+    for name, section in sections.items():
         schema = section.model_json_schema()
         yield from _section("procedure", schema, schema.get("$defs", {}), f"### `procedure` with `name: {name}`")
 

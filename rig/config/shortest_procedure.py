@@ -1,23 +1,70 @@
 """`procedure: {name: shortest, wanted: …}`: six observations, repeated until the uncertainty is what is wanted."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rig.config.section import RATIO, Section
 
 SHORTEST = "shortest"
-WANTED: Mapping[str, str] = {"scale": "wanted_scale_u", "bias": "wanted_bias_u_rad_s"}
+CARRIED_OUT = "six_observation"
 REPEATS = 16  # at most, where the section says nothing
+IN_ADVANCE = "`rig plan CONFIG --wanted scale=U --write FILE` writes the shortest run for what is wanted"
+# What does not end after a repeat, by the kind of turner, and the procedure to name in its place.
+OTHERS: Mapping[str, tuple[str, str]] = {
+    "servo": ("with a servo the repeats are made in each mounting, so no run ends early", "servo_six_observation"),
+    "hand": ("nothing turns whole revolutions by hand", "by_hand"),
+}
 
 
-def wrong_wish(section: Mapping[str, Any]) -> str | None:
-    """What is wrong with what such a section says of `wanted`, None if nothing is."""
-    wanted = section.get("wanted")
-    if isinstance(wanted, dict) and wanted and not wanted.keys() - WANTED.keys():
+class WantedSection(Section):
+    """The expanded uncertainties at which the run ends; at least one of them."""
+
+    scale: float | None = Field(
+        default=None,
+        gt=0,
+        lt=0.1,
+        description="of the scale factors, as `wanted_scale_u` of six_observation",
+        json_schema_extra=RATIO,
+    )
+    bias: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="of the biases, as `wanted_bias_u_rad_s`",
+        json_schema_extra={"unit": "rad/s"},
+    )
+
+    @model_validator(mode="after")
+    def something_is_wanted(self) -> Self:
+        """Without a wish nothing ends the run early."""
+        if self.scale is None and self.bias is None:
+            raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")
+        return self
+
+
+class ShortestSection(Section):
+    """The repeats of six_observation, until the uncertainty is what is wanted. All keys of `name: six_observation` may
+    stand here too; `repeats` is the largest number of them, and 16 if it is left out.
+    """
+
+    name: Literal["shortest"] = Field(description="this procedure")
+    wanted: WantedSection
+
+
+def turned_otherwise(document: Mapping[str, Any]) -> str | None:
+    """What to do in place of a procedure of this name where no arm turns the sensors; None where one does."""
+    turner = document.get("turner")
+    kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
+    if kind not in OTHERS:
         return None
-    return "must say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4} or one of them"
+    why, name = OTHERS[kind]
+    return f"{SHORTEST}: {why}; say name: {name}, and {IN_ADVANCE}"
 
 
-def written_out(section: Mapping[str, Any]) -> dict[str, Any]:
+def written_out(section: Mapping[str, Any], wanted: WantedSection) -> dict[str, Any]:
     """The section of the procedure that is carried out: the keys that stand beside the name and the wish stay."""
     rest = {key: value for key, value in section.items() if key != "wanted"}
-    ends = {WANTED[size]: value for size, value in section["wanted"].items()}
-    return {"repeats": REPEATS, **ends, **rest, "name": "six_observation"}
+    ends = {"wanted_scale_u": wanted.scale, "wanted_bias_u_rad_s": wanted.bias}
+    return {"repeats": REPEATS, **ends, **rest, "name": CARRIED_OUT}

@@ -349,7 +349,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         procedure=config.procedure.name,
         then_verify=config.procedure.then_verify,
         observation=ObservationThresholds(**config.observation.model_dump()),
-        limits=Limits(**config.limits.model_dump()),
+        limits=_limits(config),
         to_calibrate=tuple(config.to_calibrate),
         reference=reference,
         home_q_rad=plan.home_q_rad,
@@ -369,6 +369,17 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     if settings.has_arcs and uncertainty.angle_std_deg is None:
         raise _angle_std_not_stated()
     return settings
+
+
+def _limits(config: "RigConfig") -> Limits:
+    """The limits of the file, and what its procedure repeats for."""
+    from rig.config.procedure_sections import SixObservationSection
+
+    said, section = config.limits.model_dump(), config.procedure
+    if isinstance(section, SixObservationSection):
+        wanted = {"scale_u": section.wanted_scale_u, "bias_u_rad_s": section.wanted_bias_u_rad_s}
+        said |= {key: value for key, value in wanted.items() if said[key] is None}
+    return Limits(**said)
 
 
 def _by_hand(section: "ProcedureSection") -> ByHand | None:

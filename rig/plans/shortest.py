@@ -41,6 +41,9 @@ from rig.turners.registry import kind_of
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
+# Of the endless run a plan of two repeats is looked at: in one alone, noise weighs too much beside what repeats have
+# alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
+TWICE, HOPELESS = 2, 2.0
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
@@ -49,6 +52,7 @@ class Tried(Protocol):
     """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run."""
 
     def candidates(self) -> Sequence[Candidate]: ...
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def predict(self, candidate: Candidate) -> Budgets | None: ...
     def endless(self, candidate: Candidate) -> Budgets | None: ...
@@ -64,12 +68,17 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     what = tried(config)
     _refuse_others(wanted, config)
     candidates = what.candidates()
-    floors = {each.family: floor for each in _once(candidates) if (floor := what.endless(each)) is not None}
-    least = min(floors, key=lambda family: wanted.share(floors[family].reached))
-    able = {family for family, floor in floors.items() if wanted.met_by(floor.reached)}
-    found = shortest([each for each in candidates if each.family in able], what.predict, wanted)
-    if not able:
-        found = shortest(_longest(candidates, least, wanted.at_most_s), what.predict, wanted)
+    floors = [
+        (each.family, floor) for each in what.made_endless(candidates) if (floor := what.endless(each)) is not None
+    ]
+    able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
+    least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
+    hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
+    found = shortest(hopeful, what.predict, wanted)
+    endless = [floor for _, floor in floors]
+    cannot_be_had = not any(wanted.met_by(each.reached) for each in (*endless, *found.looked))
+    if found.best is None and cannot_be_had and able and wanted.at_most_s < inf:
+        cannot_be_had = shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
     fine = shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
     best = what.final(fine.best or found.best, wanted)
     shown = best or found.nearest
@@ -80,9 +89,9 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
         None if own is None else Planned(replace(before, duration_s=_duration_s(config)), own),
         best,
         found.nearest,
-        list(floors.values()),
-        not able,
-        found.tried + fine.tried,
+        [*endless, *found.looked],
+        cannot_be_had,
+        len(found.looked) + len(fine.looked),
         len(candidates),
         None if shown is None else what.directions(shown.candidate.procedure),
     )
@@ -147,14 +156,6 @@ def _duration_s(config: RigConfig) -> float:
     return plan_of(config, procedure).duration_s
 
 
-def _once(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The one of each family that turns farthest and repeats and rests least: without noise, more adds little."""
-    found = dict[tuple[object, ...], Candidate]()
-    for each in sorted(candidates, key=lambda each: (each.sizes[0], [-size for size in each.sizes[1:]])):
-        found[each.family] = each
-    return list(found.values())
-
-
 def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
     """The longest of a family, alone."""
     own = [each for each in candidates if each.family == family and each.duration_s <= at_most_s]
@@ -192,12 +193,25 @@ class _Swept:
                 )
                 lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * longer_s
                 procedure = self._procedure(**keys, repeats=repeats, **dict(zip(self.waits, waits_s, strict=True)))
-                found.append(Candidate(procedure, family, (turned, repeats, *waits_s), lasting_s))
+                rests_s, dwells_s = self._apart(waits_s)
+                found.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
         return found
 
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """The candidate of each family that turns and dwells most, made twice at most, with short rests and long."""
+        found = {
+            (each.family, each.rests_s): each
+            for each in sorted(candidates, key=lambda each: each.sizes)
+            if set(each.rests_s) <= {RESTS_S[0], RESTS_S[-1]} and each.sizes[1] <= TWICE
+        }
+        return list(found.values())
+
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """The candidates that stand still a little shorter, down to the next of the coarse ones."""
-        turned, repeats, *waits_s = best.sizes
+        """The candidates that stand still a little shorter, down to the next of the coarse ones.
+
+        By so little that those which stand still longer are taken to tell more.
+        """
+        waits_s = [float(getattr(best.procedure, key)) for key in self.waits]
         counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
         found = []
         for shorter_s in product(*map(_down_from, waits_s)):
@@ -205,8 +219,17 @@ class _Swept:
                 count * (wait_s - each_s) for count, wait_s, each_s in zip(counts, waits_s, shorter_s, strict=True)
             )
             procedure = best.procedure.model_copy(update=dict(zip(self.waits, shorter_s, strict=True)))
-            found.append(Candidate(procedure, best.family, (turned, repeats, *shorter_s), best.duration_s - less_s))
+            sizes, lasting_s = (*best.sizes, *shorter_s), best.duration_s - less_s
+            found.append(Candidate(procedure, best.family, sizes, lasting_s))
         return found
+
+    def _apart(self, waits_s: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The rests among waits, and the dwells, of which longer ones tell more."""
+        rests_s, dwells_s = (
+            tuple(each for key, each in zip(self.waits, waits_s, strict=True) if (key == "dwell_s") == dwells)
+            for dwells in (False, True)
+        )
+        return rests_s, dwells_s
 
     def _counts(self, plan: Plan) -> list[int]:
         """How many waits of each key a plan has."""
@@ -268,6 +291,10 @@ class _ByHand:
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
+
+    def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
+        """The candidate of most flips and least rests: without noise, more adds nothing."""
+        return [max(candidates, key=lambda each: (each.sizes[0], -each.sizes[1], -each.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
         """The candidates with a few flips less, down to the next of the coarse numbers."""

@@ -11,10 +11,13 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from rig.analysis.shortest import wanted_by
 from rig.config.models import RigConfig
+from rig.config.procedure_sections import SixObservationSection
 from rig.motion.doubts import doubts
 from rig.motion.state import JOINT_NAMES, Joints
 from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep, Transfer, closes, turn_words
+from rig.report.shortest_words import wish_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
@@ -128,6 +131,9 @@ def _print_steps(planned: Planned, console: Console) -> None:
     console.print(table)
     long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
     console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
+    if isinstance(section := planned.config.procedure, SixObservationSection) and (wanted := wanted_by(section)):
+        repeats = f"of {section.repeats} repeats, each of about {plan.duration_s / section.repeats:.1f} s"
+        console.print(plain(f"It ends after the first {repeats}, with {wish_words(wanted)}"))
     if arcs := {turn_words(sweep.angle_rad) for sweep in plan.sweeps if not closes(sweep.angle_rad)}:
         console.print(f"Sweeps are averaged over {', '.join(sorted(arcs))}, as far as the encoders show this angle")
     if plan.dwells:

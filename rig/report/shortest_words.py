@@ -10,7 +10,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.shortest import SIZES, Budgets, Planned, Reached, Shortest
+from rig.analysis.shortest import SIZES, Budgets, Planned, Reached, Shortest, Wanted
 from rig.config.attitude_sets import SETS
 from rig.config.models import ProcedureSection
 from rig.config.procedure_sections import AttitudesSection
@@ -106,7 +106,7 @@ def _sizes_entry(reached: Reached) -> dict[str, float | None]:
 
 
 def _verdict(found: Shortest) -> str:
-    wish = _wish(found)
+    wish = wish_words(found.wanted)
     within = "" if found.wanted.at_most_s == inf else f" within {found.wanted.at_most_s:g} s"
     if found.best is not None:
         return f"The shortest run for {wish} takes {found.best.candidate.duration_s:.1f} s."
@@ -115,10 +115,11 @@ def _verdict(found: Shortest) -> str:
     return f"No plan that was looked at reaches {wish}{within}; this one comes nearest."
 
 
-def _wish(found: Shortest) -> str:
-    wanted = {size: getattr(found.wanted, size) for size in SIZES}
+def wish_words(wanted: Wanted) -> str:
+    """What is wanted, as `U ≤ 0.0005 of the scale factors`."""
+    sizes = {size: getattr(wanted, size) for size in SIZES}
     return " and ".join(
-        f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in wanted.items() if value < inf
+        f"U ≤ {value:.3g}{SHOWN[size][0]} of {SHOWN[size][1]}" for size, value in sizes.items() if value < inf
     )
 
 

@@ -31,19 +31,22 @@ def mounting(plan: Plan, number: int, words: Words) -> Prompt:
     return Prompt(lines, to_tick=ticked, for_a_person=True, mounts=number)
 
 
-def announcement(plan: Plan, report: Report, words: Words, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
+def announcement(
+    plan: Plan, report: Report, words: Words, repeated: Plan | None, mounted: Iterable[str], *, early: bool = False
+) -> Prompt:
     """The question before the first motion, which depends on where the turner stands; `words` speak of it.
 
     `repeated` is the movement that follows without another question if the calibration passes; `mounted` says, in
-    lines, which sensors are turned.
+    lines, which sensors are turned, `early` that the movement may end before its last repeat.
     """
+    at_most = " at most, until the uncertainty is what is wanted" if early else ""
     way = way_to_home(plan, report.state.q_rad)
     turns = ", ".join(
         f"{name} {degrees(angle):+.0f}°" for name, angle in zip(report.joints, way, strict=True) if abs(angle) > 0.01
     )
     lines = [
         *mounted,
-        f"The {words.short} at {report.host} will move for {duration_words(plan.duration_s)}.",
+        f"The {words.short} at {report.host} will move for {duration_words(plan.duration_s)}{at_most}.",
         f"First it goes home: {turns or 'it is there already'}.",
     ]
     if plan.sweeps:

@@ -4,11 +4,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from math import inf
 from pathlib import Path
 
 from firmware_host.client import Calibration
-from rig.analysis.shortest import Wanted
+from rig.analysis.shortest import wanted_by
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
@@ -119,14 +118,11 @@ class Connector:
 
     def _ending_early(self, plan: Plan, sweeps: int) -> EndingEarly | None:
         """What ends the run before its last repeat; None where nothing is wanted, or readings are compared."""
-        section = self.loaded.config.procedure
-        if not isinstance(section, SixObservationSection) or self.phase.procedure.reads_corrected:
+        section, procedure = self.loaded.config.procedure, self.phase.procedure
+        wanted = wanted_by(section)
+        if wanted is None or procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None
-        if section.wanted_scale_u is None and section.wanted_bias_u_rad_s is None:
-            return None
-        wanted = Wanted(section.wanted_scale_u or inf, section.wanted_bias_u_rad_s or inf)
-        estimator = self.phase.procedure.estimator
-        return EndingEarly(wanted, plan, sweeps, section.repeats, self.path, self.resumed.earlier, estimator)
+        return EndingEarly(wanted, plan, sweeps, section.repeats, self.path, self.resumed.earlier, procedure.estimator)
 
     def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> BoardSource:
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected

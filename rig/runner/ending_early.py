@@ -1,31 +1,35 @@
 """A run that ends before its last repeat, once its uncertainty is what is wanted.
 
-The arm only makes motions that pre-flight has judged: every repeat ends in one pose, where the plan's last way home
-begins. Where a repeat ends in another pose, the run goes on.
+The arm only makes motions that pre-flight has judged: after the end, the one of the plan that leads from where it
+stands to home. Where the plan has none, the run goes on to the next repeat.
 """
 
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from rig.analysis.reached import reached_so_far
 from rig.analysis.shortest import Reached, Wanted
 from rig.data.run_file import RunData, read_run
 from rig.errors import RigError
+from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer
-from rig.station.events import WantedReached
+from rig.station.events import UncertaintySoFar
 
 WRITTEN_S = 0.6  # by then the recorder has written all that it was given
+# Of what is wanted: the whole recording says a little more of clocks and noise than it does before the way home.
+ENOUGH = 0.99
 
 
 @dataclass(slots=True)
 class EndingEarly:
     """The end of a run of `repeats` with so many `sweeps` in all, of which the `plan` is what was left to do.
 
-    It is recorded at `path`, `earlier` are the recordings before. Nothing here moves anything.
+    It is recorded at `path`, `earlier` are the recordings before. If these are whole repeats, the run may be at its
+    end before anything moves. Nothing here moves anything.
     """
 
     wanted: Wanted
@@ -37,19 +41,28 @@ class EndingEarly:
     estimator: str
     ended: bool = False
     _motions: int = 0  # asked for so far
-    _last: Sweep | None = None  # made, and not looked at yet
-    _repeats_left: int = field(default=0)
+    _due: bool = False
+    _recorded: bool = False  # whether this recording has sweeps
+    _repeats_left: int = 0
+    _home: int | None = None  # the place in the plan of the motion that is still made after the end
+
+    def __post_init__(self) -> None:
+        left = [sweep.index for sweep in self.plan.sweeps]
+        whole = bool(left) and left[0] % self._each == 0 and left == [*range(left[0], self.sweeps)]
+        if self.earlier and whole:
+            self._stands_at(self.plan.start_q_rad, len(left))
 
     def swept(self, sweep: Sweep) -> None:
         """Note a sweep that was made."""
-        each = self.sweeps // self.repeats
-        complete = (sweep.index + 1) % each == 0 and sweep.index + 1 < self.sweeps
-        self._repeats_left = self.repeats - (sweep.index + 1) // each
-        self._last = sweep if complete and self._home_begins_at(sweep) else None
+        self._recorded = True
+        left = [each.index for each in self.plan.motions[self._motions :] if isinstance(each, Sweep)]
+        self._due = False
+        if left and left[0] // self._each > sweep.index // self._each:
+            self._stands_at(sweep.end_q_rad, len(left))
 
     def due(self) -> bool:
         """Whether a repeat was completed that nobody has looked at."""
-        return self._last is not None and not self.ended
+        return self._due and not self.ended
 
     @contextmanager
     def looking(self) -> Iterator["Future[Reached | None]"]:
@@ -60,34 +73,48 @@ class EndingEarly:
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def found(self, looked: "Future[Reached | None]") -> WantedReached | None:
-        """What was found, where it ends the run; what takes too long ends nothing."""
-        self._last = None
+    def found(self, looked: "Future[Reached | None]") -> UncertaintySoFar | None:
+        """What was found, which may end the run; what takes too long ends nothing."""
+        self._due = False
         reached = looked.result() if looked.done() else None
-        if reached is None or not self.wanted.met_by(reached):
+        if reached is None:
             return None
-        self.ended = True
-        return WantedReached(reached.scale, reached.bias_rad_s, self._repeats_left)
+        self.ended = self.wanted.share(reached) <= ENOUGH
+        return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def passes_over(self, motion: Motion) -> bool:
-        """Whether the next motion of the plan is not made: after the end, all but the last way home."""
-        self._motions += 1
-        return self.ended and self._motions <= len(self.plan.motions) - len(self._home())
+        """Whether the next motion of the plan is not made: after the end, all but the way home."""
+        place, self._motions = self._motions, self._motions + 1
+        return self.ended and place != self._home
 
     def _look(self) -> Reached | None:
         time.sleep(WRITTEN_S)
         try:
-            return reached_so_far([*self.earlier, read_run(self.path)], self.estimator)
+            return reached_so_far([*self.earlier, *([read_run(self.path)] if self._recorded else [])], self.estimator)
         except RigError:  # what is wrong with the recording, the end of the run will say
             return None
 
-    def _home(self) -> list[Motion]:
-        """The transfers after the last sweep."""
-        motions = list(self.plan.motions)
-        last = max((place for place, each in enumerate(motions) if isinstance(each, Sweep)), default=-1)
-        return [each for each in motions[last + 1 :] if isinstance(each, Transfer)]
+    @property
+    def _each(self) -> int:
+        """The sweeps of one repeat."""
+        return self.sweeps // self.repeats
 
-    def _home_begins_at(self, sweep: Sweep) -> bool:
-        home = self._home()
-        ends = home[0].start_q_rad if home else self.plan.home_q_rad
-        return all(abs(mine - its) < SAME_PLACE_RAD for mine, its in zip(sweep.end_q_rad, ends, strict=True))
+    def _stands_at(self, here: Joints, sweeps_left: int) -> None:
+        """Look whether it is enough, if the rest of the plan knows the way home from here."""
+        self._repeats_left = -(-sweeps_left // self._each)
+        self._home = next(
+            (
+                place
+                for place, each in enumerate(self.plan.motions)
+                if place >= self._motions
+                and isinstance(each, Transfer)
+                and _same(each.start_q_rad, here)
+                and _same(each.target_q_rad, self.plan.home_q_rad)
+            ),
+            None,
+        )
+        self._due = self._home is not None or _same(here, self.plan.home_q_rad)
+
+
+def _same(one: Joints, other: Joints) -> bool:
+    return all(abs(mine - its) < SAME_PLACE_RAD for mine, its in zip(one, other, strict=True))

@@ -123,8 +123,7 @@ class Rig:
     `whole_plan` is the same as `plan`, or more when an interrupted run goes on or the item is mounted in stages: this
     one has the number `stage`, from 0, and is the `last` or not; `along` is there when the board calibrates along,
     `hand` where an operator's turns the item, `warming` where its temperature is to change, and `up` is that direction
-    in the frame of the arm's base. Where there is an `early` end, the steps between it and the last way home are passed
-    over.
+    in the frame of the arm's base. Where there is an `early` end, all that follows it is passed over but a way home.
     """
 
     devices: Devices
@@ -171,7 +170,8 @@ class Rig:
         devices, station = self.devices, self.recording.station
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
-        said = announcement(self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines())
+        told = self.plan, devices.report, devices.kind.words, repeated, devices.mounted.lines()
+        said = announcement(*told, early=self.early is not None)
         if not station.ask(said):
             raise Refused("not_confirmed", "nobody agreed to the movement", NOT_AGREED)
 

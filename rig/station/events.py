@@ -228,8 +228,8 @@ class PhaseSkipped:
 
 
 @dataclass(frozen=True, slots=True)
-class WantedReached:
-    """The expanded uncertainties so far are what was wanted: `repeats_left` are not made, the arm goes home.
+class UncertaintySoFar:
+    """The expanded uncertainties after a repeat. If they are `as_wanted`, the other repeats are left out.
 
     `scale_u` and `bias_u_rad_s` are those of the axis and the sensor that is known worst.
     """
@@ -237,6 +237,7 @@ class WantedReached:
     scale_u: float
     bias_u_rad_s: float
     repeats_left: int
+    as_wanted: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +378,7 @@ RunEvent = (
     | AttitudeRead
     | CalibrationStored
     | PhaseSkipped
-    | WantedReached
+    | UncertaintySoFar
     | DocumentWritten
     | Plotted
     | NotPlotted

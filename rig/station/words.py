@@ -31,7 +31,7 @@ from rig.station.events import (
     SamplingStarted,
     SensorConnected,
     StepFinished,
-    WantedReached,
+    UncertaintySoFar,
 )
 
 
@@ -92,9 +92,11 @@ def _of_the_outcome(event: RunEvent) -> str | None:
     match event:
         case CalibrationStored(sensor, part, serial_number, record):
             text = f"stored on the board: {sensor}, {part} {serial_number}, record {record}"
-        case WantedReached(scale_u, bias_u_rad_s, left):
-            text = f"U = {scale_u:.3g} of the scale factors, {bias_u_rad_s:.3g} rad/s of the biases, as wanted: "
-            text += f"{left} more {'repeat is' if left == 1 else 'repeats are'} left out"
+        case UncertaintySoFar(scale_u, bias_u_rad_s, left, as_wanted):
+            text = f"U = {scale_u:.3g} of the scale factors, {bias_u_rad_s:.3g} rad/s of the biases, "
+            text += "as wanted" if as_wanted else "more than wanted"
+            text += f": {left} more {'repeat' if left == 1 else 'repeats'} "
+            text += f"{'is' if left == 1 else 'are'} left out" if as_wanted else "at most"
         case PhaseSkipped():
             text = "not verified: the calibration failed its limits, so the board keeps what it had"
         case Plotted(names):

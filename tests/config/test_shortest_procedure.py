@@ -2,9 +2,14 @@
 
 import pytest
 
-from rig.config.load import ConfigurationRefused, parse
+from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.models import ProcedureSection
 from rig.config.procedure_sections import SixObservationSection
+from rig.data.settings import settings_of
+from rig.plans.registry import installed, sections
+from rig.plans.six_sweeps import plan_six_observation
+from rig.turners import registry as turners
+from support.paths import CONFIGS
 from support.synthetic_run import CONFIG
 
 TEXT = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=8, part="lsm9ds1", procedure="", uncertainty="")
@@ -28,7 +33,42 @@ def test_without_a_number_of_repeats_there_are_enough() -> None:
     assert (found.repeats, found.wanted_scale_u, found.wanted_bias_u_rad_s) == (16, None, 1e-4)
 
 
-@pytest.mark.parametrize("wish", [(), ("procedure.wanted=5e-4",), ("procedure.wanted={field: 1}",)])
-def test_a_wish_that_is_none_is_refused_by_its_place(wish: tuple[str, ...]) -> None:
-    with pytest.raises(ConfigurationRefused, match=r"procedure\.wanted"):
+@pytest.mark.parametrize(
+    ("wish", "where"),
+    [
+        ((), "procedure.wanted: say the expanded uncertainty"),
+        (("procedure.wanted=5e-4",), "procedure.wanted (--set): "),
+        (("procedure.wanted={field: 1}",), "procedure.wanted.field"),
+        (("procedure.wanted={scale: often}",), "procedure.wanted.scale"),
+        (("procedure.wanted={bias: 0}",), "procedure.wanted.bias"),
+    ],
+)
+def test_a_wish_that_is_none_is_refused_by_its_place(wish: tuple[str, ...], where: str) -> None:
+    with pytest.raises(ConfigurationRefused) as refused:
         section(*wish)
+    assert where in "\n".join(refused.value.problems)
+
+
+@pytest.mark.parametrize(
+    ("file", "instead"), [("servo.yaml", "servo_six_observation"), ("by_hand.yaml", "name: by_hand")]
+)
+def test_where_no_arm_turns_it_is_refused_with_what_to_do_instead(file: str, instead: str) -> None:
+    changes = ["procedure={name: shortest, wanted: {scale: 1e-3}}"]
+    with pytest.raises(ConfigurationRefused) as refused:
+        load(CONFIGS / file, changes, sections(installed()), turners.sections())
+    (problem,) = refused.value.problems
+    assert problem.startswith("procedure.name") and instead in problem and "rig plan CONFIG --wanted" in problem
+
+
+def test_a_misspelt_name_is_told_of_it() -> None:
+    with pytest.raises(ConfigurationRefused, match="did you mean shortest"):
+        section("procedure.name=shortes", "procedure.wanted={bias: 1e-4}")
+
+
+def test_what_is_wanted_is_a_limit_of_the_verdict_unless_the_file_has_its_own() -> None:
+    wish = "procedure.wanted={scale: 5e-4, bias: 1e-4}"
+    for said, limit in (((), 5e-4), (("limits.scale_u=2e-3",), 2e-3)):
+        config = parse(TEXT, overrides=["procedure.name=shortest", wish, *said]).config
+        plan = plan_six_observation(config.arm, config.procedure)  # type: ignore[arg-type]
+        limits = settings_of(config, plan).limits
+        assert limits is not None and (limits.scale_u, limits.bias_u_rad_s) == (limit, 1e-4)

@@ -1,9 +1,14 @@
 """A run that ends after the repeat which reaches the uncertainty that is wanted, in the simulated laboratory."""
 
 import json
+import signal
+import subprocess
+import sys
+from collections.abc import Collection, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,20 +17,26 @@ from rig.analysis.reached import reached_so_far
 from rig.analysis.shortest import Reached, Wanted
 from rig.config.load import parse
 from rig.data.run_file import RunData
+from rig.motion.state import Joints
 from rig.motion.steps import Motion, Plan, Sweep
 from rig.plans.six_sweeps import plan_six_observation
 from rig.runner.ending_early import EndingEarly
-from support.commands import configuration, rig
+from rig.station.events import UncertaintySoFar
+from support.commands import configuration, rig, wait_for_log
 from support.synthetic_run import CONFIG, Setup, synthetic_run
 
 REPEATS = 4
 
 
 def planned(**keys: object) -> Plan:
+    return resumed(None, (), **keys)
+
+
+def resumed(start_q_rad: Joints | None, done: Collection[int], /, **keys: object) -> Plan:
     said = [f"procedure.{key}={json.dumps(value)}" for key, value in keys.items()]
     text = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=REPEATS, part="lsm9ds1", procedure="", uncertainty="")
     config = parse(text, overrides=said).config
-    return plan_six_observation(config.arm, config.procedure)  # type: ignore[arg-type]
+    return plan_six_observation(config.arm, config.procedure, start_q_rad, done)  # type: ignore[arg-type]
 
 
 def made_of(plan: Plan, enough: int) -> list[Motion]:
@@ -37,12 +48,37 @@ def made_of(plan: Plan, enough: int) -> list[Motion]:
             looked += 1
             so_far = Future[Reached | None]()
             so_far.set_result(Reached(0.5 if looked >= enough else 2.0, 0.0))
-            assert (early.found(so_far) is not None) == (looked >= enough)
+            said = early.found(so_far)
+            assert said is not None and said.as_wanted == (looked >= enough)
         if not early.passes_over(motion):
             made.append(motion)
             if isinstance(motion, Sweep):
                 early.swept(motion)
     return made
+
+
+def test_a_run_ends_after_an_odd_repeat_too_where_the_plan_goes_home_from_there() -> None:
+    """Where directions turn about from repeat to repeat, the last way home begins elsewhere than an odd repeat ends."""
+    made = made_of(planned(order=["wrist_2", "wrist_3", "wrist_1"]), 1)
+    assert sum(isinstance(each, Sweep) for each in made) == 6
+
+
+@pytest.mark.parametrize("away_rad", [0.0, 0.3])
+@pytest.mark.parametrize(("done", "whole"), [(range(6), True), (range(7), False), ([0, 1, 2, 3, 6, 7], False)])
+def test_resumed_after_whole_repeats_that_are_enough_it_only_goes_home(
+    done: Sequence[int], whole: bool, away_rad: float
+) -> None:
+    """Else the repeat that was begun is completed first, and sweeps that do not count are made again."""
+    home = planned().home_q_rad
+    plan = resumed((home[0] + away_rad, *home[1:]), done)
+    early = EndingEarly(Wanted(scale=1.0), plan, 6 * REPEATS, REPEATS, Path(), [synthetic_run(Setup())], "vector")
+    assert early.due() == whole
+    if whole:
+        so_far = Future[Reached | None]()
+        so_far.set_result(Reached(0.5, 0.0))
+        assert early.found(so_far) == UncertaintySoFar(0.5, 0.0, 3, as_wanted=True)
+        made = [motion.name for motion in plan.motions if not early.passes_over(motion)]
+        assert made == ["approach home"] * (away_rad > 0)
 
 
 def test_after_the_end_only_the_last_way_home_is_made() -> None:
@@ -80,12 +116,45 @@ def without_sweeps(run: RunData) -> RunData:
     return replace(run, events=())
 
 
+SHORTEST = {"name": "shortest", "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+
+
 @pytest.mark.thorough
 @pytest.mark.slow
-def test_a_run_ends_when_what_is_wanted_is_reached(tmp_path: Path) -> None:
-    changes = {"procedure": {"repeats": REPEATS, "wanted_scale_u": 0.05, "wanted_bias_u_rad_s": 0.5}}
-    done = rig("run", configuration(tmp_path, changes), "--out", tmp_path / "run")
-    assert done.returncode == 0, done.stderr
-    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_interruption(tmp_path: Path) -> None:
+    """Interrupted on its way home, it has all that is wanted, and measures nothing more."""
+    config, run = (
+        configuration(tmp_path, procedure={**SHORTEST, "wanted": {"scale": 0.05, "bias": 0.05}}),
+        tmp_path / "run",
+    )
+    begun = subprocess.Popen([sys.executable, "-m", "rig", "run", config, "--out", run], stderr=subprocess.DEVNULL)
+    wait_for_log(run, "as wanted: 15 more repeats are left out", timeout_s=200)
+    begun.send_signal(signal.SIGINT)
+    begun.wait()
+    if begun.returncode == 130:  # else it was home already
+        assert rig("resume", run).returncode == 0
+    result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     assert len(result["sensors"]["gyro"]["observations"]) == 6
-    assert "as wanted: 3 more repeats are left out" in (tmp_path / "run" / "log.txt").read_text(encoding="utf-8")
+    assert {"gyro.scale_u": True, "gyro.bias_u": True}.items() <= passed(result).items()
+
+
+@pytest.mark.thorough
+@pytest.mark.slow
+def test_a_run_that_does_not_come_to_what_is_wanted_fails_by_its_name(tmp_path: Path) -> None:
+    wanted = {"scale": 1e-5, "bias": 0.05}
+    done = rig(
+        "run",
+        configuration(tmp_path, procedure={**SHORTEST, "wanted": wanted, "repeats": 2}),
+        "--out",
+        tmp_path / "run",
+    )
+    assert done.returncode == 1, done.stderr
+    assert "more than wanted: 1 more repeat at most" in done.stderr
+    assert "FAILED gyro.scale_u" in done.stdout
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    assert len(result["sensors"]["gyro"]["observations"]) == 12
+    assert [name for name, good in passed(result).items() if not good] == ["gyro.scale_u"]
+
+
+def passed(result: dict[str, Any]) -> dict[str, bool]:
+    return {check["name"]: check["passed"] for check in result["checks"]}
