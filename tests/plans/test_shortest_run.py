@@ -39,8 +39,6 @@ from support.synthetic_run import CONFIG, Setup, synthetic_run
 SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
 PARTS = tuple(SET_TO)
 RATIO = 0.9, 1.15  # of reached to predicted
-# What a servo's recording says of its turns' noise doubles from one stage to another: see `rig.analysis.uneven_turn`.
-OF_SERVO = 0.85, 1.35
 SCALES = 0.97, 1.03  # as data sheets have them: U of a scale factor grows with it, and nobody knows it beforehand
 SAMPLED_HZ = 238.0
 ARM_RAD = 1e-4  # by which the wrists' axes are off
@@ -166,12 +164,8 @@ def test_what_is_predicted_is_reached(thorough: bool) -> None:
         foretold, found = predicted_of(each), reached(each, seed)
         ratios[each] = found.scale / foretold.scale, found.bias_rad_s / foretold.bias_rad_s
         print(f"{each.turner} {each.part} {dict(each.keys)}: {ratios[each][0]:.3f} {ratios[each][1]:.3f}")
-    assert not {each: found for each, found in ratios.items() if not _within(each, *found)}
-
-
-def _within(of: Run, *ratios: float) -> bool:
-    low, high = OF_SERVO if of.turner == "servo" else RATIO
-    return all(low <= each <= high for each in ratios)
+    low, high = RATIO
+    assert not {each: found for each, found in ratios.items() if not low <= min(found) <= max(found) <= high}
 
 
 def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
