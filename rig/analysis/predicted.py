@@ -13,7 +13,6 @@ import numpy as np
 from rig.analysis.clock import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
 from rig.analysis.planned_motion import STANDING_S, Timed, timed
 from rig.analysis.surroundings import Surroundings
-from rig.analysis.uneven_turn import scattering_variance
 from rig.analysis.vector_inputs import Part, known_sensor, put_together, unknown_of
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
@@ -64,7 +63,7 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
     found = {}
     for name, sensor in config.to_calibrate.items():
         surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
-        parts = [_part(config, each, sensor, made, endless=endless) for each in _stages(plan, settings)]
+        parts = [_part(config, each, sensor, made) for each in _stages(plan, settings)]
         seen = put_together(parts, surroundings)
         whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
         kept = tuple(each for each in whole.contributors if not (endless and each.name in ANEW))
@@ -132,9 +131,7 @@ def _stages(plan: Plan, settings: RunSettings) -> list[tuple[Plan, RunSettings, 
     return found
 
 
-def _part(
-    config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made, *, endless: bool
-) -> Part:
+def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made) -> Part:
     """What a recording of a stage would tell."""
     plan, settings, since_s = stage
     mount = np.array(settings.mount)
@@ -142,8 +139,7 @@ def _part(
     for each in timed(plan):
         if isinstance(each.step, Sweep):
             turned = Timed(each.step, each.start_s, each.end_s)
-            turn = _turn(turned, sensor, made, mount, _scatter(config, each.step, made))
-            turns.append(_unevenly(turn, sensor, len(plan.sweeps)) if made.reading_std_rad and not endless else turn)
+            turns.append(_turn(turned, sensor, made, mount, _scatter(config, each.step, made)))
         elif isinstance(each.step, (Rest, Dwell)):
             here = each.step.q_rad if isinstance(each.step, Dwell) else here
             window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
@@ -208,14 +204,6 @@ def _scatter(config: RigConfig, sweep: Sweep, made: Made) -> float:
     places = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
     scatter_rad = np.hypot(made.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
     return float(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD)
-
-
-def _unevenly(turn: Observation, sensor: SensorSection, turns: int) -> Observation:
-    """A turn of which the mean scatters, along the axis that turns, as those of a servo that makes so many `turns`."""
-    noise_rad_s = angle_walk_rad_sqrt_s(sensor) * sensor.rate_hz**0.5
-    scattering = scattering_variance(turn.speed_rad_s, noise_rad_s, sensor.rate_hz, turns)
-    variances = np.where(np.array(list("xyz")) == turn.axis, scattering, turn.average.variance_rad2_s2)
-    return replace(turn, average=replace(turn.average, variance_rad2_s2=variances))
 
 
 @lru_cache(maxsize=512)

@@ -20,9 +20,10 @@ def turned_beside(motion: KnownMotion, turn: Revolution, lines_hz: Array) -> tup
     """A revolution's mean speed, and the unit vector (3,) of its turn in the flange's frame, beside lines (k,).
 
     2π/T and the turn's own axis, but for what the encoders see of the lines: so the turn's ends are as well known as
-    they were.
+    they were. Of an `uneven` turn they see nothing but how single readings scatter; its own lines come whole times a
+    turn, and 2π/T holds nothing of them.
     """
-    if not len(lines_hz):
+    if not len(lines_hz) or turn.uneven:
         return turn.speed_rad_s, turn.axis_flange
     even, beside_them = (turned(motion, turn.start_s, turn.end_s, each, 1)[0] for each in (lines_hz[:0], lines_hz))
     rate = turn.speed_rad_s * turn.axis_flange + beside_them - even

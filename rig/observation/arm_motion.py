@@ -149,6 +149,7 @@ class ArmMotion:
             arm_m=self.mount @ flange_arm(began, sweep.joint, self.kinematics),
             station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
             angle_rad=sweep.angle_rad,
+            uneven=self._scatters,
         )
 
     def table(self) -> dict[str, Array]:

@@ -14,6 +14,7 @@ from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.observation.beside_lines import FEWEST, colour_left, mean_beside_lines, rest_beside_lines, swinging
 from rig.observation.coloured_noise import left_by_correlations, noise_left
+from rig.observation.lines import BEATS
 from rig.observation.mean import Mean, even_mean, mean_at_rest, mean_of
 from rig.observation.windows import Window
 
@@ -23,13 +24,14 @@ class Passing:
     """What comes and goes in a turn of n readings.
 
     The arm's rate less its mean (n,), as the encoders have it where that is `covered` (n,); columns `turning` (n, k) of
-    once and twice a turn, of an arc less their means. Whole turns are `closed`.
+    once and twice a turn and so on, of an arc less their means. Whole turns are `closed`. `beats` are a revolution's.
     """
 
     rate_rad_s: Array
     covered: NDArray[np.bool_]
     turning: Array
     closed: bool = True
+    beats: int = BEATS
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,9 @@ def _turned(readings: Array, count: float | Array, passing: Passing) -> Mean:
 def _turned_beside_lines(readings: Array, count: float | Array, passing: Passing) -> Mean:
     """Does so too, and few readings tell no lines."""
     if len(readings) >= FEWEST and passing.covered.all():
-        return mean_beside_lines(readings, count, passing.turning, passing.rate_rad_s, closed=passing.closed)
+        return mean_beside_lines(
+            readings, count, passing.turning, passing.rate_rad_s, closed=passing.closed, beats=passing.beats
+        )
     return _turned(readings, count, passing)
 
 

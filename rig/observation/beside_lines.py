@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import MEMORIES, left_of
-from rig.observation.lines import fitted, lines, waves
+from rig.observation.lines import BEATS, fitted, lines, waves
 from rig.observation.mean import Mean, rounding_left
 from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
@@ -34,19 +34,20 @@ class Noise:
 
 
 def mean_beside_lines(
-    readings: Array, count: float | Array, turning: Array, rate: Array, *, closed: bool = True
+    readings: Array, count: float | Array, turning: Array, rate: Array, *, closed: bool = True, beats: int = BEATS
 ) -> Mean:
     """The mean of readings (n, 3) in steps of `count`, evenly spaced, over whole turns (`closed`) or an arc.
 
-    `turning` (n, k) comes and goes in a turn. `rate` (n,) is the arm's less its mean, as the encoders have it: they see
-    not all that vibrates, and some that does not, so it counts only for what no line explains. What it has of the lines
-    themselves is missing from the mean: see `rig.observation.arm_beside_lines`. Where a turn is not closed a ripple of
-    it does not end where it began. So beside its lines the rate has a mean of its own, which is left out of the fit: it
-    would be told from the readings' mean badly.
+    `turning` (n, k) comes and goes in a turn, each line with its `beats`: see `rig.observation.lines.waves`. `rate`
+    (n,) is the arm's less its mean, as the encoders have it: they see not all that vibrates, and some that does not, so
+    it counts only for what no line explains. What it has of the lines themselves is missing from the mean: see
+    `rig.observation.arm_beside_lines`. Where a turn is not closed a ripple of it does not end where it began. So beside
+    its lines the rate has a mean of its own, which is left out of the fit: it would be told from the readings' mean
+    badly.
     """
     steady = np.column_stack([np.ones(len(readings)), turning])
-    cycles = lines(readings - steady @ fitted(steady, readings), STANDS_OUT)
-    shaking = _columns(cycles, len(readings))
+    cycles = lines(readings - steady @ fitted(steady, readings), STANDS_OUT, beats=beats)
+    shaking = _columns(cycles, len(readings), beats)
     if shaking.size and not closed:
         others = np.column_stack([steady, shaking])
         rate = rate - others @ fitted(others, rate[:, None])[:, 0]
@@ -92,9 +93,9 @@ def colour_left(residuals: Array) -> float:
     return left_of(residuals, BRIEF).factor
 
 
-def _columns(cycles: Array, count: int) -> Array:
-    """(n, 8 k) columns of k lines in n readings."""
-    return waves(cycles, np.arange(count) / count)
+def _columns(cycles: Array, count: int, beats: int = BEATS) -> Array:
+    """(n, w k) columns of k lines in n readings."""
+    return waves(cycles, np.arange(count) / count, beats)
 
 
 def noise_of(residuals: Array, taken: int, count: float | Array, memories: Sequence[int]) -> Noise:

@@ -16,29 +16,30 @@ SLOWEST = 8  # cycles in all the readings: what is slower is told badly from wha
 APART = 2.5  # cycles in all the readings, from a line that was found
 SAME = 1.5  # cycles in all the readings: lines that come so near each other are no lines, but a jerk
 PASSES = 2
-WIDE = 8  # columns of a line
+WIDE = 4  # columns of a line, and of each of its beats
+BEATS = 1  # as a sensor that makes a turn feels what shakes in the room
 SAMPLES_EACH = 5  # are needed to find what one column has in them
 NONE: Array = np.zeros(0)
 ALIKE = 1e-2  # columns that differ by less are one
 
 
-def lines(residuals: Array, stands_out: float = STANDS_OUT, known_cycles: Array = NONE) -> Array:
+def lines(residuals: Array, stands_out: float = STANDS_OUT, known_cycles: Array = NONE, beats: int = BEATS) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero.
 
-    A line `stands_out` so far over the median power around it. One that comes to be another is none. Those that are
-    known are among them, as they are.
+    A line `stands_out` so far over the median power around it, each with its `beats`: see `waves`. One that comes to be
+    another is none. Those that are known are among them, as they are.
     """
     count, merged, held = len(residuals), NONE, len(known_cycles)
     cycles = known_cycles
-    most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
+    most = min(MOST_LINES, count // (wide(beats) * SAMPLES_EACH))
     share = np.arange(count) / count
     while len(cycles) < most and len(merged) < most:
-        found = waves(cycles, share)
+        found = waves(cycles, share, beats)
         beside = np.append(cycles, merged)
         strongest = _strongest(residuals - found @ fitted(found, residuals), beside, stands_out)
         if strongest is None:
             break
-        refined = _refined(np.append(cycles, strongest), residuals, held)
+        refined = _refined(np.append(cycles, strongest), residuals, held, beats)
         if np.diff(np.sort(refined)).min(initial=np.inf) < SAME:
             merged = np.append(merged, strongest)
         else:
@@ -52,16 +53,23 @@ def in_hertz(cycles: Array, time_s: Array) -> Array:
     return hertz
 
 
-def waves(cycles: Array, share: Array) -> Array:
-    """(n, 8 k) cosine and sine of k lines where a share (n,) of the time is over.
+def wide(beats: int) -> int:
+    """How many columns of `waves` one line has."""
+    return WIDE * (1 + beats)
+
+
+def waves(cycles: Array, share: Array, beats: int = BEATS) -> Array:
+    """(n, w k) cosine and sine of k lines where a share (n,) of the time is over, w columns of each: see `wide`.
 
     Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less:
-    what shakes in the room is felt so by a sensor that makes a turn.
+    what shakes in the room is felt so by a sensor that makes a turn. Or of up to so many more and less as the line
+    `beats` in a turn: see `rig.observation.revolution.Revolution`.
     """
-    each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, -1, 1) for wave in (np.cos, np.sin)]
+    beside = [way * times for times in range(1, beats + 1) for way in (-1, 1)]
+    each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, *beside) for wave in (np.cos, np.sin)]
     grown = [(2 * share - 1)[:, None] * wave for wave in each[:2]]
     columns = np.stack(each[:2] + grown + each[2:], axis=2, dtype=np.float64)
-    return columns.reshape(len(share), WIDE * len(cycles))
+    return columns.reshape(len(share), wide(beats) * len(cycles))
 
 
 def fitted(columns: Array, values: Array) -> Array:
@@ -75,8 +83,8 @@ def swings(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     The lines are those of columns (n, 8 k) in residuals (n, 3): one of the mean square P and the frequency f swings by
     √(2 P) / (2π f) either way, and so its angle differs between two moments by P / (2 π² f²) in the mean square.
     """
-    sizes = fitted(columns, residuals).reshape(len(lines_hz), WIDE, residuals.shape[1])
-    each = np.einsum("nlw,lwm->lnm", columns.reshape(len(residuals), len(lines_hz), WIDE), sizes)
+    sizes = fitted(columns, residuals).reshape(len(lines_hz), wide(BEATS), residuals.shape[1])
+    each = np.einsum("nlw,lwm->lnm", columns.reshape(len(residuals), len(lines_hz), wide(BEATS)), sizes)
     found: Array = np.sum(np.mean(each**2, axis=1) / (2 * np.pi**2 * lines_hz[:, None] ** 2), axis=0)
     return found
 
@@ -100,11 +108,11 @@ def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
     return best + (float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0 else 0.0)
 
 
-def _refined(cycles: Array, residuals: Array, held: int) -> Array:
+def _refined(cycles: Array, residuals: Array, held: int, beats: int) -> Array:
     """Lines refined by what grows of each a quarter of a cycle behind it: its phase. The first so many are held."""
     share = np.arange(len(residuals)) / len(residuals)
     for _ in range(PASSES):
-        sizes = fitted(waves(cycles, share), residuals).reshape(len(cycles), WIDE, -1)
+        sizes = fitted(waves(cycles, share, beats), residuals).reshape(len(cycles), wide(beats), -1)
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / np.sum(cosine**2 + sine**2, axis=1)
         cycles = cycles + np.where(np.arange(len(cycles)) < held, 0.0, np.clip(late / np.pi, -0.5, 0.5))

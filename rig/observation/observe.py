@@ -221,7 +221,8 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-    waves = np.array([wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]).T
+    often = range(1, 2 * turn.beats + 1)
+    waves = np.array([wave(times * turned_rad) for times in often for wave in (np.cos, np.sin)]).T
     if not turn.closed:
         waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
     passing = Passing(
@@ -229,6 +230,7 @@ def _observation(
         covered,
         waves,
         turn.closed,
+        turn.beats,
     )
     readings = stream.readings_rad_s[inside]
     found = averaging.turned(readings, stream.sensor.channel(RATE).resolution_of(readings), passing)

@@ -10,6 +10,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
+from rig.observation.lines import BEATS
 
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
@@ -26,7 +27,8 @@ class Revolution:
     the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
     radian (`rig.motion.geometry.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
     into the flange's; `arm_m` (3,) is a way from the joint's axis to the flange's origin, in the flange's frame;
-    `station` names the joint, from 0 at the base, and the pose it turned in.
+    `station` names the joint, from 0 at the base, and the pose it turned in. A turn is `uneven` where its readings are
+    even: an encoder that errs by a degree closes the loop. So the shaft is known over whole turns alone.
     """
 
     start_s: float
@@ -38,6 +40,15 @@ class Revolution:
     arm_m: Array
     station: tuple[float, ...]
     angle_rad: float = TURN_RAD
+    uneven: bool = False
+
+    @property
+    def beats(self) -> int:
+        """How often in a turn, at most, the shaft is ahead and behind: each of its lines has others as far beside it.
+
+        Such an encoder errs once and twice a turn; what that makes of itself comes up to four times.
+        """
+        return 2 if self.uneven else BEATS
 
     @property
     def closed(self) -> bool:

@@ -13,6 +13,8 @@ from rig.estimation.six_observation_budget import NOT_SQUARE
 from support.drawn_servo import drawn_servo
 
 RUNS = 50  # by chance alone twenty may scatter by a fifth more or less than they should
+QUIET_RAD_S = 5e-4  # of a reading of a good gyroscope, beside which all that the turning errs by shows
+SQUARE = "uncertainty.non_orthogonality_deg=0.02", "uncertainty.g_sensitivity_deg_s_g=0.001"
 TURNING = 5e-5  # what the turning may add to a scale factor's standard uncertainty, read at 100 Hz
 
 
@@ -25,8 +27,8 @@ class Ran:
     in_expanded: Array
 
 
-def ran(seed: int, *overrides: str) -> Ran:
-    drawn = drawn_servo(seed, overrides)
+def ran(seed: int, *overrides: str, noise_rad_s: float = 0.035) -> Ran:
+    drawn = drawn_servo(seed, overrides, noise_rad_s=noise_rad_s)
     outcome = calibrated(drawn.runs, "newton")
     result = outcome.results["gyro"]
     assert result.uncertainty is not None
@@ -66,3 +68,16 @@ def test_error_over_uncertainty_is_about_one_in_many_runs() -> None:
         assert 0.8 < np.sqrt(np.mean(part**2)) < 1.2, np.sqrt(np.mean(part**2))
     assert within >= 0.93
     assert max(turning(run.outcome) for run in runs) < TURNING
+
+
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(1800)
+def test_so_it_is_of_a_gyroscope_that_hides_nothing() -> None:
+    """The biases' u is that of the Earth's rate, which nobody simulates here."""
+    runs = [ran(seed, "turner.state_rate_hz=100", *SQUARE, noise_rad_s=QUIET_RAD_S) for seed in range(RUNS)]
+    in_u = np.array([run.in_u for run in runs])
+    assert 0.8 < np.sqrt(np.mean(in_u[:, :3] ** 2)) < 1.2, in_u
+    assert np.sqrt(np.mean(in_u[:, 3:] ** 2)) < 1.2, in_u
+    failed = {check.name for run in runs for check in run.outcome.checks if not check.passed}
+    assert all(name.startswith("gyro.board_") for name in failed), failed

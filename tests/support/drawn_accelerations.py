@@ -81,8 +81,8 @@ def sheet_of(part: str) -> Sheet:
     )
 
 
-def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
-    """Eighteen dwells after sweeps about six axes, at temperatures that stray."""
+def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_K) -> Session:
+    """Eighteen dwells after sweeps about six axes, at temperatures that stray by so much."""
     rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
     density = PARTS[part].acceleration_noise_ug_sqrt_hz
     truth = Truth(
@@ -99,7 +99,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
     even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
     length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
-    warm_c = 22 + WARMER_K * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
+    warm_c = 22 + warmer_k * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
     stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
     pieces = [
         Piece((start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
