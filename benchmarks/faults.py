@@ -29,7 +29,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.fault_matrix.catalogue import BY_NAME
 from support.fault_matrix.cell import Cell, carry_out, document, span
-from support.fault_matrix.commands import Start, forking
 from support.fault_matrix.setups import SETUPS
 
 ROOT = Path(__file__).parents[1]
@@ -50,14 +49,14 @@ def done_before(record: Path, *, again: bool) -> dict[Key, dict[str, Any]]:
     return {key: cell for key, cell in cells.items() if not (again and cell["deviations"])}
 
 
-def cell_of(key: Key, seed: int, span_s: float, kept: Path, start: Start) -> dict[str, Any]:
+def cell_of(key: Key, seed: int, span_s: float, kept: Path) -> dict[str, Any]:
     """Carry one out; the folder of one that deviates is kept."""
     name, setup, number = key
     when, own = moment(key, seed)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         place = Path(folder) / "cell"
         try:
-            cell = carry_out(name, BY_NAME[name], setup, place, moment=when, span_s=span_s, seed=own, start=start)
+            cell = carry_out(name, BY_NAME[name], setup, place, moment=when, span_s=span_s, seed=own)
         except Exception as error:  # of the bench itself: one cell must not end all the others
             cell = Cell(name, setup, when, deviations=[f"the bench failed: {type(error).__name__}: {error}"])
         if cell.deviations:
@@ -119,9 +118,8 @@ def main() -> int:
     to_do = [key for key in keys if key not in cells]
     if to_do:
         spans = {setup: undisturbed(setup) for setup in options.procedures}
-        start = forking()
         with ThreadPoolExecutor(options.jobs) as pool, record.open("a", encoding="utf-8") as lines:
-            carried = pool.map(lambda key: cell_of(key, options.seed, spans[key[1]], options.out, start), to_do)
+            carried = pool.map(lambda key: cell_of(key, options.seed, spans[key[1]], options.out), to_do)
             for key, cell in zip(to_do, carried, strict=True):
                 cells[key] = cell
                 lines.write(json.dumps(cell) + "\n")

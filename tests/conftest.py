@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from support.warm import nursery
 from support.worlds import world
 
 if TYPE_CHECKING:
@@ -33,6 +34,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--proof", action="store_true", help="statistical acceptance over all seeds, not over a few")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    nursery.closed = bool(config.getoption("--proof"))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

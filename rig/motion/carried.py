@@ -1,8 +1,10 @@
 """What the arm's flange carries, as one value."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from rig.config.models import ArmSection
+if TYPE_CHECKING:
+    from rig.config.models import ArmSection
 
 Place = tuple[float, float, float]
 FLANGE: Place = (0.0, 0.0, 0.0)
@@ -17,7 +19,7 @@ class Carried:
     extension_m: Place = FLANGE
 
 
-def carried_by(arm: ArmSection) -> Carried:
+def carried_by(arm: "ArmSection") -> Carried:
     """What an arm carries by its configuration."""
     return Carried(arm.payload_kg, _metres(arm.payload_centre_mm), arm.extension_m)
 

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from math import inf, pi, radians
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import yaml
 
-from rig.config.models import ArmSection
 from rig.config.section import ModelName
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import JointLimits, Joints
+
+if TYPE_CHECKING:
+    from rig.config.models import ArmSection
 
 Series = Literal["e-Series", "CB3"]
 CLIENT_SPEED_RAD_S = 3.14  # `ur_rtde` accepts no more, which is a little below 180°/s
@@ -90,11 +92,11 @@ def turner_model(key: ModelName) -> TurnerModel:
     )
 
 
-def model_of(arm: ArmSection) -> TurnerModel:
+def model_of(arm: "ArmSection") -> TurnerModel:
     """The model that an arm is, by its configuration."""
     return turner_model(arm.model)
 
 
-def home_of(arm: ArmSection) -> Joints:
+def home_of(arm: "ArmSection") -> Joints:
     """(6,) rad of the pose around which everything turns: what the configuration says, or else the model's own."""
     return model_of(arm).home_rad if arm.home_deg is None else tuple(radians(angle) for angle in arm.home_deg)

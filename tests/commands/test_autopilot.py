@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from contextlib import closing
 from math import radians
 from pathlib import Path
@@ -22,6 +21,7 @@ from rig.sensors.mavlink.writing import unfinished
 from support.autopilot_on_a_wire import AutopilotOnAWire, autopilot_on_a_wire, section
 from support.commands import rig_here
 from support.paths import CONFIGS, ROOT
+from support.warm import started
 
 LEFT = {"INS_GYROFFS_X": 0.1, "INS_ACCSCAL_Y": 1.01}  # of which no single-precision number is just that
 STORED = 10  # parameters: three offsets and INS_GYR_CAL, three offsets and three scales
@@ -143,8 +143,7 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
             os.kill(process[0].pid, signal.SIGKILL)
 
     wire.parameters.set_field = setting  # type: ignore[method-assign]
-    command = [sys.executable, "-m", "rig", "autopilot", "store", *map(str, arguments)]
-    process.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+    process.append(started("autopilot", "store", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
     assert process[0].wait(120) == -signal.SIGKILL
     wire.parameters.set_field = set_field  # type: ignore[method-assign]
 

@@ -22,8 +22,10 @@ from rig.board.store import calibration_of, store
 from rig.config.sensor_sections import SensorSection
 from rig.data.result_file import passed_result, read_result, write_result
 from rig.errors import Refused
+from support import commands
 from support.certified import over_temperature
 from support.results import SENSOR, VERIFIED, result_document
+from support.warm import started
 from support.worlds import World, WorldHandle, worlds
 
 pytestmark = pytest.mark.slow
@@ -39,14 +41,13 @@ BIAS = {"gyro": [0.0077, -0.01, -0.0051], "other": [0.0411, -0.0099, 0.0101]}
 
 
 def rig(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "rig", "board", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, stdin=stdin)
+    return commands.rig("board", *arguments, stdin=stdin)
 
 
 def answered(keyboard: int, terminal: int, answer: bytes, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """The command at that terminal, whose question is answered when it is asked: earlier is no answer."""
-    command = [sys.executable, "-m", "rig", "board", *map(str, arguments)]
-    with subprocess.Popen(command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    command = ("board", *arguments)
+    with started(*command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None and process.stderr is not None
         said = b""
         while b"Type yes to" not in said and (more := os.read(process.stderr.fileno(), 4096)):
@@ -224,8 +225,7 @@ def test_a_missing_part_and_another_part_in_its_place_are_named(laboratory: Worl
     laboratory.control({"do": "sensor_fault", "sensor": "other", "fault": "other_part"})
     laboratory.control({"do": "sensor_fault", "sensor": "reference", "fault": "absent"})
     try:
-        command = [sys.executable, "-m", "rig", "check", str(config)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+        done = commands.rig("check", config)
         info = json.loads(rig("info", config, "--json").stdout)
     finally:
         for name in SENSORS:
@@ -261,15 +261,7 @@ def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: W
 
 def test_check_names_what_a_verification_lacks(config: Path) -> None:
     limits = ("limits.verification_rms_rad_s=1", "limits.verification_mean_rad_s=1", "procedure.name=verify")
-    command = [
-        sys.executable,
-        "-m",
-        "rig",
-        "check",
-        str(config),
-        *(word for each in limits for word in ("--set", each)),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = commands.rig("check", config, *(word for each in limits for word in ("--set", each)))
     assert done.returncode == 2 and done.stdout.endswith("not ready: 2 to mend\n"), done
     assert [line.split(": ")[1:3] for line in done.stderr.splitlines()] == [
         ["no_calibration", "sensors.gyro"],

@@ -21,6 +21,7 @@ from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
 from support.commands import rig
 from support.paths import DEMO, ROOT
+from support.warm import started
 from support.worlds import World, fresh_host, hardware
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are names of Linux' kernel")
@@ -107,8 +108,8 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
     other_arm.write_text(yaml.safe_dump(document), encoding="utf-8")
 
     operator, terminal = pty.openpty()
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "first")]
-    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as first, ExitStack() as ended:
+    command = ("run", config, "--out", tmp_path / "first")
+    with started(*command, stdin=terminal, stderr=terminal) as first, ExitStack() as ended:
         ended.callback(first.kill)
         os.close(terminal)
         said = b""

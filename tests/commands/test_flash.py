@@ -18,6 +18,7 @@ from firmware_host import flashing
 from firmware_host.errors import BoardError
 from firmware_host.installation import install_command
 from firmware_host.protocol import FIRMWARE_VERSION
+from support.commands import rig
 from support.full_disk import full_disk
 from support.paths import IMAGE
 
@@ -62,14 +63,7 @@ def refused(action: Callable[[], object]) -> BoardError:
 
 
 def rig_board_flash(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "rig", "board", "flash", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+    return rig("board", "flash", *arguments)
 
 
 def test_the_shipped_image_is_of_the_version_the_program_needs() -> None:

@@ -5,8 +5,6 @@ import io
 import json
 import re
 import shutil
-import subprocess
-import sys
 from datetime import timedelta
 from pathlib import Path
 
@@ -213,8 +211,7 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     assert refused.returncode == 2 and "rig: other_board: lsm9ds1 LSM9DS1-CI was last calibrated" in refused.stderr
     assert f"{'f' * 24}. Correct sensors.gyro.serial_number; or, where" in " ".join(refused.stderr.split())
     assert "done: " not in (folder / "refused" / "log.txt").read_text(encoding="utf-8")
-    command = [sys.executable, "-m", "rig", "run", config, "--out", folder / "run", "--other-board", "LSM9DS1-CI"]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, check=False)
+    done = rig("run", config, "--out", folder / "run", "--other-board", "LSM9DS1-CI")
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())
     assert "(no. 1): bias of x changed by +" in printed and "more: rig history compare 1 2" in printed

@@ -1,7 +1,6 @@
 """The simulated laboratory as a command starts it: when it does not come up, the command says why."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import pytest
 
 from rig.commands.laboratory import simulated_laboratory
 from rig.errors import Refused
+from support.commands import rig
 from support.paths import DEMO
 from support.worlds import World
 
@@ -24,8 +24,7 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and
         simulated_laboratory(running.config_path.read_text(encoding="utf-8")),
     ):
         pass
-    command = [sys.executable, "-m", "rig", "check", str(running.config_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = rig("check", running.config_path)
     assert done.returncode == 0 and done.stdout.endswith("ready\n"), done
     assert f"another one is at {running.host}, so this one is at 127.0." in done.stderr
     assert running.host not in done.stdout

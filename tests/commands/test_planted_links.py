@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from firmware_host.emulator.flash_memory import FlashMemory
 from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
 from support.paths import FIXTURES
+from support.warm import started
 
 WRITTEN = ("certificate.html", "calibration.h", "result.json")
 
@@ -28,8 +28,8 @@ def linked(link: Path) -> Path:
 def run_with(links: Sequence[str], tmp_path: Path) -> tuple[int, str, list[Path]]:
     """A run in whose folder the links lie as soon as it is there: exit status, stderr, and where they led."""
     out = tmp_path / "run"
-    command = [sys.executable, "-m", "rig", "run", str(configuration(tmp_path)), "--out", str(out), "--yes"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    command = ("run", configuration(tmp_path), "--out", out, "--yes")
+    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         while not (out / "config.yaml").exists():
             assert process.poll() is None, process.communicate()[1]
             time.sleep(0.001)

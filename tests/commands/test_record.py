@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from rig.turners.ur.driver import Arm
 from support.commands import rig_here
 from support.ideal import ideal_document
 from support.paths import CONFIGS
+from support.warm import started
 from support.worlds import fresh_host, hardware, merge
 
 KVH = CONFIGS / "kvh1775.yaml"
@@ -58,10 +58,8 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     states: list[ArmState] = []
     with simulated_laboratory(config.read_text(encoding="utf-8")), Arm(host, states.append) as table:
         out = tmp_path / "recorded"
-        command = [sys.executable, "-m", "rig", "record", str(hardware(config, tmp_path)), "--out", str(out)]
-        with subprocess.Popen(
-            [*command, "--duration-s", f"{DURATION_S}"], stdout=subprocess.PIPE, text=True
-        ) as recording:
+        command = ("record", hardware(config, tmp_path), "--out", out, "--duration-s", f"{DURATION_S}")
+        with started(*command, stdout=subprocess.PIPE, text=True) as recording:
             while not (out / "kvh.csv").exists():
                 table.check()
                 assert recording.poll() is None

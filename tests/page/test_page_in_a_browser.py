@@ -5,7 +5,6 @@ import re
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -22,6 +21,7 @@ from rig.data.run_file import read_run
 from rig.motion.state import REST_SPEED_RAD_S
 from support.browser import kind, needs_browser, picture, text, until
 from support.commands import configuration, rig
+from support.warm import started
 from support.worlds import World, hardware
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
@@ -33,12 +33,10 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
     running: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str | Path) -> tuple["subprocess.Popen[str]", str]:
-        command = [sys.executable, "-m", "rig", *map(str, arguments), "--page-address", "127.0.0.1:0"]
+        words = (*arguments, "--page-address", "127.0.0.1:0")
         told = tmp_path / f"stderr-{len(running)}"
         with told.open("w", encoding="utf-8") as errors:
-            process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True
-            )
+            process = started(*words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True)
         running.append(process)
         found = until(lambda: re.search(r"^page: (\S+)$", told.read_text(encoding="utf-8"), re.M), "the address")
         return process, found[1]

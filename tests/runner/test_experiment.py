@@ -15,7 +15,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.data.run_file import read_run
-from support.commands import configuration, rig_here
+from support.commands import configuration, rig, rig_here
 from support.drawn_laboratory import truth
 from support.ideal import ideal_document
 from support.paths import CONFIGS
@@ -48,9 +48,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """The run folder, result.json and the simulated truth of a finished experiment."""
     out = tmp_path_factory.mktemp(request.param) / "run"
     config = CONFIGS / f"{request.param}.yaml"
-    done = subprocess.run(
-        command("run", config, "--out", out, *on_fresh_host()), capture_output=True, text=True, timeout=240, check=False
-    )
+    done = rig("run", config, "--out", out, *on_fresh_host())
     assert done.returncode == 0, done.stdout + done.stderr
     world = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]  # bases and all
     return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world

@@ -3,7 +3,6 @@
 import json
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ import yaml
 
 from support.commands import configuration, rig, rig_here, wait_for_log
 from support.stated import solved_otherwise
+from support.warm import started
 from support.worlds import merge
 
 pytestmark = pytest.mark.slow
@@ -29,8 +29,7 @@ def start() -> Iterator[Start]:
     running: list[subprocess.Popen[str]] = []
 
     def popen(*arguments: str | Path) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "rig", *map(str, arguments)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = started(*arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         running.append(process)
         return process
 

@@ -7,7 +7,6 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,7 +17,9 @@ import numpy as np
 import pytest
 
 from rig.data.run_file import read_run
+from support.commands import rig as command
 from support.fault_matrix.setups import SETUPS
+from support.warm import started
 from support.worlds import World, WorldHandle, fresh_host, hardware, merge
 
 # The driver names each of these faults as well (tests/turners/ur/test_driver.py): a few whole runs are enough.
@@ -50,8 +51,12 @@ class RunningRig:
         config = hardware(world.config_path, folder)
         self.world = world
         self.out = folder / "run"
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "rig", "run", str(config), "--out", str(self.out), *arguments],
+        self.process = started(
+            "run",
+            config,
+            "--out",
+            self.out,
+            *arguments,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -181,8 +186,7 @@ def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
 def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
     rig = start()
     rig.until_sweeping()
-    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
-    second = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    second = command("resume", rig.out, "--yes")
     assert second.returncode == 2, second.stderr
     time_s = rig.world.state()["time_s"]
     rig.until(lambda state: state["time_s"] > time_s + 1.0)
@@ -279,8 +283,7 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     status, errors = rig.end()
     assert status == 3 and "rig: lost_samples: " in errors, errors
 
-    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
-    resumed = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    resumed = command("resume", rig.out, "--yes")
     assert resumed.returncode == 0, resumed.stderr
     assert "resuming: 5 of 6 sweeps and dwells are recorded and sound" in resumed.stderr
     assert resumed.stderr.count("done: sweep") == 1
@@ -325,8 +328,7 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
     handle = world()
     config = hardware(handle.config_path, tmp_path)
     operator, terminal = pty.openpty()
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run")]
-    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as process:
+    with started("run", config, "--out", tmp_path / "run", stdin=terminal, stderr=terminal) as process:
         os.close(terminal)
         said = b""
         while b"Type yes to start" not in said:
@@ -348,15 +350,13 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
 def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     handle = world()
     config = hardware(handle.config_path, tmp_path)
-    command = [sys.executable, "-m", "rig", "check", str(config)]
-
-    ready = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    ready = command("check", config)
     assert ready.returncode == 0 and ready.stdout.endswith("ready\n"), ready.stderr
     assert "sensor gyro: LSM9DS1, identity register 0x68" in ready.stdout
 
     handle.control({"do": "speed_slider", "fraction": 0.3})
     handle.control({"do": "unplug_board"})
-    missing = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    missing = command("check", config)
     assert missing.returncode == 2 and "not ready: 2 to mend" in missing.stdout
     assert "missing: speed_slider: the speed slider is at 30 %" in missing.stderr
     state = handle.state()

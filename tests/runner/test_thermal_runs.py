@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +16,7 @@ from rig.data.run_file import RunData, read_run
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
 from rig.observation.windows import finished_sweeps
 from support.commands import configuration, rig, wait_for_log
+from support.warm import started
 from support.worlds import World, hardware, merge, world
 
 __all__ = ["world"]
@@ -202,8 +202,8 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     slow = {"world": {"thermal": {"capacity_j_k": 15}}}  # a set takes a part of a gap
     laboratory = world(merge(merge(LABORATORY, slow), {"procedure": procedure}))
     config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+    command = ("run", config, "--out", out, "--yes")
+    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         wait_for_log(out, "to do: warm the board until it is at", timeout_s=300)
         laboratory.control({"do": "air", "temperature_c": 41})
         said = run.communicate(timeout=400)[1]
@@ -214,8 +214,8 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
 @pytest.mark.thorough
 def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+    command = ("run", config, "--out", out, "--yes")
+    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
         wait_for_log(out, "set made", timeout_s=300)
         wait_for_log(out, "done: sweep", timeout_s=300, times=8)
         run.send_signal(signal.SIGINT)
@@ -230,8 +230,8 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
 def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tmp_path: Path, world: World) -> None:
     laboratory = world(merge(LABORATORY, {"procedure": {"order": None, "directions": None, **PROCEDURE}}))
     config = hardware(laboratory.config_path, tmp_path)
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run"), "--yes"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
+    command = ("run", config, "--out", tmp_path / "run", "--yes")
+    with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
         deadline_s = time.monotonic() + 300
         while laboratory.control({"do": "heater"})["duty"] == 0:
             assert run.poll() is None and time.monotonic() < deadline_s, run.communicate()[1]

@@ -1,12 +1,12 @@
 """A command that shows a page, in a process of its own as an operator starts it."""
 
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from support.waiting import wait_for
+from support.warm import started
 
 TOLD = "page: "
 BUSY_S = 400.0  # a busy machine's patience
@@ -15,10 +15,9 @@ BUSY_S = 400.0  # a busy machine's patience
 @contextmanager
 def with_a_page(told: Path, *words: str | Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
     """`rig …` without a terminal, and the address that it tells; all it says goes into the file `told`."""
-    command = [sys.executable, "-m", "rig", *map(str, words)]
     with (
         told.open("wb") as file,
-        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
+        started(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
     ):
         try:
             yield process, wait_for(lambda: _address(told), "its page", BUSY_S)

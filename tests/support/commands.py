@@ -13,14 +13,22 @@ import yaml
 from rig.cli import main
 from rig.config.load import load
 from support.paths import CONFIGS
+from support.warm import started
 from support.worlds import fresh_host, merge
 
 CI = CONFIGS / "ci.yaml"
 
 
-def rig(*arguments: str | Path, timeout_s: float = 240) -> subprocess.CompletedProcess[str]:
+def rig(
+    *arguments: str | Path, timeout_s: float = 240, stdin: int = subprocess.DEVNULL
+) -> subprocess.CompletedProcess[str]:
     """`rig …`, until it has ended."""
-    return python("-m", "rig", *arguments, timeout_s=timeout_s)
+    with started(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            said, errors = process.communicate(timeout=timeout_s)
+        finally:
+            process.kill()
+    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, said, errors)
 
 
 def python(*arguments: str | Path, timeout_s: float = 240) -> subprocess.CompletedProcess[str]:

@@ -3,13 +3,14 @@
 import os
 import pty
 import subprocess
-import sys
 import termios
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from support.warm import started
 
 TIMEOUT_S = 150.0
 
@@ -69,8 +70,7 @@ def station(*arguments: str | Path) -> Iterator[Scanner]:
     modes = termios.tcgetattr(far_end)
     modes[3] &= ~termios.ECHO
     termios.tcsetattr(far_end, termios.TCSANOW, modes)
-    command = [sys.executable, "-m", "rig", "station", *map(str, arguments)]
-    with subprocess.Popen(command, stdin=far_end, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with started("station", *arguments, stdin=far_end, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         os.close(far_end)
         try:
             yield Scanner(process, terminal)

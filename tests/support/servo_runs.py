@@ -4,7 +4,6 @@ import json
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -15,6 +14,7 @@ from typing import Any
 import yaml
 
 from support.paths import CONFIGS
+from support.warm import started
 from support.worlds import fresh_host, merge
 
 # As fast as it goes: no seconds are spared by a clock that runs faster.
@@ -79,9 +79,7 @@ def carried_out(*command: str | Path, config: Path, when: str = "", times: int =
     """`rig …` until it has ended; when it says something the n-th time `act` is done, so long after that."""
     document = yaml.safe_load(config.read_text(encoding="utf-8"))
     host = document["board"]["port"].removeprefix("socket://").partition(":")[0]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rig", *map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
+    process = started(*command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     seen = Seen(process, (host, 7322))
     watching = threading.Thread(target=_watch, args=(seen,), daemon=True)
     assert process.stdout is not None

@@ -5,7 +5,6 @@ import json
 import os
 import socket
 import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ import yaml
 
 from support.ideal import ideal_document
 from support.paths import DEMO
+from support.warm import started
 
 START_TIMEOUT_S = 20.0
 REPLY_TIMEOUT_S = 30.0
@@ -113,11 +113,9 @@ def worlds(folder: Path) -> Iterator[World]:
         document = merge(merge(ideal_document(DEMO), address), changes or {})
         config_path = folder / f"world-{len(running)}.yaml"
         config_path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
-        process = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "rig.world", str(config_path), "--until-eof"),
-                *("--late", str(late_path(config_path))),
-            ],
+        process = started(
+            *(config_path, "--until-eof", "--late", late_path(config_path)),
+            module="rig.world",
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,

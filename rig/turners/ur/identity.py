@@ -6,16 +6,18 @@ that are made alike; so the lengths decide as well, and the series, by the versi
 """
 
 from collections.abc import Mapping
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from rig.config.models import ArmSection
 from rig.config.section import ModelName
 from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
 from rig.motion.model import TurnerModel, model_of, turner_model
 from rig.turners.ur.report import ArmReport
+
+if TYPE_CHECKING:
+    from rig.config.models import ArmSection
 
 E_SERIES, POLYSCOPE_X = 5, 10  # the first major versions of their software; the CB3 series has 3
 POLYSCOPE_X_SINCE = (10, 10)  # older ones are not known to take programs and stops at their primary interface
@@ -76,7 +78,7 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     return None
 
 
-def identity_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
+def identity_problems(arm: "ArmSection", report: ArmReport) -> list[Problem]:
     """Whether the arm that answers is the one that was meant, by series, type and lengths: one problem, or none."""
     model, robot_type = model_of(arm), _type_told(report)
     if series := series_problem(report.host, report.version):
@@ -131,7 +133,7 @@ def _other_length(arm: DenavitHartenberg, model: TurnerModel) -> str | None:
     return f"its {LENGTHS[worst]} is {lengths[worst]:.3f} m, a {model.name}'s {nominal[worst]:.3f} m"
 
 
-def _other(arm: ArmSection, report: ArmReport, why: str) -> Problem:
+def _other(arm: "ArmSection", report: ArmReport, why: str) -> Problem:
     found = model_found(report) or "arm that is not known"
     named = f"an {found}" if found.startswith("arm") else f"a {found}"
     what = f"the controller at {report.host} is {named}; configured is {arm.model} ({why})"

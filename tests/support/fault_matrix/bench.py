@@ -11,8 +11,9 @@ from typing import Any
 
 import yaml
 
-from support.fault_matrix.commands import Command, Start
 from support.fault_matrix.wires import ARM_PORTS, Wire, wires
+from support.paths import ROOT
+from support.warm import of_system, started
 from support.worlds import WorldHandle, hardware, worlds
 
 BOARD_PORT = 7321
@@ -25,13 +26,10 @@ POLL_S = 0.02
 class Bench:
     """A laboratory with a run in it. `wire` holds the wires by name: those of the arm, and `board`."""
 
-    def __init__(
-        self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str], start: Start
-    ) -> None:
+    def __init__(self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str]) -> None:
         self.world, self.wire, self.config = world, wire, config
-        self._start = start
         self.out = config.parent / "run"
-        self.process: Command | None = None
+        self.process: subprocess.Popen[bytes] | None = None
         self._environment = environment
         self.companions: list[subprocess.Popen[str]] = []  # other programs that a fault has started
 
@@ -39,14 +37,24 @@ class Bench:
     def start(self) -> None:
         self.process = self.rig("run", str(self.config), "--out", str(self.out), "--yes")
 
-    def rig(self, *arguments: str) -> Command:
-        """`rig …`"""
-        return self._start(arguments, self.config.parent / f"{arguments[0]}.txt", self._environment)
+    def rig(self, *arguments: str) -> "subprocess.Popen[bytes]":
+        """`rig …` in a session of its own, as a terminal would start it; with libraries loaded first by the system."""
+        start = of_system if self._environment else started
+        with (self.config.parent / f"{arguments[0]}.txt").open("wb") as errors:
+            return start(
+                *arguments,
+                cwd=ROOT,
+                env={**os.environ, **self._environment},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,
+            )
 
     @property
     def running(self) -> bool:
         assert self.process is not None
-        return self.process.status is None
+        return self.process.poll() is None
 
     @property
     def pid(self) -> int:
@@ -120,7 +128,7 @@ def alive(pid: int) -> bool:
 
 
 @contextmanager
-def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str], start: Start) -> Iterator[Bench]:
+def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str]) -> Iterator[Bench]:
     """A laboratory with these changes to the ideal demonstration, and wires between it and a rig that has not begun."""
     folder.mkdir(parents=True)
     with ExitStack() as stack:
@@ -131,6 +139,6 @@ def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, st
         document = yaml.safe_load(config.read_text(encoding="utf-8"))
         document["arm"]["host"], document["board"]["port"] = host, f"socket://{host}:{BOARD_PORT}"
         config.write_text(yaml.safe_dump(document), encoding="utf-8")
-        running = Bench(world, wire, config, environment, start)
+        running = Bench(world, wire, config, environment)
         stack.callback(running.end)
         yield running

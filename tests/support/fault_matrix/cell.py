@@ -19,7 +19,6 @@ from rig.observation.windows import dwelt, swept
 from support.fault_matrix.bench import END_S, POLL_S, QUICK, REAL, START_S, Bench, alive, bench
 from support.fault_matrix.catalogue import Fault
 from support.fault_matrix.clock_shift import shifted_clock
-from support.fault_matrix.commands import Start, anew
 from support.fault_matrix.setups import SETUPS, errors_in_u
 
 AT_REST_S = 1.0  # of the controller's time, after the fault can be known
@@ -57,12 +56,11 @@ def carry_out(
     moment: float,
     span_s: float,
     seed: int,
-    start: Start = anew,
 ) -> Cell:
     """A run of `setup` that meets the fault (None: none) after `moment` of the `span_s` it takes, in `folder`."""
     cell, random, began_s = Cell(name, setup, moment), Random(seed), time.monotonic()
     environment = shifted_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
-    with bench(folder, SETUPS[setup], environment, start) as here:
+    with bench(folder, SETUPS[setup], environment) as here:
         here.start()
         if not here.until(lambda state: state["program_running"], START_S):
             cell.deviations.append(f"did not start: {here.said('run')[-300:]}")
@@ -130,7 +128,7 @@ def _account(here: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fa
     """How the run ended, when the arm came to rest, and whether the file holds what was received."""
     assert here.process is not None
     said = here.said("run")
-    cell.status = here.process.status
+    cell.status = here.process.poll()
     cell.ending = _ending(cell.status, said)
     if cell.status == 0:
         cell.verdict = "pass"
@@ -201,7 +199,7 @@ def _resume(here: Bench, cell: Cell) -> None:
         if not here.ended(END_S):
             cell.deviations.append("resuming hung")
             return
-        status = here.process.status
+        status = here.process.poll()
         if status not in (0, 1):
             break
     finished = cell.status == 1 and "already_finished" in here.said("resume")  # the verdict it had is the one it has
