@@ -192,7 +192,8 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
     if sections is None:
         return ProcedureSection(name=str(name)), []
     place = ("procedure", "name")
-    if (name == SHORTEST and SHORTEST not in sections) or (name == CARRIED_OUT and "wanted" in data):
+    short = name == SHORTEST and SHORTEST not in sections
+    if isinstance(data, dict) and (short or (name == CARRIED_OUT and "wanted" in data)):  # a script's name stands there
         if (otherwise := turned_otherwise(layered.document)) is not None:
             return None, [f"{_where(place, layered.places)}: {otherwise}"]
         wanted, problems = _validate(WantedSection, data.get("wanted", {}), ("procedure", "wanted"), layered)

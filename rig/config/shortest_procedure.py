@@ -38,16 +38,14 @@ class WantedSection(Section):
 
     @model_validator(mode="after")
     def something_is_wanted(self) -> Self:
-        """Without a wish nothing ends the run early."""
+        """A wish of one of the two: without it nothing ends the run early."""
         if self.scale is None and self.bias is None:
             raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")
         return self
 
 
 class ShortestSection(Section):
-    """The repeats of six_observation, until the uncertainty is what is wanted. All keys of `name: six_observation` may
-    stand here too; `repeats` is the largest number of them, and 16 if it is left out.
-    """
+    """Repeats of six_observation, with all its keys, until U is as wanted; at most `repeats`, 16 if left out."""
 
     name: Literal["shortest"] = Field(description="this procedure")
     wanted: WantedSection

@@ -62,7 +62,7 @@ def test_a_name_not_known_is_one_error_beside_those_of_the_nearest_procedure() -
     assert found[1] == (
         "procedure.name (--set): 'six_obsrvation' is not allowed, did you mean six_observation?; "
         "allowed: six_observation, verify, static_attitudes, imu, bias_drift, by_hand, servo_six_observation, "
-        "thermal, nod"
+        "thermal, nod, shortest"
     )
     assert found[2].startswith("procedure.speed_deg (--set): unknown key, did you mean speed_deg_s?")
 
