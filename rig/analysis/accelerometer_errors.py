@@ -78,11 +78,12 @@ def sheet_of(known: Uncertainty, name: str, part: str, range_m_s2: float) -> She
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A dwell or a sweep: when, on the clock of the first recording, where the arm stood, how warm the sensor was.
+    """A dwell or a sweep: its `number` in the plan, when, on the clock of the first recording, where the arm stood.
 
-    That in the mean over so many `samples`.
+    And how warm the sensor was, in the mean over so many `samples`.
     """
 
+    number: int
     window_s: tuple[float, float]
     samples: int
     temperature_c: float
@@ -100,7 +101,7 @@ def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[Dwe
             if dwell.index in used
         ),
         *(
-            _swept(each, since_s, turn.average, turn.acceleration.joint)
+            _swept(each, since_s, turn.sweep, turn.average, turn.acceleration.joint)
             for each, since_s in timed
             for turn in each.sensors[name].revolutions
             if turn.acceleration is not None
@@ -175,10 +176,11 @@ def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -
 def _dwelt(recording: ObservedRun, since_s: float, dwell: DwellReading) -> Piece:
     start_s, end_s = dwell.window.start_s, dwell.window.end_s
     stood = Stood(recording.motion.angles((start_s + end_s) / 2), None)
-    return Piece((start_s + since_s, end_s + since_s), dwell.reading.samples, dwell.temperature_c, stood)
+    window_s = start_s + since_s, end_s + since_s
+    return Piece(dwell.index, window_s, dwell.reading.samples, dwell.temperature_c, stood)
 
 
-def _swept(recording: ObservedRun, since_s: float, average: Average, joint: int) -> Piece:
+def _swept(recording: ObservedRun, since_s: float, sweep: int, average: Average, joint: int) -> Piece:
     stood = Stood(recording.motion.angles(average.start_s), joint - WRIST_1)
     window_s = average.start_s + since_s, average.end_s + since_s
-    return Piece(window_s, average.samples, average.temperature_c, stood)
+    return Piece(sweep, window_s, average.samples, average.temperature_c, stood)

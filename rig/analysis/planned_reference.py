@@ -69,13 +69,13 @@ def planned_read(of: PlannedAccelerometer) -> Read:
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), of.site.gravity_m_s2 * np.array(of.site.up)
     repeatability_rad = float(np.radians(of.known.repeatability_deg) / np.sqrt(3))
     movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise, arm), repeatability_rad)
-    stood = [
-        *(Stood(np.array(each.step.q_rad), None) for each in dwells),
-        *(Stood(_began(each.step), each.step.joint - WRIST_1) for each in sweeps),
-    ]
-    windows_s = [*(each.window_s for each in dwells), *(each.window_s for each in sweeps)]
     # At a temperature that stays.
-    pieces = [Piece(window_s, 1, 0.0, at) for window_s, at in zip(windows_s, stood, strict=True)]
+    pieces = [Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.q_rad))) for each in dwells]
+    pieces += [
+        Piece(each.step.index, each.window_s, 1, 0.0, Stood(_began(each.step), each.step.joint - WRIST_1))
+        for each in sweeps
+    ]
+    stood = [each.stood for each in pieces]
     movement = replace(
         _reading(theta, movement),
         own=errors_of(of.sheet, pieces, 0.0, second_order=settings.second_order),

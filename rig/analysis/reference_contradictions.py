@@ -1,12 +1,13 @@
 """What accelerometers and magnetometers are held against: their readings' bits and noise, their dwells, their model."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.accelerometer_errors import pieces_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import Window
@@ -27,9 +28,7 @@ from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
-from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
-from rig.motion.geometry import WRIST_1
 from rig.observation.observed_run import ObservedRun
 
 DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
@@ -64,11 +63,9 @@ def of_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
 ) -> ReadInReference:
     """What an accelerometer read in a run, in the order of its solution; `known` is of what no recording shows."""
-    timed = list(zip(recordings, since_first_s(recordings), strict=True))
+    timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in acceleration_dwells(name, each, since_s)]
-    used = {dwell.index for dwell in result.dwells}
-    pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
-    pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
+    pieces = pieces_of(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
     flicker_m_s2 = MICRO_G_M_S2 * known.of("acceleration_bias_instability_ug", name, sensor.part)
@@ -84,10 +81,10 @@ def of_accelerometer(
             theta=theta,
             movement=movement,
             known=np.concatenate([lag, arm_patterns(theta, movement, [each.stood for each in pieces], arm)]),
-            times_s=np.array([each.time_s for each in pieces]),
+            times_s=np.array([each.window_s for each in pieces]).mean(axis=1),
             second_order=solution.second_order_s2_m is not None,
         ),
-        pieces=[each.name for each in pieces],
+        pieces=[f"{DISTURBED_DWELL if each.stood.wrist is None else DISTURBED_SWEEP}.{each.number}" for each in pieces],
         flicker_counts=flicker_m_s2 / channel.unit_per_count,
     )
 
@@ -100,12 +97,12 @@ def of_magnetometer(
     channel = result.sensor.channel(FIELD)
     timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
-    pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
-    theta = _theta(solution.matrix, solution.reference, solution.bias)
+    theta = np.zeros(PARAMETERS)
+    theta[: LEVER.start] = solution.theta
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
     off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
-    of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
+    of_arm = arm_patterns(theta, movement, [Stood(each.q_rad) for each in dwells], arm)
     return ReadInReference(
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
@@ -114,32 +111,11 @@ def of_magnetometer(
             theta=theta,
             movement=movement,
             known=np.concatenate([drift / (np.sqrt(3) if result.drift is None else 1.0), of_arm]),
-            times_s=np.array([each.time_s for each in pieces]),
+            times_s=np.array([each.middle_s + each.since_s for each in dwells]),
             second_order=False,
         ),
-        pieces=[each.name for each in pieces],
+        pieces=[f"{DISTURBED_DWELL}.{each.index}" for each in dwells],
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    """A dwell or a sweep: its name, its middle on the clock of the first recording, where the arm stood."""
-
-    name: str
-    time_s: float
-    stood: Stood
-
-    @classmethod
-    def of_dwell(cls, dwell: Dwelt) -> "_Piece":
-        return cls(f"{DISTURBED_DWELL}.{dwell.index}", dwell.middle_s + dwell.since_s, Stood(dwell.q_rad))
-
-
-def _swept(name: str, recording: ObservedRun, since_s: float) -> Iterator[_Piece]:
-    for turn in recording.sensors[name].revolutions:
-        if turn.acceleration is not None:
-            start_s, end_s = turn.average.start_s, turn.average.end_s
-            stood = Stood(recording.motion.angles(start_s), turn.acceleration.joint - WRIST_1)
-            yield _Piece(f"{DISTURBED_SWEEP}.{turn.sweep}", (start_s + end_s) / 2 + since_s, stood)
 
 
 def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> ReferenceStatistics:
@@ -154,10 +130,3 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
         **judge_readings(held.counts, windows, rate, has_bits=held.has_bits),
     }
     return ReferenceStatistics(statistics, found.told_from)
-
-
-def _theta(matrix: Array, reference: Array, bias: Array) -> Array:
-    """(22,) parameters that dwells tell, as `rig.estimation.accelerometer_model` orders them."""
-    theta = np.zeros(PARAMETERS)
-    theta[: LEVER.start] = np.concatenate([matrix.ravel(), reference, bias])
-    return theta

@@ -102,8 +102,8 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
     warm_c = 22 + WARMER_K * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
     stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
     pieces = [
-        Piece((start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
-        for start, length, warm, place in zip(start_s, length_s, warm_c, stood, strict=True)
+        Piece(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
+        for number, (start, length, warm, place) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
     ]
     own = errors_of(sheet, pieces, STEPS_K[part], second_order=False)
     movement = replace(straight, own=own, arm_turns=arm_turns(stood, NOMINAL, np.eye(3)))
