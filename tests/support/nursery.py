@@ -61,6 +61,8 @@ def _become(order: dict[str, Any], streams: list[int], told: int) -> None:
     if order["new_session"]:
         os.setsid()
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in order["ignored"]:
+        signal.signal(number, signal.SIG_IGN)
     os.environ.clear()
     os.environ.update(order["environment"])
     os.chdir(order["folder"])

@@ -9,6 +9,7 @@ import atexit
 import inspect
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -74,6 +75,7 @@ class _Forked(subprocess.Popen[Any]):
             "environment": dict(os.environ if named["env"] is None else named["env"]),
             "folder": str(named["cwd"] or Path.cwd()),
             "new_session": named["start_new_session"],
+            "ignored": [number for number in signal.valid_signals() if signal.getsignal(number) == signal.SIG_IGN],
         }
         ends = ("p2cread", "c2pwrite", "errwrite")
         inherited_or_given = [number if named[end] == -1 else named[end] for number, end in enumerate(ends)]
