@@ -47,6 +47,7 @@ class _Nursery:
 
         def end() -> None:
             kept.close()
+            process.kill()  # it has nothing to put away, and whoever starts tests on many processes does not wait long
             process.wait()
 
         atexit.register(end)
