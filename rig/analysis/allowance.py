@@ -78,7 +78,7 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_s
     `stamp_std_s` is as of `RecordedSensor`.
     """
     sensor, explained = result.sensor, result.explained
-    known = allowed_of(
+    return allowed_of(
         surroundings.uncertainty,
         (name, sensor.part, sensor.range_rad_s or 0.0),
         finds_curve=explained is not None and explained.nonlinearity is not None,
@@ -87,8 +87,8 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_s
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
+        stamp_s=stamp_std_s or 0.0,
     )
-    return replace(known, stamp_s=stamp_std_s or 0.0)
 
 
 def allowed_of(
@@ -101,6 +101,7 @@ def allowed_of(
     earth_rad_s: Array,
     sensor: KnownSensor | None,
     at_s: Array,
+    stamp_s: float = 0.0,
 ) -> Allowed:
     """What is allowed `of` a sensor of that name, part and range (rad/s)."""
     name, part, full_scale_rad_s = of
@@ -116,6 +117,7 @@ def allowed_of(
         curve=Curve(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
         sensor=sensor,
         at_s=at_s,
+        stamp_s=stamp_s,
     )
 
 
