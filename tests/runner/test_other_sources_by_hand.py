@@ -1,7 +1,12 @@
 """By hand with a device that prints lines, and with an autopilot's IMU: the time is the sensor's own clock."""
 
 import json
+import re
+import socket
+import time
+from dataclasses import dataclass
 from pathlib import Path
+from subprocess import PIPE, STDOUT
 from typing import Any
 
 import numpy as np
@@ -9,9 +14,15 @@ import pytest
 import yaml
 
 from rig.config.load import ConfigurationRefused, load, parse
+from rig.data.hand_events import HandRested
+from rig.data.run_file import read_run
 from rig.turners.registry import sections
-from support.commands import rig, rig_here
+from rig.world.section import world_section
+from support.commands import rig_here, wait_for_log
+from support.drawn_laboratory import truth
+from support.handled_body import FAST_RAD_S, LSM9DS1
 from support.paths import CONFIGS
+from support.warm import started
 from support.worlds import fresh_host, merge
 
 SOURCES = {"lines": ("imu", {"range_g": 8}, "oscillator_ppm"), "autopilot": ("imu1", {"range_g": 16}, "clock_ppm")}
@@ -45,26 +56,56 @@ def document(source: str, *changes: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def ran(source: str, folder: Path, *changes: dict[str, Any]) -> dict[str, Any]:
-    """The sensor's entry in the result of a run that passed."""
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """A run that passed: the sensor's entry in its result, and what it really is when the session ends."""
+
+    entry: dict[str, Any]
+    scale: np.ndarray
+    bias_rad_s: np.ndarray
+
+    @property
+    def off(self) -> np.ndarray:
+        """(6,) errors of scale and bias by their u, that of the scale without what real hands did elsewhere."""
+        std = np.sqrt(np.diag(self.entry["covariance_combined"]))
+        std[:3] = self.entry["by_hand"]["session_std"]
+        found = np.array(self.entry["scale"] + self.entry["bias_rad_s"])
+        errors: np.ndarray = (found - np.concatenate([self.scale, self.bias_rad_s])) / std
+        return errors
+
+
+def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
     folder.mkdir(exist_ok=True)
-    config = folder / "config.yaml"
-    config.write_text(yaml.safe_dump(document(source, *changes), sort_keys=False), encoding="utf-8")
-    done = rig("run", config, "--out", folder / "run", timeout_s=560)
-    assert done.returncode == 0, done.stderr + done.stdout
-    result = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
-    entry: dict[str, Any] = result["sensors"][SOURCES[source][0]]
-    return entry
+    laboratory, name = document(source, *changes), SOURCES[source][0]
+    config, out = folder / "config.yaml", folder / "run"
+    config.write_text(yaml.safe_dump(laboratory, sort_keys=False), encoding="utf-8")
+    with started("run", config, "--out", out, stdout=PIPE, stderr=STDOUT, text=True) as process:
+        try:
+            wait_for_log(out, "sampling: ")
+            began_s = began(laboratory, (out / "log.txt").read_text(encoding="utf-8"))
+            said, _ = process.communicate(timeout=560)
+        finally:
+            process.kill()
+    assert process.returncode == 0, said
+    run = read_run(out / "run.h5")
+    (*_, last) = (each.event for each in run.events if isinstance(each.event, HandRested))
+    first = run.samples[name][0]
+    on_s = (float(first["host_time_s"]) - began_s) * laboratory["world"]["time_scale"]
+    rest_s = on_s + 1e-6 * (np.array([last.begin_us, last.end_us]) - int(first["board_time_us"]))
+    true = truth(laboratory, name, [(rest_s[0], rest_s[1])])
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    return Ran(result["sensors"][name], np.array(laboratory["world"]["sensors"][name]["scale"]), true[3:])
 
 
-def off(source: str, entry: dict[str, Any]) -> np.ndarray:
-    """(6,) errors of scale and bias by their u, that of the scale without what real hands did elsewhere."""
-    truth = document(source)["world"]["sensors"][SOURCES[source][0]]
-    std = np.sqrt(np.diag(entry["covariance_combined"]))
-    std[:3] = entry["by_hand"]["session_std"]
-    true = truth["scale"] + truth["bias_rad_s"]
-    found: np.ndarray = (np.array(entry["scale"] + entry["bias_rad_s"]) - np.array(true)) / std
-    return found
+def began(laboratory: dict[str, Any], log: str) -> float:
+    """When the run's own world began, by this computer's clock, while it goes on as fast as it is to."""
+    section = world_section(parse(yaml.safe_dump(laboratory), turners=sections()))
+    (host,) = set(re.findall(r" at socket://([\d.]+):", log))
+    with socket.create_connection((host, section.control_port), 30) as control:
+        control.sendall(b'{"do": "state"}\n')
+        with control.makefile() as replies:
+            now_s = float(json.loads(replies.readline())["time_s"])
+    return time.monotonic() - now_s / section.time_scale
 
 
 @pytest.mark.one_in(2)
@@ -72,8 +113,9 @@ def off(source: str, entry: dict[str, Any]) -> np.ndarray:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("source", SOURCES)
 def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Path) -> None:
-    entry = ran(source, tmp_path, SHORT)
-    assert np.abs(off(source, entry)).max() < 4
+    found = ran(source, tmp_path, SHORT)
+    assert np.abs(found.off).max() < 4
+    entry = found.entry
     (clock,) = (each for each in entry["budget"]["contributors"] if each["name"] == "clock")
     assert clock["half_width"] == CLOCK_PPM and "the sensor's own clock" in clock["source"]
     again = json.loads(rig_here("solve", tmp_path / "run", "--json").stdout)
@@ -89,13 +131,23 @@ def test_by_hand_errors_are_as_large_as_is_said(source: str, tmp_path: Path) -> 
     name, _, clock = SOURCES[source]
     errors = []
     for seed in range(6):
-        ppm = float(np.random.default_rng([seed, 29]).uniform(-CLOCK_PPM, CLOCK_PPM))
-        simulated = {"seed": 300 + seed, "sensors": {name: {source: {clock: ppm}}}}
-        errors.append(off(source, ran(source, tmp_path / str(seed), {"world": simulated})))
+        rng = np.random.default_rng([seed, 29])
+        sensor = {
+            source: {clock: float(rng.uniform(-CLOCK_PPM, CLOCK_PPM))},
+            "bias_random_walk_rad_s_per_sqrt_s": LSM9DS1.walk_rad_s_sqrt_s,
+            **{f"nonlinearity_{each}_per_rad_s": bent(rng) for each in ("even", "odd")},
+        }
+        simulated = {"seed": 300 + seed, "sensors": {name: sensor}}
+        errors.append(ran(source, tmp_path / str(seed), {"world": simulated}).off)
     scale, bias = (float(np.sqrt(np.mean(np.square(each)))) for each in np.hsplit(np.array(errors), 2))
     print(f"{source}: RMS of error / u {scale:.2f} of the scale, {bias:.2f} of the bias")
     # 36 squares, but the three scale factors of a run share its placements: as if a run told two values of each.
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.4
+
+
+def bent(rng: np.random.Generator) -> float:
+    """1/(rad/s), as far as the sensors bend whose sessions are held against their uncertainty seed by seed."""
+    return float(rng.normal() * LSM9DS1.nonlinearity / FAST_RAD_S)
 
 
 def problems(source: str, *changes: dict[str, Any]) -> str:
