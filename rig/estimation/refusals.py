@@ -248,7 +248,7 @@ def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning
     Singular values at rounding, or within three times `noise` (the norm that measurement noise gives a design which is
     itself measured), do not count towards the rank.
     """
-    _, singular, _ = np.linalg.svd(design, full_matrices=False)
+    singular = np.linalg.svd(design, compute_uv=False)
     floor = max(1e-10 * float(singular[0]), 3 * noise)
     last = float(singular[needed - 1]) if len(singular) >= needed else 0.0
     condition = float(singular[0]) / last if last > 0 else float("inf")

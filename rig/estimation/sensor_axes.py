@@ -47,7 +47,8 @@ class SensorAxes:
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
         """The covariance (6, 6) of non-orthogonality and mounting, by that of F (9, 9), row by row."""
-        covariance: Array = self.to_angles @ of_matrix @ self.to_angles.T
+        to_angles = self.to_angles
+        covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance
 
     def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:

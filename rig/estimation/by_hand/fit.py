@@ -13,7 +13,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.faces import faced
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, WALK, Factor, Graph, State, factors
-from rig.estimation.by_hand.moves import Moved, moved
+from rig.estimation.by_hand.moves import Moved, Taken, moved
 from rig.estimation.by_hand.session import LARGEST, STATED, Faced, Handled, Sizes, Told
 
 PASSES, SIZED = 10, 4  # of the fit; in each but the first, how often the sizes are found anew
@@ -59,14 +59,14 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
 
     Raises Fault `no_fit`, Refused `first_face_not_told`.
     """
-    matrix = np.eye(3)
     biases = np.array([rest.mean_rad_s for rest in session.rests])
     found, state = STATED, None
-    seen = moved(session, matrix, biases, np.zeros((3, 3)), np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
+    begun = Taken(np.eye(3), biases, np.zeros((3, 3)), np.zeros(6))
+    seen = moved(session, begun, np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
     on = faced(session, told, seen)
     iterations, settled = 0, False
     while iterations < PASSES and not settled:
-        state = _start(seen, on, matrix, biases) if state is None else state
+        state = _start(seen, on, begun) if state is None else state
         rows = tuple(factors(Graph(session, on, told, state, seen, found)))
         step, covariance = solved(rows)
         for _ in range(SIZED if iterations else 0):
@@ -77,7 +77,7 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
             raise Fault("no_fit", "the moves contradict each other so much that no fit converges", _REMEDY)
         state, iterations = state.stepped(step), iterations + 1
         settled = iterations > 2 and bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
-        seen = moved(session, state.matrix, state.biases, state.sensitivity, state.attitudes[:, 2])
+        seen = moved(session, state.taken, state.attitudes[:, 2])
     assert state is not None
     rows = tuple(factors(Graph(session, on, told, state, seen, found)))
     _, covariance = solved(rows)
@@ -88,20 +88,21 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
 _REMEDY = "See that each move is between two rests on the table, that no reading is lost, and which axes are which"
 
 
-def _start(seen: Moved, on: Faced, matrix: Array, biases: Array) -> State:
+def _start(seen: Moved, on: Faced, begun: Taken) -> State:
     """Every attitude by dead reckoning, its vertical that of the face."""
     attitudes = [_upright(np.eye(3), on.up[0])]
     for row, rotation in enumerate(seen.rotations):
         attitudes.append(_upright(attitudes[-1] @ rotation, on.up[row + 1]))
     return State(
-        matrix=matrix,
-        sensitivity=np.zeros((3, 3)),
+        matrix=begun.matrix,
+        sensitivity=begun.sensitivity,
+        bends=begun.bends,
         level=np.eye(3),
         offset=np.zeros(3),
         table=np.zeros(2),
         normals=np.zeros((6, 2)),
         attitudes=np.array(attitudes),
-        biases=biases,
+        biases=begun.biases,
     )
 
 

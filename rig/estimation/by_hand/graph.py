@@ -1,8 +1,8 @@
 """The graph of a session: what is sought, and what each rest and each move says of it.
 
-Sought are F, G, the accelerometer's F_a and b_a, how the table leans, the faces' normals, and of each rest the
-attitude Q (body to table) and the gyroscope's bias. A factor is a row of the equations, divided by its standard
-deviation; whose that is stands beside it.
+Sought are F, G, how the gyroscope bends, the accelerometer's F_a and b_a, how the table leans, the faces' normals, and
+of each rest the attitude Q (body to table) and the gyroscope's bias. A factor is a row of the equations, divided by its
+standard deviation; whose that is stands beside it.
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), as uncertain as the gyroscope's noise and a part of the angle
 - rest: m̄ − b − G f; walk: how the bias went from rest to rest
@@ -18,13 +18,13 @@ from functools import cached_property
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.moves import Moved
+from rig.estimation.by_hand.moves import Moved, Taken
 from rig.estimation.by_hand.session import FACES, Faced, Handled, Sizes, Told, axis_of
 
-MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX = (
-    slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44),
+MATRIX, GRAVITY, LEVEL, OFFSET, TABLE, BOX, BENDS = (
+    slice(0, 9), slice(9, 18), slice(18, 27), slice(27, 30), slice(30, 32), slice(32, 44), slice(44, 50),
 )  # fmt: skip
-RESTS = 44  # six of each rest from here on: attitude, bias
+RESTS = 50  # six of each rest from here on: attitude, bias
 
 MATRIX_STD = 0.2  # of an element of F
 SENSITIVITY_STD = float(np.radians(0.1))  # rad/s per g, of an element of G
@@ -33,7 +33,8 @@ TABLE_STD_RAD = 0.02
 BIAS_STD_RAD_S = 1.0
 EARTH_STD_RAD_S = 5e-5  # of each axis: a face that is come back to reads the same of it
 LEAN_RAD = 0.02
-NONLINEARITY = 1e-4  # of the angle of a move: what is known of parts
+HAND_RAD_S = float(np.radians(150))  # as fast as a hand turns, half of the way
+NONLINEARITY = 7e-5  # of the angle of a move at that speed, even and odd, of each axis: what is known of parts
 BUT_GAPS = 0.95
 QUARTER_RAD = np.pi / 2  # of which `Sizes.of_angle` is said; it grows with the root, as errors of many pushes do
 ALONG_M_S2 = 0.1  # what an accelerometer's own errors may be along the vertical
@@ -47,16 +48,26 @@ MOVE, REST, WALK, FLAT, CLOSURE, LEANING, ACCELERATION, PRIOR = (
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where the solution is; `normals` (6, 2) are the faces' own, across the nominal ones."""
+    """Where the solution is.
+
+    `bends` (6,) of the three axes, even ones and odd ones, in s/rad; `normals` (6, 2) are the faces' own, across the
+    nominal ones.
+    """
 
     matrix: Array
     sensitivity: Array
+    bends: Array
     level: Array
     offset: Array
     table: Array
     normals: Array
     attitudes: Array
     biases: Array
+
+    @property
+    def taken(self) -> Taken:
+        """What the gyroscope is taken for there."""
+        return Taken(self.matrix, self.biases, self.sensitivity, self.bends)
 
     def stepped(self, step: Array) -> "State":
         from scipy.spatial.transform import Rotation
@@ -67,6 +78,7 @@ class State:
             self,
             matrix=self.matrix + step[MATRIX].reshape(3, 3),
             sensitivity=self.sensitivity + step[GRAVITY].reshape(3, 3),
+            bends=self.bends + step[BENDS],
             level=self.level + step[LEVEL].reshape(3, 3),
             offset=self.offset + step[OFFSET],
             table=self.table + step[TABLE],
@@ -180,12 +192,12 @@ def _move(graph: Graph, row: int) -> Factor:
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _place(row), _place(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = moved.by_matrix[row], moved.by_gravity[row]
+    design[:, BENDS] = moved.by_bends[row]
     design[:, first_bias] = design[:, second_bias] = moved.by_bias[row] / 2
     design[:, first], design[:, second] = np.eye(3), -between
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(moved.durations_s[row])),
         "stamps": np.full(3, graph.stamp_std_s * moved.changes_rad_s[row]),
-        "nonlinearity": np.full(3, NONLINEARITY * moved.paths_rad[row]),
         "of_angle": np.full(3, sizes.of_angle * np.sqrt(QUARTER_RAD * moved.paths_rad[row])),
     }
     return Factor(MOVE, row, _vector(moved.rotations[row] @ between.T), design, causes)
@@ -280,6 +292,7 @@ def _priors(graph: Graph) -> Iterator[Factor]:
 
     yield prior("matrix", MATRIX, (state.matrix - np.eye(3)).ravel(), MATRIX_STD)
     yield prior("g-sensitivity", GRAVITY, state.sensitivity.ravel(), SENSITIVITY_STD)
+    yield prior("nonlinearity", BENDS, state.bends, NONLINEARITY / HAND_RAD_S)
     yield prior("level", LEVEL, (state.level - np.eye(3)).ravel(), LEVEL_STD)
     yield prior("level", OFFSET, state.offset, OFFSET_STD_M_S2)
     yield prior("table", TABLE, state.table, TABLE_STD_RAD)

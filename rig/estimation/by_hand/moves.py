@@ -1,6 +1,6 @@
 """How the gyroscope says that the body turned in each move, and how that changes with what is sought.
 
-    m = F ω + b + G f
+    m = r + even r² + odd r |r| + b + G f,   r = F ω
 
 f is the specific force in units of gravity, which at a hand's speeds is the vertical in body axes. Taken at the ends of
 a move alone it makes the scale wrong by 1.7 standard uncertainties: it has to be followed along the move.
@@ -21,8 +21,8 @@ class Moved:
     """How the body turned in k moves.
 
     - `rotations` (k, 3, 3): body coordinates at the end to those at the start, R; exp(J δθ) R with `by_matrix`
-      (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9).
-    - `swept_rad` (k, 3): the integral of the reading less offset and g-sensitivity.
+      (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9), `by_bends` (k, 3, 6).
+    - `swept_rad` (k, 3): the integral of the reading less offset, g-sensitivity and what bends it.
     - `durations_s` (k,), `paths_rad` (k,): how far it turned in all, there and back.
     - `changes_rad_s` (k,): the root of the sum of squares of how the rate changed from sample to sample, which makes an
       angle of what time stamps err by.
@@ -32,17 +32,29 @@ class Moved:
     by_matrix: Array
     by_bias: Array
     by_gravity: Array
+    by_bends: Array
     swept_rad: Array
     durations_s: Array
     paths_rad: Array
     changes_rad_s: Array
 
 
-def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up: Array) -> Moved:
-    """The moves by F (3, 3), biases (N, 3) at the rests, G (3, 3) and the vertical `up` (N, 3) in the body at each."""
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What the gyroscope is taken for: F (3, 3), biases (N, 3) at the rests, G (3, 3), even and odd (6,) in s/rad."""
+
+    matrix: Array
+    biases: Array
+    sensitivity: Array
+    bends: Array
+
+
+def moved(session: Handled, taken: Taken, up: Array) -> Moved:
+    """The moves by a gyroscope that is taken for so, with the vertical `up` (N, 3) in the body at each rest."""
+    matrix, biases, sensitivity = taken.matrix, taken.biases, taken.sensitivity
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)
-    rotations, by_theta, by_gravity, swept, durations, paths, changes = [], [], [], [], [], [], []
+    rotations, by_theta, by_gravity, by_bends, swept, durations, paths, changes = ([] for _ in range(8))
     for row, move in enumerate(session.moves):
         inside = _inside(session.time_s, move.start_s, move.end_s)
         at_s = session.time_s[inside]
@@ -51,11 +63,17 @@ def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up
         if sensitivity.any():
             corrected = corrected - _vertical(there.attitudes, up[row]) @ sensitivity.T
             there = course(at_s, corrected, matrix, np.zeros(3), at_s)
+        squares = np.hstack([corrected**2, corrected * np.abs(corrected)])
+        if taken.bends.any():
+            corrected = corrected - (squares * taken.bends).reshape(-1, 2, 3).sum(axis=1)
+            there = course(at_s, corrected, matrix, np.zeros(3), at_s)
         attitudes, back = there.attitudes, there.attitudes[0].T
         rotations.append(back @ attitudes[-1])
         by_theta.append(back @ (there.sensitivities[-1] - there.sensitivities[0]))
         along = -(back @ attitudes @ inverse)[..., None] * _vertical(attitudes, up[row])[:, None, None, :]
         by_gravity.append(np.trapezoid(along.reshape(len(at_s), 3, 9), at_s, axis=0))
+        of_axes = np.tile(-(back @ attitudes @ inverse), (1, 1, 2)) * squares[:, None]
+        by_bends.append(np.trapezoid(of_axes, at_s, axis=0))
         swept.append(np.trapezoid(corrected, at_s, axis=0))
         durations.append(float(np.ptp(at_s)))
         paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s, axis=1), at_s)))
@@ -66,6 +84,7 @@ def moved(session: Handled, matrix: Array, biases: Array, sensitivity: Array, up
         theta[..., :9],
         theta[..., 9:],
         _stacked(by_gravity, (3, 9)),
+        _stacked(by_bends, (3, 6)),
         _stacked(swept, (3,)),
         np.array(durations),
         np.array(paths),
