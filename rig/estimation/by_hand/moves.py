@@ -51,7 +51,7 @@ class Taken:
 
 def moved(session: Handled, taken: Taken, up: Array) -> Moved:
     """The moves by a gyroscope that is taken for so, with the vertical `up` (N, 3) in the body at each rest."""
-    matrix, biases, sensitivity = taken.matrix, taken.biases, taken.sensitivity
+    matrix, biases, sensitivity, bends = taken.matrix, taken.biases, taken.sensitivity, taken.bends
     middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
     inverse = np.linalg.inv(matrix)
     rotations, by_theta, by_gravity, by_bends, swept, durations, paths, changes = ([] for _ in range(8))
@@ -60,12 +60,10 @@ def moved(session: Handled, taken: Taken, up: Array) -> Moved:
         at_s = session.time_s[inside]
         corrected = session.rates[inside] - np.column_stack([np.interp(at_s, middles, each) for each in biases.T])
         there = course(at_s, corrected, matrix, np.zeros(3), at_s)
-        if sensitivity.any():
-            corrected = corrected - _vertical(there.attitudes, up[row]) @ sensitivity.T
-            there = course(at_s, corrected, matrix, np.zeros(3), at_s)
         squares = np.hstack([corrected**2, corrected * np.abs(corrected)])
-        if taken.bends.any():
-            corrected = corrected - (squares * taken.bends).reshape(-1, 2, 3).sum(axis=1)
+        if sensitivity.any() or bends.any():
+            bent = (squares * bends).reshape(-1, 2, 3).sum(axis=1)
+            corrected = corrected - _vertical(there.attitudes, up[row]) @ sensitivity.T - bent
             there = course(at_s, corrected, matrix, np.zeros(3), at_s)
         attitudes, back = there.attitudes, there.attitudes[0].T
         rotations.append(back @ attitudes[-1])
