@@ -53,7 +53,7 @@ def test_a_module_that_stands_on_no_layer_is_refused(copy: Path) -> None:
 def test_nothing_but_the_world_imports_the_world(copy: Path) -> None:
     rooms = ["rig/data/memory.py", "rig/analysis/peeking.py", "rig/commands/look.py"]
     for room in rooms:
-        (copy / room).write_text("from rig.world.laboratory import Laboratory\n\nTRUTH = Laboratory\n", encoding="utf-8")
+        (copy / room).write_text("from rig.world.laboratory import Laboratory\n\nTRUTH = Laboratory\n")
     found = lint(copy)
     assert found.returncode == 1
     for room in rooms:
