@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
-from support.warm import nursery
+from support.warm import nursery, readers_forked, readers_of_system
 from support.worlds import world
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     nursery.closed = bool(config.getoption("--proof"))
+    if not nursery.closed:
+        readers_forked()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -68,6 +70,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def thorough(request: pytest.FixtureRequest) -> bool:
     """Whether a test marked `proof` goes through all its seeds (`make proof`) or through a few (`make test`)."""
     return bool(request.config.getoption("--proof"))
+
+
+@pytest.fixture
+def read_by_system() -> Iterator[None]:
+    """Run files are read by processes that the system starts, for what is asked of those themselves."""
+    with readers_of_system():
+        yield
 
 
 @pytest.fixture(scope="module")

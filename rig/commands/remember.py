@@ -117,6 +117,8 @@ def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | N
 
 def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
+    if not calibrations:  # as with the history off, which costs no import of it
+        return ()
     from rig.history.change_words import beyond_u, change_in_short
 
     changed = [(each, beyond) for each in calibrations if (beyond := beyond_u(each.changes))]

@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.analysis.estimators import DEFAULT_ESTIMATOR
@@ -12,6 +13,7 @@ from rig.observation.windows import swept
 from support.frozen import RECORDINGS
 
 
+@pytest.mark.slow
 def test_a_sample_lost_where_the_arm_moves_between_two_sweeps_fails_no_check() -> None:
     run = read_run(RECORDINGS / "rig.settings-7" / "lines" / "run.h5")
     samples = run.samples["imu"]

@@ -68,6 +68,7 @@ def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
     )
 
 
+@pytest.mark.slow
 def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     budget = outcome.results["gyro"].uncertainty
     assert budget is not None

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.data.run_file import read_run
@@ -24,6 +25,7 @@ def failed(stamp_std_s: float | None) -> set[str]:
     return {check.name for check in outcome.checks if not check.passed}
 
 
+@pytest.mark.slow
 def test_times_that_wander_as_is_stated_change_no_scale_factor() -> None:
     assert failed(None) == {"imu.scale_changed", "imu.loose_mounting", "imu.axis_changed"}
     assert not failed(WANDERS_S)

@@ -182,6 +182,7 @@ def test_a_number_that_is_not_taken_is_asked_for_again_with_the_reason(tmp_path:
     assert second.lines == (r"G-1 does not match the pattern G-\d{3}.",)
 
 
+@pytest.mark.slow
 def test_between_two_parts_nothing_of_a_run_is_left_in_memory(tmp_path: Path) -> None:
     """What refers to itself, as a run and its listeners do, is let go at once: twenty parts need the memory of one."""
 

@@ -11,6 +11,7 @@ from support.crowd import kept, timed, told
 from support.processes import descendant, grown, resident_kb
 from support.scanner import Scanner, station
 from support.station_laboratory import Laboratory
+from support.warm import of_system
 
 PARTS = 20
 NEXT_S, FIRST_MOTION_S = 3.0, 2.0
@@ -36,7 +37,7 @@ def test_twenty_parts_in_a_row_each_get_the_right_verdict(tmp_path: Path) -> Non
     laboratory, out = Laboratory(config), tmp_path / "batch"
     next_s, motion_s = list[tuple[float, float]](), list[tuple[float, float]]()
     memory_kb, laboratory_kb = list[int](), list[int]()
-    with station(config, "--out", out, "--operator", "A. Person") as at:
+    with station(config, "--out", out, "--operator", "A. Person", start=of_system) as at:
         for number in numbers:
             at.waits_for(NUMBER)
             at.types(number)

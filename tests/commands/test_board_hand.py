@@ -101,6 +101,7 @@ def real_board(folder: Path, port: str, **changes: Any) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_what_the_button_began_is_fetched_said_to_be_unchecked_and_stored(
     tmp_path: Path, kept: HostBoard, handled: Recorded
 ) -> None:
@@ -119,6 +120,7 @@ def test_what_the_button_began_is_fetched_said_to_be_unchecked_and_stored(
     assert (read["serial_number"], read["range_deg_s"]) == ("LSM9DS1-HAND", 500)
 
 
+@pytest.mark.slow
 def test_an_answer_of_another_range_or_sensor_is_refused(tmp_path: Path, kept: HostBoard) -> None:
     with served(kept) as port:
         wide = rig_here(
@@ -129,6 +131,7 @@ def test_an_answer_of_another_range_or_sensor_is_refused(tmp_path: Path, kept: H
     assert "another_range" in wide.stderr and "another_sensor" in other.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turned", "why"),
     [
@@ -146,6 +149,7 @@ def test_a_board_without_an_answer_says_why(
     assert "no_answer_by_hand" in ended.stderr and why in " ".join(ended.stderr.split())
 
 
+@pytest.mark.slow
 def test_a_board_that_was_just_switched_on_has_no_answer(tmp_path: Path) -> None:
     with served(alone()) as port:
         ended = rig_here("board", "hand", real_board(tmp_path, port), "--fetch", "--write", "--yes")

@@ -22,7 +22,7 @@ from rig.errors import Fault, Refused
 from support.full_disk import full_disk
 from support.paths import FIXTURES
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
 RECORDING = FIXTURES / "calibration" / "run.h5"
 TIMEOUT_S = 5.0 * crowding()

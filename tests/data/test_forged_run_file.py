@@ -23,6 +23,8 @@ from rig.data.settings import settings_from_json
 from rig.errors import Refused
 from support.frozen import RECORDINGS
 
+pytestmark = pytest.mark.usefixtures("read_by_system")
+
 RECORDING = RECORDINGS / "rig.settings-7" / "six_observation" / "run.h5"
 MEMORY_BYTES = 1_000_000_000
 TIMEOUT_S = 60.0

@@ -219,6 +219,7 @@ def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
     assert {each for each in found if each is not None} <= names, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "at", "size", "said"),
     [("crumb", 5, 30.0, "did not lie flat"), ("short", 12, 3.0, "from where it began")],
@@ -240,6 +241,7 @@ def test_a_clock_that_is_off_is_in_the_scale_and_nowhere_else() -> None:
     assert slow.chi_square == pytest.approx(usual.chi_square, rel=0.02)
 
 
+@pytest.mark.slow
 def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
     recorded = handle(TWELVE, 6)
     usual, uneven = (

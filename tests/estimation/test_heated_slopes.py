@@ -39,6 +39,8 @@ def test_slopes_of_a_heated_run_lie_within_u() -> None:
     assert np.sqrt(np.mean(slopes**2)) < 1.3 and np.sqrt(np.mean(loops**2)) < 1.6
 
 
+@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.timeout(900)
 def test_slopes_of_forty_heated_runs_lie_within_u() -> None:

@@ -171,6 +171,7 @@ def test_the_c_structures_lie_as_the_table_says(tmp_path: Path) -> None:
 # Streams
 
 
+@pytest.mark.slow
 @given(
     st.lists(messages(), min_size=1, max_size=5, unique_by=lambda one: one[1]),
     st.lists(st.integers(0, 2000), max_size=8),

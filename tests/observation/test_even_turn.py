@@ -43,6 +43,7 @@ def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
     assert truth == pytest.approx(turn.speed_rad_s, rel=4 * SHARE)
 
 
+@pytest.mark.slow
 def test_a_shaft_that_dithers_is_at_rest(drawn: Drawn) -> None:
     motion = motion_of(drawn.runs[0])
     assert all(standing(motion, window) is not None for window in rested(drawn.runs[0]))

@@ -1,6 +1,7 @@
 """What is kept for the clock of the next sweep, however long something was waited for before it."""
 
 import numpy as np
+import pytest
 
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.data.recorded_sensor import RecordedSensor
@@ -20,6 +21,7 @@ def taken(acquisition: Acquisition, from_s: float, to_s: float, sensor: Recorded
         acquisition.on_samples("gyro", sample)
 
 
+@pytest.mark.slow
 def test_hours_of_waiting_before_a_sweep_are_not_looked_through_for_its_clock() -> None:
     acquisition = Acquisition()
     acquisition.expect("gyro", SENSOR)

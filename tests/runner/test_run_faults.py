@@ -153,8 +153,10 @@ def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt
 
 
 def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> None:
+    quick = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+    known_less = {"scale_std": 0.005, "bias_std_rad_s": 0.01, "condition": 20}
     with ignored(signal.SIGHUP):
-        rig = start({"world": {"time_scale": 8}})
+        rig = start({"procedure": quick, "limits": known_less, "world": {"time_scale": 8}})
     rig.until_sweeping()
     rig.send(signal.SIGHUP)
     status, errors = rig.end()

@@ -6,9 +6,10 @@ import subprocess
 import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from support.warm import started
 
@@ -64,13 +65,13 @@ class Scanner:
 
 
 @contextmanager
-def station(*arguments: str | Path) -> Iterator[Scanner]:
+def station(*arguments: str | Path, start: Callable[..., "subprocess.Popen[Any]"] = started) -> Iterator[Scanner]:
     """`rig station …`, ended by force if it has not ended by itself when the block does."""
     terminal, far_end = pty.openpty()
     modes = termios.tcgetattr(far_end)
     modes[3] &= ~termios.ECHO
     termios.tcsetattr(far_end, termios.TCSANOW, modes)
-    with started("station", *arguments, stdin=far_end, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with start("station", *arguments, stdin=far_end, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         os.close(far_end)
         try:
             yield Scanner(process, terminal)

@@ -1,115 +1,83 @@
 """Processes of `python -m rig …` that need not import everything anew, which takes longer than most of them run.
 
-They are forked from one process that has imported what they need. Of those that the system starts they differ in this
-alone that /proc shows another command line. Tests of what a process imports, of how soon it starts, of how much memory
-it takes and of variables of Python's own start one by the system, and so does all of `make proof`.
+They are forked from one process that has imported what they need, and so are the laboratories that they start; what
+takes run files apart is forked from another. Of those that the system starts they differ in this alone that /proc shows
+another command line and another parent. Tests of what a process imports, of how soon it starts, of how much memory it
+takes and of variables of Python's own start one by the system, and so does all of `make proof`.
 """
 
 import atexit
-import inspect
 import json
-import os
-import signal
-import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 from typing import Any
+
+from rig.data.run_file import READING
+from support.nursery import READER, Forked, forked_here
 
 NURSERY = Path(__file__).with_name("nursery.py")
 
 
 class _Nursery:
-    """The process that all are forked from; it is started when the first is wanted, and ends with this one."""
+    """The processes that all are forked from; they are started when the first is wanted, and end with this one."""
 
     def __init__(self) -> None:
-        self._orders: socket.socket | None = None
+        self._addresses: dict[str, str] | None = None
         self._starting = Lock()
         self.closed = False  # nothing is forked: all are processes that the system starts
 
-    def bear(self, order: dict[str, Any], streams: list[int]) -> tuple[int, socket.socket]:
-        """A new process: its identity, and where its status is told (as of `os.waitpid`, 4 bytes) when it has ended."""
+    def address(self, module: str) -> str:
+        """Where orders for processes of that module are taken."""
         with self._starting:
-            if self._orders is None:
-                self._orders = self._begun()
-        kept, given = socket.socketpair()
-        with given:
-            socket.send_fds(self._orders, [json.dumps(order).encode()], [*streams, given.fileno()])
-        return _number(kept), kept
+            if self._addresses is None:
+                self._addresses = self._begun()
+        return self._addresses[module]
 
-    def _begun(self) -> socket.socket:
-        kept, given = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with given:
-            number = given.fileno()
-            command = [sys.executable, str(NURSERY), str(number)]
-            process = subprocess.Popen(command, pass_fds=[number], stdin=subprocess.DEVNULL)
+    def _begun(self) -> dict[str, str]:
+        command = [sys.executable, str(NURSERY), json.dumps(READING)]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert process.stdin is not None and process.stdout is not None
+        pipes = (process.stdin, process.stdout)
 
         def end() -> None:
-            kept.close()
+            for pipe in pipes:
+                pipe.close()
             process.kill()  # it has nothing to put away, and whoever starts tests on many processes does not wait long
             process.wait()
 
         atexit.register(end)
-        return kept
+        addresses: dict[str, str] = json.loads(process.stdout.readline())
+        return addresses
 
 
 nursery = _Nursery()
 
 
-def _number(told: socket.socket, flags: int = 0) -> int:
-    number = told.recv(4, flags)
-    assert number, "the process that all are forked from has ended"
-    return int.from_bytes(number, "little")
+def readers_forked() -> None:
+    """Have what takes run files apart forked for this process too."""
+    forked_here((READER,), nursery.address)
 
 
-class _Forked(subprocess.Popen[Any]):
-    """As Popen, but for its birth and its end: it is no child of this process, so its status comes through a socket."""
-
-    def _execute_child(self, *given: Any) -> None:
-        of_popen = super()._execute_child  # type: ignore[misc]
-        named = inspect.signature(of_popen).bind(*given).arguments
-        module, *words = named["args"]
-        order = {
-            "module": module,
-            "words": words,
-            "environment": dict(os.environ if named["env"] is None else named["env"]),
-            "folder": str(named["cwd"] or Path.cwd()),
-            "new_session": named["start_new_session"],
-            "ignored": [number for number in signal.valid_signals() if signal.getsignal(number) == signal.SIG_IGN],
-        }
-        ends = ("p2cread", "c2pwrite", "errwrite")
-        inherited_or_given = [number if named[end] == -1 else named[end] for number, end in enumerate(ends)]
-        self.pid, self._status = nursery.bear(order, inherited_or_given)
-        self._child_created = True
-        self._close_pipe_fds(  # type: ignore[attr-defined]
-            *(named[end] for end in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite"))
-        )
-
-    def _internal_poll(self, _deadstate: int | None = None) -> int | None:
-        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # type: ignore[attr-defined]
-            try:
-                pid, status = self._try_wait(os.WNOHANG)
-                if pid == self.pid:
-                    self._handle_exitstatus(status)  # type: ignore[attr-defined]
-            finally:
-                self._waitpid_lock.release()  # type: ignore[attr-defined]
-        return self.returncode
-
-    def _try_wait(self, wait_flags: int) -> tuple[int, int]:
-        try:
-            status = _number(self._status, socket.MSG_DONTWAIT if wait_flags & os.WNOHANG else 0)
-        except BlockingIOError:
-            return 0, 0
-        self._status.close()
-        return self.pid, status
+@contextmanager
+def readers_of_system() -> Iterator[None]:
+    """For the length of the block they are processes that the system starts."""
+    forking = subprocess.Popen.__new__
+    subprocess.Popen.__new__ = lambda kind, *_, **__: object.__new__(kind)  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        subprocess.Popen.__new__ = forking  # type: ignore[method-assign]
 
 
 def started(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
     """`python -m MODULE WORDS …`; `options` as of Popen, but for those of what is done before the program begins."""
     if nursery.closed:
         return of_system(*words, module=module, **options)
-    return _Forked([module, *map(str, words)], **options)
+    return Forked(nursery.address(module), [module, *map(str, words)], safe_path=False, **options)
 
 
 def of_system(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":

@@ -82,6 +82,7 @@ def test_samples_carry_the_sensor_s_motion_and_temperature() -> None:
     assert set(stream["temperature"] / 16 + 25) == {22.0}
 
 
+@pytest.mark.slow
 def test_equal_inputs_give_equal_bytes() -> None:
     def digest(tick_s: float) -> str:
         session = Session(tick_s=tick_s)

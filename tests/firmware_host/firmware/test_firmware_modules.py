@@ -73,6 +73,7 @@ def test_no_module_of_the_core_calls_what_calls_it(objects: list[Path]) -> None:
     assert circle(needs) == []
 
 
+@pytest.mark.slow
 def test_includes_and_calls_together_make_no_circle(objects: list[Path]) -> None:
     by_include, by_call = included(sorted(CORE.glob("*.[ch]"))), called(objects)
     both = {module: by_include.get(module, set()) | by_call.get(module, set()) for module in {*by_include, *by_call}}
