@@ -1,6 +1,7 @@
 """The analyses that procedures name: from recordings to the outcome of a run.
 
-Whoever plans a procedure reads this: so what solves is loaded when there is something to solve.
+Whoever plans a procedure reads this: so what solves is loaded when there is something to solve. Where NumPy or SciPy
+gives up, each raises Fault `not_solvable`.
 """
 
 from collections.abc import Sequence
@@ -8,11 +9,13 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
+from rig.analysis.solvable import solvable
 
 if TYPE_CHECKING:
     from rig.data.run_file import RunData
 
 
+@solvable()
 def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
 
@@ -24,6 +27,7 @@ def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *,
     return judging.calibrated(runs, estimator, drifting=drifting)
 
 
+@solvable()
 def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
     """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
 
@@ -34,6 +38,7 @@ def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Ou
     return judging.drifted(runs, estimator)
 
 
+@solvable()
 def calibrated_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """Solve and judge the recordings of a session by hand, at least one.
 
@@ -44,6 +49,7 @@ def calibrated_by_hand(runs: "Sequence[RunData]") -> Outcome:
     return hand_judging.calibrated_by_hand(runs)
 
 
+@solvable()
 def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
     """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
 
@@ -54,6 +60,7 @@ def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
     return judging.verified(outcome, repeated)
 
 
+@solvable()
 def verified_alone(repeated: "Sequence[RunData]") -> Outcome:
     """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
 

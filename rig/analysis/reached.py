@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.shortest import Reached
+from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import surroundings_of
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData
@@ -14,12 +15,13 @@ def reached_so_far(runs: Sequence[RunData], estimator: str) -> Reached | None:
     """The worst U of all sensors to calibrate by what is recorded yet; None where that tells no uncertainty."""
     settings = runs[0].settings
     try:
-        recordings = observe_recordings(runs)
-        if not recordings:
-            return None
-        surroundings = surroundings_of(recordings)
-        sensors = runs[0].measuring(RATE)
-        found = solve_observed(sensors, recordings, estimator, surroundings, settings.matrix_corrected)
+        with solvable():
+            recordings = observe_recordings(runs)
+            if not recordings:
+                return None
+            surroundings = surroundings_of(recordings)
+            sensors = runs[0].measuring(RATE)
+            found = solve_observed(sensors, recordings, estimator, surroundings, settings.matrix_corrected)
     except Fault:  # what is wrong with it, the end of the run will say
         return None
     budgets = {name: found[name].uncertainty for name in settings.to_calibrate}

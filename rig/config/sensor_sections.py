@@ -103,10 +103,9 @@ class TurntableSection(Section):
 class AccelerationSection(Section):
     """The part's accelerometer. Without this section it is not read. Procedures with attitudes calibrate it."""
 
-    range_g: float | None = Field(
-        default=None,
-        description="full scale of the accelerometer, one of the part's ranges; if left out, the smallest",
-        json_schema_extra={"unit": "g"},
+    range_g: float = Field(
+        description="full scale of the accelerometer, one of the part's ranges",
+        json_schema_extra={**OF_THE_PART, "unit": "g"},
     )
 
 
@@ -207,7 +206,7 @@ class SensorSection(Section):
     @model_validator(mode="before")
     @classmethod
     def usual_of_the_part(cls, data: Any) -> Any:
-        """The section with the part's usual data rate and range where they are left out."""
+        """The section with the part's usual data rate and ranges where they are left out."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("part")
@@ -216,23 +215,25 @@ class SensorSection(Section):
         if part.any_rate:  # nothing is usual of a part that may be any
             return data
         usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
-        return {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
+        whole = {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
+        acceleration = data.get("acceleration")
+        if isinstance(acceleration, Mapping) and acceleration.get("range_g") is None:
+            whole["acceleration"] = {**acceleration, "range_g": part.ranges_g[0]}
+        return whole
 
     @field_validator("acceleration")
     @classmethod
     def a_range_of_its_accelerometer(
         cls, value: AccelerationSection | None, info: ValidationInfo
     ) -> AccelerationSection | None:
-        """A range that the part's accelerometer has; left out, the smallest: nothing on the arm is felt beyond 2 g."""
+        """A range that the part's accelerometer has."""
         part = PARTS.get(info.data.get("part", ""))
         if value is None or part is None:
             return value
         if part.any_rate:
-            if value.range_g is None or value.range_g <= 0:
+            if value.range_g <= 0:
                 raise ValueError("state range_g, the full scale to which its program sets the accelerometer")
             return value
-        if value.range_g is None:
-            return value.model_copy(update={"range_g": part.ranges_g[0]})
         if value.range_g not in part.ranges_g:
             raise ValueError(f"the part has no range_g {value.range_g:g}; it has {', '.join(map(str, part.ranges_g))}")
         return value

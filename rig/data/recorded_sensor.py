@@ -101,8 +101,7 @@ def recorded_as(
 
 
 def range_m_s2(section: AccelerationSection) -> float:
-    """The full scale of an accelerometer, which its sensor's section has filled in where it was left out."""
-    assert section.range_g is not None, "of a sensor that was checked"
+    """The full scale of an accelerometer."""
     return section.range_g * STANDARD_GRAVITY_M_S2
 
 

@@ -20,7 +20,7 @@ from rig.estimation.by_hand.session import Handled, Move, Rest, Told
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
-from rig.observation.timebase import NOMINAL_DRIFT
+from rig.observation.timebase import NOMINAL_DRIFT, check_readings
 
 LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
 BETWEEN_S = 10.0  # of nothing between two recordings of a session, whose boards' clocks do not tell it
@@ -123,7 +123,7 @@ def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted
     """A session's rests and moves so far by one sensor, what of them does not count, and when it may go on.
 
     The item may have been anywhere between two recordings: the way from the last rest of one to the first of the next
-    ties nothing.
+    ties nothing. Raises Fault as `check_readings` does.
     """
     microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
     segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
@@ -135,7 +135,9 @@ def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted
         shift_s = 0.0 if ends_s is None else ends_s + BETWEEN_S - board_s[0]
         if ends_s is not None:
             refused.seams.append(ends_s + BETWEEN_S / 2)
-        segmenter.feed(*readings_of(run.sensors[name], samples, shift_s))
+        readings = readings_of(run.sensors[name], samples, shift_s)
+        check_readings(*readings[:2])
+        segmenter.feed(*readings)
         ends_s = shift_s + board_s[1]
         for recorded in run.events:
             refused.take(recorded.event, shift_s)

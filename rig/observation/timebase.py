@@ -94,6 +94,27 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
 def _check_samples(board_time_s: Array, readings: Array) -> None:
     if len(board_time_s) < MIN_SAMPLES:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
+    check_readings(board_time_s, readings)
+    still = np.ptp(readings, axis=0) == 0
+    if still.all():
+        raise Fault(
+            "stuck_sensor",
+            f"the gyroscope reads {_triple(readings[0])} rad/s all the time, although the arm moves",
+            "Check the sensor's supply and its bus wiring",
+        )
+    if still.any():
+        raise Fault(
+            "stuck_axis",
+            f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, although the arm moves",
+            "The sensor is broken or wrongly configured; replace it",
+        )
+
+
+def check_readings(board_time_s: Array, readings: Array) -> None:
+    """Readings (n, 3) are refused whose times (n,) do not rise, or that are no numbers.
+
+    Raises Fault `not_finite`, `duplicated_samples`, `board_clock_restarted`, `impossible_times`.
+    """
     if not np.isfinite(readings).all():
         raise not_finite("a reading")
     if np.any(np.diff(board_time_s) == 0):
@@ -109,19 +130,6 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
             "Check the board's power and cable, then record again",
         )
     check_span(board_time_s, "the samples")
-    still = np.ptp(readings, axis=0) == 0
-    if still.all():
-        raise Fault(
-            "stuck_sensor",
-            f"the gyroscope reads {_triple(readings[0])} rad/s all the time, although the arm moves",
-            "Check the sensor's supply and its bus wiring",
-        )
-    if still.any():
-        raise Fault(
-            "stuck_axis",
-            f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, although the arm moves",
-            "The sensor is broken or wrongly configured; replace it",
-        )
 
 
 def _begun(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:

@@ -119,8 +119,9 @@ class Connector:
     def _ending_early(self, plan: Plan, sweeps: int) -> EndingEarly | None:
         """What ends the run before its last repeat; None where nothing is wanted, or readings are compared."""
         section, procedure = self.loaded.config.procedure, self.phase.procedure
-        wanted = wanted_by(section)
-        if wanted is None or procedure.reads_corrected or not isinstance(section, SixObservationSection):
+        if procedure.reads_corrected or not isinstance(section, SixObservationSection):
+            return None
+        if (wanted := wanted_by(section)) is None:
             return None
         return EndingEarly(wanted, plan, sweeps, section.repeats, self.path, self.resumed.earlier, procedure.estimator)
 

@@ -98,7 +98,7 @@ def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> Boar
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
-    range_g = 0.0 if section.acceleration is None else section.acceleration.range_g or 0.0
+    range_g = 0.0 if section.acceleration is None else section.acceleration.range_g
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
     channels = [
         of_three_axes(RATE, setup.sensitivity_rad_s, FULL_SCALE_COUNTS, radians(setup.range_deg_s)),

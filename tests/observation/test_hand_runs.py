@@ -1,11 +1,18 @@
 """What of a session by hand does not count, and what is left of it then."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from rig.analysis.analyses import calibrated_by_hand
 from rig.data.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
+from rig.data.run_file import read_run
+from rig.errors import Fault
 from rig.estimation.by_hand.session import Handled, Move, Rest
 from rig.motion.by_hand import FACES
 from rig.observation.hand_runs import NotCounted, turned_face
+from support.frozen import RECORDINGS
 
 SECOND_US = 1_000_000
 
@@ -68,3 +75,14 @@ def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     assert [turned_face(face, quarter) for face in ("+x", "+y", "-z")] == ["-y", "+x", "-z"]
     assert all(turned_face(turned_face(face, quarter), quarter.T) == face for face in FACES)
+
+
+@pytest.mark.parametrize(
+    ("step", "name"), [(0, "duplicated_samples"), (-1, "board_clock_restarted"), (10**9, "impossible_times")]
+)
+def test_stamps_that_no_clock_gives_are_refused(step: int, name: str) -> None:
+    run = read_run(RECORDINGS / "rig.settings-7" / "by_hand" / "run.h5")
+    samples = run.samples["gyro"].copy()
+    samples["board_time_us"] = 2_000_000_000 + step * np.arange(len(samples))
+    with pytest.raises(Fault, match=f"{name}: "):
+        calibrated_by_hand([replace(run, samples={"gyro": samples})])

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.sensor_sections import AccelerationSection
 from rig.config.world_autopilot import SimulatedAutopilotSection
 from rig.config.world_models import WorldSection
 from rig.errors import Refused
@@ -66,9 +65,7 @@ class AutopilotMount:
     def _imu(self, place: int, motion_of: MotionOf, time_s: float) -> Imu:
         name = self.imus.get(place, next(iter(self.imus.values())))
         # It has an accelerometer whether the rig reads it or not.
-        sensor = self.config.sensors[name]
-        sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
-        truth = SensorTruth(sensor, self.world.sensors[name], time_s)
+        truth = SensorTruth(self.config.sensors[name], self.world.sensors[name], time_s, accelerometer=True)
         of_another = [] if place in self.imus else [place]
         seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *of_another])
         px4 = self.section.firmware == "px4"

@@ -19,7 +19,7 @@ from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:
-    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read.
+    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read nor `accelerometer` said.
 
     `temperature_c`: the die's, of a part that gets power at the time `powered_s`, or as warm as the heated `part` is;
     `data_rate_ppm`: how much too fast its own oscillator is.
@@ -31,11 +31,13 @@ class SensorTruth:
         simulated: SimulatedSensorSection,
         powered_s: float = 0.0,
         part: HeatedPart | None = None,
+        *,
+        accelerometer: bool = False,
     ) -> None:
         self.gyro = replace(_gyro(simulated), die=part)
         self.accelerometer = (
             None
-            if sensor.acceleration is None
+            if sensor.acceleration is None and not accelerometer
             else replace(_accelerometer(simulated.accelerometer, simulated.temperature_c), die=part)
         )
         self.data_rate_ppm = simulated.data_rate_ppm

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.sensor_sections import AccelerationSection
 from rig.config.world_models import SimulatedKvhSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -38,10 +37,9 @@ class Mount:
         if self.instrument is not None:
             return
         sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
-        # It sends accelerations whether the rig reads them or not.
-        sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
         simulated = self.world.sensors[self.name]
-        truth = SensorTruth(sensor, simulated, time_s)
+        # It sends accelerations whether the rig reads them or not.
+        truth = SensorTruth(sensor, simulated, time_s, accelerometer=True)
         magnetometer = MountedMagnetometer(
             sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
         )

@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.sensor_sections import AccelerationSection
 from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_models import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
@@ -48,9 +47,8 @@ class PrinterMount:
         if sensor.lines is None or sensor.serial is None:
             raise ValueError(f"{self.name} prints no lines")
         baud, prints = sensor.serial.baud, self.section.prints or sensor.lines
-        if "ax" in prints.columns:  # it prints accelerations whether the rig reads them or not
-            sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
-        truth = SensorTruth(sensor, simulated, time_s)
+        # It prints accelerations whether the rig reads them or not.
+        truth = SensorTruth(sensor, simulated, time_s, accelerometer="ax" in prints.columns)
         magnetometer = MountedMagnetometer(
             sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
         )
