@@ -24,7 +24,10 @@ def no_numbers() -> None:
 
 
 def no_beginning() -> None:
-    scipy.optimize.least_squares(lambda x: x * np.nan, np.ones(2))
+    def left(at: np.ndarray) -> np.ndarray:
+        return at * np.nan
+
+    scipy.optimize.least_squares(left, np.ones(2))
 
 
 @pytest.mark.parametrize("given_up", [not_positive, singular, no_numbers, no_beginning])
