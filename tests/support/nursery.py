@@ -88,7 +88,7 @@ class Forked(subprocess.Popen[Any]):
 def forked_here(modules: Collection[str], address: Callable[[str], str]) -> None:
     """Have every `python -P -m MODULE …` of these modules forked that this process starts by Popen.
 
-    X
+    A laboratory is forked only into a session of its own, as a run starts one: then no signal for the run reaches it.
     """
 
     class Named(Forked):
