@@ -28,7 +28,7 @@ from rig.observation.arm_motion import ArmMotion
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
             WRIST_3: ANGLES.index("cos of wrist_3")}  # fmt: skip
-ZEROS = (ANGLES.index("zero of wrist_2"), ANGLES.index("zero of wrist_3"))  # of joints that stand beside one that turns
+ZEROS = {ANGLES.index("zero of wrist_2"): -2, ANGLES.index("zero of wrist_3"): -1}  # and which joint's, from the end
 CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")  # its odd and its even part
 STEPS = 24  # of a way, in which directions are taken to stand still
 STANDS_RAD = 1e-3  # what a joint that does not turn seems to
@@ -175,10 +175,11 @@ def _of_angles(pieces: Pieces, known: Allowed) -> Array:
                 again.append(np.zeros(pieces.means_rad_s.shape))
                 unseen_rad = np.hypot(stretch.unseen_rad, known.encoder_rad)
                 again[-1][place] = np.hypot(known.repeatability_rad, unseen_rad) * ends
-    for visit in _visits(pieces):
-        there = np.isin(pieces.sweep, visit)[:, None]
-        again += [known.repeatability_rad * np.where(there, each[zero], 0.0) for zero in ZEROS]
-    return np.concatenate([known.angles_rad[:, None, None] * each, again])
+    for zero, joint in ZEROS.items():
+        for alike in _off_alike(pieces, joint) if each[zero].any() else ():  # a servo has no such joint
+            there = np.isin(pieces.sweep, alike)[:, None]
+            again.append(known.repeatability_rad * np.where(there, each[zero], 0.0))
+    return np.concatenate([known.angles_rad[:, None, None] * each, np.reshape(again, (-1, *pieces.means_rad_s.shape))])
 
 
 def _of_marks(pieces: Pieces, encoder_rad: float) -> Array:
@@ -205,19 +206,23 @@ def _of_marks(pieces: Pieces, encoder_rad: float) -> Array:
     return np.array(found).reshape(-1, *pieces.means_rad_s.shape)
 
 
-def _visits(pieces: Pieces) -> list[list[int]]:
-    """Sweeps that follow each other, of one joint, beside which the others stood where they were."""
+def _off_alike(pieces: Pieces, joint: int) -> list[list[int]]:
+    """Sweeps and ways from one move of a joint to its next; a way on which it moves is among those after it.
+
+    The joint is counted from the end of the chain. Where a way is missing, another angle or recording says that it was
+    moved.
+    """
+    sweeps, firsts = np.unique(pieces.sweep, return_index=True)
     found: list[list[int]] = []
-    stood: Array = np.array(np.nan)
-    for sweep in np.unique(pieces.sweep[pieces.sweep > REST]).tolist():
-        stretch = pieces.stretches[int(np.argmax(pieces.sweep == sweep))]
-        q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
-        here = np.where(np.ptp(q_rad, axis=0) < STANDS_RAD, q_rad[0], np.inf)
-        if np.allclose(here, stood, rtol=0.0, atol=STANDS_RAD):
-            found[-1].append(sweep)
-        else:
-            found.append([sweep])
-        stood = here
+    motion, stood_rad = None, np.nan
+    for first in sorted(firsts[sweeps != REST], key=lambda first: float(pieces.times_s[first, 0])):
+        stretch = pieces.stretches[first]
+        start_rad, end_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))[:, joint]
+        stands = max(abs(start_rad - stood_rad), abs(end_rad - start_rad)) < STANDS_RAD
+        if not stands or stretch.motion is not motion:
+            found.append([])
+        found[-1].append(int(pieces.sweep[first]))
+        motion, stood_rad = stretch.motion, end_rad
     return found
 
 
