@@ -68,10 +68,10 @@ def moved(session: Handled, taken: Taken, up: Array) -> Moved:
         attitudes, back = there.attitudes, there.attitudes[0].T
         rotations.append(back @ attitudes[-1])
         by_theta.append(back @ (there.sensitivities[-1] - there.sensitivities[0]))
-        along = -(back @ attitudes @ inverse)[..., None] * _vertical(attitudes, up[row])[:, None, None, :]
+        turned = -(back @ attitudes @ inverse)
+        along = turned[..., None] * _vertical(attitudes, up[row])[:, None, None, :]
         by_gravity.append(np.trapezoid(along.reshape(len(at_s), 3, 9), at_s, axis=0))
-        of_axes = np.tile(-(back @ attitudes @ inverse), (1, 1, 2)) * squares[:, None]
-        by_bends.append(np.trapezoid(of_axes, at_s, axis=0))
+        by_bends.append(np.trapezoid(np.tile(turned, (1, 1, 2)) * squares[:, None], at_s, axis=0))
         swept.append(np.trapezoid(corrected, at_s, axis=0))
         durations.append(float(np.ptp(at_s)))
         paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s, axis=1), at_s)))
