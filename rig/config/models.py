@@ -18,12 +18,11 @@ from rig.config.judging_sections import (
 from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget
 from rig.config.mavlink_section import over_budget_of_autopilots
-from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S
+from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S, ModelName
 from rig.config.section import (
     RATIO,
     AccelerometerOrder,
     JointAngle,
-    ModelName,
     Offset,
     Section,
     SensorName,

@@ -1,8 +1,12 @@
-"""How far values of a configuration may range: as far as any arm's may.
+"""Which arms a configuration may name, and how far its values may range: as far as any arm's may.
 
 What the arm that is configured can do is judged where a plan is made (`rig.turners.ur.limits`, `rig.motion.model`).
 """
 
+from typing import Literal
+
+# The arms that can turn the sensors, each a row of `rig/motion/models/`.
+ModelName = Literal["ur3e", "ur5e", "ur7e", "ur10e", "ur12e", "ur16e", "ur20", "ur30", "ur10_cb3"]
 JOINT_RANGE_DEG = 360.0
 SPEED_RANGE_DEG_S = 180.0  # `ur_rtde` accepts no more, whatever an arm can do
 ACCELERATION_RANGE_DEG_S2 = 800.0

@@ -8,8 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 from rig.config.ranges import JOINT_RANGE_DEG
 
 Direction = Literal["cw", "ccw"]
-# The arms that can turn the sensors, each a row of `rig/motion/models/`.
-ModelName = Literal["ur3e", "ur5e", "ur7e", "ur10e", "ur12e", "ur16e", "ur20", "ur30", "ur10_cb3"]
 Vector3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 AccelerometerOrder = Literal[0, 1, 2]

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from rig.config.hand_sections import HandSection
 from rig.config.models import ArmSection, TurnerSection
-from rig.config.section import RATIO, ModelName, Section, SensorName, Vector3
+from rig.config.ranges import ModelName
+from rig.config.section import RATIO, Section, SensorName, Vector3
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import StageMountSection
 from rig.config.world_autopilot import SimulatedAutopilotSection

@@ -10,9 +10,11 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.quoting import printable, quote
+from rig.motion.geometry import MAX_JOINTS
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]  # the one that stands on the ground first
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
 MOST_VALUES = 200_000  # the largest of a run has 3,000; every wrong one of them costs a thousand bytes to tell

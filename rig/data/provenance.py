@@ -6,18 +6,20 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
 from rig.config.load import Loaded
 from rig.data.absent import NO_ARM, NO_BOARD
-from rig.data.checked import checked
+from rig.data.checked import Finite, checked
 from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.result_types import Utc
 from rig.data.run_folder import ScriptIdentity
-from rig.motion.geometry import DenavitHartenberg, Pose
+from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Made, Report
 
 OF_FILES = ("readings_file", "motion_file")
@@ -56,7 +58,7 @@ class Provenance:
     script_sha256: str | None = None
     script_installed: bool = True
     arm_kinematics: DenavitHartenberg | None = None
-    tcp_offset: Pose | None = None
+    tcp_offset: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)] | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
     turner_kind: str | None = None

@@ -15,7 +15,7 @@ from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.attitude_entries import InAttitudesRatesEntry, TurnedEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
-from rig.data.checked import read_document
+from rig.data.checked import OfJoints, read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.hand_entries import ByHandEntry
@@ -42,7 +42,6 @@ from rig.data.result_types import (
 from rig.data.run_folder import RESULT
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
-from rig.motion.geometry import OfJoints
 
 SCHEMA: Final = "rig.result/1"
 SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,000

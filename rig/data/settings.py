@@ -17,12 +17,11 @@ from pydantic import Field, model_validator
 from rig.config.judged_by import OF_SENSORS, NonNegative, ObservationKeys, OfSensor, UncertaintyKeys, as_recorded
 from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
-from rig.data.checked import Finite, Positive, checked, parsed
+from rig.data.checked import Finite, OfJoints, Positive, checked, parsed
 from rig.data.recorded_sensor import AS_THE_FLANGE, Mounting, check_rotation
 from rig.errors import Refused
 from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.motion.geometry import OfJoints
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import SiteSection

@@ -5,12 +5,10 @@ others. What speaks of shoulder, elbow, forearm is of an arm like the UR10e, of 
 """
 
 from dataclasses import dataclass
-from math import pi
-from typing import Annotated
+from math import isfinite, pi
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
 
 from rig.estimation.arrays import Array
 
@@ -31,27 +29,29 @@ LENGTHS = (
     "offset of wrist 3",
 )
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 MAX_JOINTS = 8
-OfJoints = Annotated[tuple[Finite, ...], Field(max_length=MAX_JOINTS)]
-Pose = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]  # a controller's: m, rotation vector in rad
+Pose = tuple[float, ...]  # a controller's, (6,): m, rotation vector in rad
 
 
 @dataclass(frozen=True, slots=True)
 class DenavitHartenberg:
     """A chain's geometry: of each of n joints, from the ground on, its zero θ, the length a, the offset d, the twist α.
 
-    Raises ValueError unless there are as many of each.
+    Raises ValueError unless there are as many of each, `MAX_JOINTS` at most, and all are finite.
     """
 
-    theta_rad: OfJoints
-    a_m: OfJoints
-    d_m: OfJoints
-    alpha_rad: OfJoints
+    theta_rad: tuple[float, ...]
+    a_m: tuple[float, ...]
+    d_m: tuple[float, ...]
+    alpha_rad: tuple[float, ...]
 
     def __post_init__(self) -> None:
         if len({len(each) for each in (self.theta_rad, self.a_m, self.d_m, self.alpha_rad)}) > 1:
             raise ValueError("a geometry has as many θ as a, d and α")
+        if self.joints > MAX_JOINTS:
+            raise ValueError(f"a geometry has at most {MAX_JOINTS} joints")
+        if not all(map(isfinite, (*self.theta_rad, *self.a_m, *self.d_m, *self.alpha_rad))):
+            raise ValueError("a geometry is of finite numbers")
 
     @property
     def joints(self) -> int:

@@ -7,9 +7,7 @@ from importlib.resources import files
 from math import inf, pi, radians
 from typing import TYPE_CHECKING, Any, Literal
 
-import yaml
-
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import JointLimits, Joints
 
@@ -58,6 +56,8 @@ class TurnerModel:
 @lru_cache
 def turner_model(key: ModelName) -> TurnerModel:
     """The model that a configuration calls so. Raises FileNotFoundError when there is none."""
+    import yaml  # here, as the process that the arm's client lives in shall start soon, and asks for no model
+
     text = files("rig.motion").joinpath("models", f"{key}.yaml").read_text(encoding="utf-8")
     row: dict[str, Any] = yaml.safe_load(text)
     joints = tuple(row["joints"])

@@ -73,3 +73,9 @@ def test_a_report_is_written_without_them(place: Path) -> None:
 def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None:
     first, last = loaded("plan", DEMO)
     assert first == [] and set(last) <= {"scipy"}  # for how small a disturbance its checks can notice
+
+
+def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_configurations() -> None:
+    command = "import rig.turners.ur.child, sys; print([n for n in ('pydantic', 'yaml', 'scipy') if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

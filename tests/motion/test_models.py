@@ -10,7 +10,7 @@ from rig.config import ranges
 from rig.config.attitude_sets import EIGHTEEN, SETS
 from rig.config.models import HOMES, ArmSection
 from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.motion.carried import carried_by
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
 from rig.motion.keep_out import clearance_problems

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.data.run_file import read_run
 from rig.motion.geometry import lengths_m
 from rig.motion.model import turner_model

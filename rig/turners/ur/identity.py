@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.errors import Problem
 from rig.motion.geometry import LENGTHS, DenavitHartenberg, lengths_m
 from rig.motion.model import TurnerModel, model_of, turner_model

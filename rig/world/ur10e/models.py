@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from math import inf, pi, radians
 from types import MappingProxyType
 
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.config.world_models import SimulatedArmSection
 from rig.world.ur10e.links import UR10E, Drawing, drawn
 from rig.world.ur10e.moments import Bodies

@@ -12,7 +12,7 @@ import pytest
 
 from rig.commands.configured import configured
 from rig.config.models import ArmSection
-from rig.config.section import ModelName
+from rig.config.ranges import ModelName
 from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
 from rig.motion.state import JointLimits
