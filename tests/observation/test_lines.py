@@ -8,14 +8,16 @@ from rig.observation.lines import fitted, lines, waves
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
 
 
-def residuals(seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0) -> np.ndarray:
+def residuals(
+    seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0, noise: float = NOISE
+) -> np.ndarray:
     """(n, 3) white noise and a vibration about one direction, of a sensor that meanwhile makes so many turns."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(COUNT) / RATE_HZ
     shaken = size * np.sqrt(2) * np.sin(2 * np.pi * hertz * time_s + rng.uniform(0, 6))
     turned = 2 * np.pi * turns * np.arange(COUNT) / COUNT
     felt = shaken[:, None] * np.column_stack([np.cos(turned), np.sin(turned), np.zeros(COUNT)])
-    return np.asarray(felt + NOISE * rng.standard_normal((COUNT, 3)))
+    return np.asarray(felt + noise * rng.standard_normal((COUNT, 3)))
 
 
 def test_white_noise_has_no_lines() -> None:
@@ -33,6 +35,16 @@ def test_of_a_vibration_hardly_more_is_left_than_the_noise(turns: float) -> None
         left = seen - columns @ fitted(columns, seen)
         assert turns or np.abs(cycles - hertz * COUNT / RATE_HZ).min() < 0.05
         assert left.std(axis=0).max() < 1.5 * NOISE  # of nine times the noise
+
+
+def test_two_vibrations_that_are_near_each_other_are_told_apart() -> None:
+    """Less than three cycles apart, of a quiet sensor that feels one of them come and go."""
+    share, quiet = np.arange(COUNT) / COUNT, NOISE / 8
+    for seed, apart_hz in enumerate(np.linspace(0.27, 0.47, 12)):
+        seen = residuals(seed, 23.0, 0.001, 1.0, quiet) + residuals(100 + seed, 23.0 + float(apart_hz), 0.001, 0.0, 0.0)
+        columns = waves(lines(seen), share)
+        left = seen - columns @ fitted(columns, seen)
+        assert left.std(axis=0).max() < 1.3 * quiet
 
 
 def test_readings_too_few_to_tell_a_line_have_none() -> None:
