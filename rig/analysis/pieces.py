@@ -20,7 +20,7 @@ from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, in_hertz, lines, swings, waves
+from rig.observation.lines import NONE, fitted, in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -29,6 +29,7 @@ from rig.observation.tapered_weights import noise_at_zero
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
+ONCE_AND_TWICE = np.array([1.0, 2.0])  # cycles: what a sensor feels comes and goes in a turn, and so do encoders err
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -173,6 +174,16 @@ def _in_the_room(rests: Sequence[tuple[Stream, Average]]) -> Array:
     return in_hertz(lines(readings - readings.mean(axis=0)), stream.time_s[inside])
 
 
+def _lines_in(readings: Array, share: Array, known_cycles: Array, *, turns: bool) -> Array:
+    """(k,) cycles of what vibrates in readings (n, 3), where a share (n,) of the time is over.
+
+    They are told beside what comes and goes smoothly in a turn: beside means of parts they would leave steps, which
+    look like slow lines of another sign each way.
+    """
+    smooth = np.column_stack([np.ones(len(readings)), waves(ONCE_AND_TWICE if turns else NONE, share, beats=0)])
+    return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles)
+
+
 def _cut(
     stream: Stream,
     motion: ArmMotion,
@@ -211,8 +222,9 @@ def _cut(
         residual = residual - shaken
     left, taken, swing_rad2 = residual, 0, np.zeros(3)
     if finds_lines:
-        cycles = lines(readings - means[part], known_cycles=room_hz * average.duration_s)
-        columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
+        share = np.arange(len(readings)) / len(readings)  # as they were found, some missing or none
+        cycles = _lines_in(readings, share, room_hz * average.duration_s, turns=turn is not None)
+        columns = waves(cycles, share)
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
         if turn is None:

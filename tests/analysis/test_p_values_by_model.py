@@ -95,6 +95,12 @@ def test_of_a_thousand_undamaged_recordings_two_fail_at_most() -> None:
     assert found.recordings >= 1000 and len(found.alarms) <= 2
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2179, 2859])  # one fast vibration; two of nearly the same frequency
+def test_what_shakes_a_quiet_gyroscope_beside_its_encoders_contradicts_nothing(seed: int) -> None:
+    assert not seen([seed], [KINDS["KVH 1775"]]).alarms
+
+
 def test_a_p_value_is_what_the_limit_is_set_by() -> None:
     from scipy.special import chdtri
 

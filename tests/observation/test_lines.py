@@ -8,9 +8,7 @@ from rig.observation.lines import fitted, lines, waves
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
 
 
-def residuals(
-    seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0, noise: float = NOISE
-) -> np.ndarray:
+def residuals(seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0, noise: float = NOISE) -> np.ndarray:
     """(n, 3) white noise and a vibration about one direction, of a sensor that meanwhile makes so many turns."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(COUNT) / RATE_HZ
