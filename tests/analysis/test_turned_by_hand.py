@@ -55,6 +55,7 @@ def test_a_hands_turns_tell_the_scale_to_a_thousandth(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.one_in(2)
 @pytest.mark.proof
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("hand", HANDS.values(), ids=HANDS)

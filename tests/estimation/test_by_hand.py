@@ -164,6 +164,7 @@ def test_twelve_flips_tell_scale_axes_and_bias() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.one_in(2)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("session", SESSIONS.values(), ids=SESSIONS)
@@ -200,6 +201,7 @@ def test_a_mistake_is_named_or_within_the_uncertainty(kind: Kind, thorough: bool
 
 
 @pytest.mark.slow
+@pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", NAMED)

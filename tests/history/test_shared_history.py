@@ -16,7 +16,7 @@ from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
 ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
-PROCESSES, ENTRIES, FEW = 8, 250, 60
+PROCESSES, ENTRIES, FEW = 8, 250, 20
 pytestmark = pytest.mark.slow
 
 

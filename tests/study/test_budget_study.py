@@ -8,6 +8,7 @@ from rig.study.report import Settings
 
 
 @pytest.mark.slow
+@pytest.mark.one_in(3)
 @pytest.mark.proof
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("noise_rad_s", [0.002, 0.035])
