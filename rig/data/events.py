@@ -196,13 +196,14 @@ def _check_sweep(sweep: Sweep) -> None:
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, *rates)
     joints = len(sweep.start_q_rad)
     possible = all(abs(number) <= LARGEST for number in numbers) and all(rate >= 1 / LARGEST for rate in rates)
-    if not (0 <= sweep.joint < joints == len(sweep.end_q_rad) and low < high and possible):
+    counted = 0 <= sweep.index <= LARGEST and 0 <= sweep.joint < joints == len(sweep.end_q_rad)
+    if not (counted and low < high and possible):
         raise ValueError(f"there is no such sweep as {quote(sweep)}")
 
 
 def _check_dwell(dwell: Dwell) -> None:
     """Raises ValueError for a dwell that cannot be."""
-    if not all(abs(number) <= LARGEST for number in (*dwell.q_rad, dwell.duration_s)):
+    if not (0 <= dwell.index <= LARGEST and all(abs(each) <= LARGEST for each in (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 

@@ -211,6 +211,14 @@ def test_a_sweep_that_no_joint_makes_is_refused(key: str, value: float) -> None:
         list(from_lines(json.dumps(first).encode() + b"\n"))
 
 
+@pytest.mark.parametrize("index", [-1, 10**9])
+def test_a_sweep_that_no_plan_counts_is_refused(index: int) -> None:
+    first = lines()[0]
+    first["detail"]["sweep"]["index"] = index
+    with pytest.raises(ValueError, match="no such sweep"):
+        list(from_lines(json.dumps(first).encode() + b"\n"))
+
+
 def column(name: str, key: str, value: float) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         rows = file[name][:]
