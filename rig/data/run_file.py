@@ -264,7 +264,8 @@ def make_plain(path: Path) -> None:
 def _contents(path: Path, timeout_s: float | None) -> Contents:
     """What the file holds, read by a process that can be ended: see `rig.data.extract`."""
     if not path.is_file():
-        raise Refused("no_run_file", f"there is no file {path}", "Give the path of a run.h5")
+        why = f"{path} is no regular file" if path.exists() else f"there is no file {path}"
+        raise Refused("no_run_file", why, "Give the path of a run.h5")
     if timeout_s is None:
         timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
     # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.

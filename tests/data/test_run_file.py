@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import os
 import signal
 import subprocess
 import sys
@@ -185,6 +186,12 @@ def test_what_is_not_a_run_file_is_refused(tmp_path: Path, content: bytes) -> No
     path.write_bytes(content)
     with pytest.raises(Refused, match="not_a_run_file"):
         read_run(path)
+
+
+def test_a_pipe_is_no_run_file_and_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "run.h5")
+    with pytest.raises(Refused, match=r"no_run_file.*is no regular file"):
+        read_run(tmp_path / "run.h5")
 
 
 def test_another_schema_is_refused(tmp_path: Path) -> None:
