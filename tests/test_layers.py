@@ -36,11 +36,13 @@ def module(room: str) -> str:
     return room.removesuffix(".py").replace("/", ".")
 
 
+@pytest.mark.slow
 def test_the_house_keeps_its_contracts(copy: Path) -> None:
     found = lint(copy)
     assert found.returncode == 0, found.stdout
 
 
+@pytest.mark.slow
 def test_a_module_that_stands_on_no_layer_is_refused(copy: Path) -> None:
     (copy / "rig" / "memory.py").write_text('"""A room nobody gave a place to."""\n', encoding="utf-8")
     view = copy / "rig" / "world_view.py"
@@ -71,6 +73,7 @@ def test_nothing_but_the_world_imports_the_emulator(copy: Path) -> None:
         assert f"{module(room)} -> firmware_host.emulator.machine" in found.stdout
 
 
+@pytest.mark.slow
 def test_a_room_does_not_import_from_the_rooms_after_it(copy: Path) -> None:
     (copy / "rig" / "observation" / "early.py").write_text(
         "from rig.analysis.verdict import Check\n\nEARLY = Check\n", encoding="utf-8"

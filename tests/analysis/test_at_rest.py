@@ -38,6 +38,7 @@ def test_random_walk_is_found_in_the_rests_between_sweeps(run: RunData) -> None:
         assert isinstance(axis.bias_instability, Fault), "seconds tell nothing of it"
 
 
+@pytest.mark.slow
 def test_a_missing_reading_parts_a_rest_in_two(run: RunData) -> None:
     whole = rates(run)
     samples = run.samples["gyro"]

@@ -80,6 +80,7 @@ def test_the_examples_are_what_their_script_makes(tmp_path: Path) -> None:
         assert path.read_text(encoding="utf-8") == (EXAMPLES / path.name).read_text(encoding="utf-8"), path.name
 
 
+@pytest.mark.slow
 def test_the_papers_accelerometer_and_a_magnetometer_are_found(capsys: pytest.CaptureFixture[str]) -> None:
     field = ["--field-t", str(np.linalg.norm(FIELD_T))]
     found = solved(capsys, example(STILL), *PLACE, *field, "--second-order")

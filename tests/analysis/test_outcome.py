@@ -67,6 +67,7 @@ def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> Non
     assert none.delay_s == 0.0
 
 
+@pytest.mark.slow
 def test_a_recording_without_sweeps_is_refused_by_name() -> None:
     with pytest.raises(Fault, match="too_few_observations: no finished sweep"):
         calibrated([replace(recorded("run.h5"), events=())])

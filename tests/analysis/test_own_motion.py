@@ -54,6 +54,7 @@ def test_the_bias_is_free_of_what_the_flanges_circling_makes_the_sensor_feel() -
     assert np.abs(bias_off(FAST, solved(FAST, reckoning=1))).max() > 3e-5
 
 
+@pytest.mark.slow
 def test_at_the_end_of_an_extension_it_circles_farther_out() -> None:
     there = solved(AT_THE_END_OF_300_MM, extension_m=(0.0, 0.0, 0.3))
     assert np.abs(bias_off(AT_THE_END_OF_300_MM, there)).max() < 1e-5

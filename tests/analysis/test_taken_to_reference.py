@@ -82,6 +82,7 @@ def test_the_settings_keep_the_reference(warmed: RunData) -> None:
     assert settings_from_json(warmed.settings.to_json()).reference_c == REFERENCE_C
 
 
+@pytest.mark.slow
 def test_an_accelerometer_in_dwells_is_taken_there_as_well() -> None:
     """A real recording's dwells, gone through at six temperatures."""
     runs = open_run(RECORDINGS / "rig.settings-6" / "bias_drift").movement

@@ -81,6 +81,7 @@ def test_blanks_about_the_equals_sign_are_told_as_what_is_wrong() -> None:
     assert done.returncode == 2 and "--set takes one word without blanks" in done.stderr, done
 
 
+@pytest.mark.slow
 def test_on_a_terminal_there_is_a_sign_of_life_at_once() -> None:
     operator, terminal = os.openpty()
     with subprocess.Popen([*PLAN.split(), "--set", "no=1"], stdout=subprocess.DEVNULL, stderr=terminal) as process:
@@ -122,6 +123,7 @@ def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() ->
     assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes determine 9 of the 14" in done.stderr, done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", ["six_observation", "verify", "static_attitudes", "imu"])
 def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str) -> None:
     done = shell(f"{sys.executable} {ROOT / 'procedures' / procedure}.py --help")

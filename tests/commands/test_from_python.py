@@ -17,6 +17,7 @@ from support.paths import CONFIGS, DEMO, FIXTURES
 from support.worlds import World, hardware
 
 
+@pytest.mark.slow
 def test_a_plan_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     changed = {"procedure.speed_deg_s": 90, "procedure.rest_s": 1e-5 + 3}
     plan = rig.plan(DEMO, changed)

@@ -58,6 +58,7 @@ def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: py
     assert "LSM9DS1-CI" in told(capsys) and "ADIS16465-001" in told(capsys, "list")
 
 
+@pytest.mark.slow
 def test_a_recording_without_a_result_is_solved_on_request(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path(place).parent / "run"
     folder.mkdir()
@@ -92,6 +93,7 @@ def test_a_result_that_was_changed_in_the_database_is_named(year: str, capsys: p
     assert "changed: run 3, calibration 3: " in told(capsys, "verify", status=1)
 
 
+@pytest.mark.slow
 def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     printed = told(capsys, "G-1")
     assert "drift a year" in printed and "U is that of noise alone" in printed

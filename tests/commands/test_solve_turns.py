@@ -61,6 +61,7 @@ def test_what_nothing_shows_must_be_told(tmp_path: Path, capsys: pytest.CaptureF
     assert "acceleration_m_s2" not in {size["name"] for size in found["by_hand"]["sizes"]}
 
 
+@pytest.mark.slow
 def test_a_real_session_tells_its_own_accuracy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its README: turns alone and flips alone disagree by 2e-3."""
     found = solved(capsys, unpacked("imucal", "samples.csv", tmp_path), *CLOCK)

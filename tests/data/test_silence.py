@@ -72,6 +72,7 @@ def test_where_nothing_is_known_of_a_process_every_tick_counts() -> None:
         assert ticks_of(Silence(ended.pid, spared=SPARED), 4) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
 def test_ticks_in_which_the_process_waited_for_a_processor_do_not_count_for_ever() -> None:
     busy = "while True: pass"

@@ -33,6 +33,7 @@ def housings(seed: int, moment_a_m2: float) -> list[dict[str, object]]:
     return [{**each, "moment_a_m2": (moment_a_m2 * direction(rng)).tolist()} for each in (HOUSING, other)]
 
 
+@pytest.mark.slow
 def test_in_a_uniform_field_no_estimate_is_worse_than_its_bound() -> None:
     found = [seen(seed) for seed in range(SEEDS)]
     errors = np.array([[*(e.solution.matrix - e.matrix).ravel(), *(e.solution.bias - e.bias_t)] for e in found])

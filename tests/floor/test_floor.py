@@ -91,6 +91,7 @@ def test_what_is_nothing_a_station_says_is_shown_as_that_and_hides_no_other_rig(
     assert b'"doing":"?"' in frame_of("all", {"rigs": [half_a_character]})
 
 
+@pytest.mark.slow
 def test_todays_parts_standards_and_recalls_are_those_of_the_history(tmp_path: Path) -> None:
     with open_history(str(tmp_path / "history.sqlite")) as history:
         for day in range(12):

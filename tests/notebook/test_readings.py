@@ -33,6 +33,7 @@ def test_an_accelerometer_is_read_beside_its_gyroscope(imu: rig.Readings) -> Non
     assert 10 < imu.temperature.values.mean() < 50 and imu.temperature.values.ndim == 1
 
 
+@pytest.mark.slow
 def test_a_magnetometer_is_read_on_the_arms_clock(magnetic: rig.Run) -> None:
     name = next(name for name in magnetic if "field" in magnetic[name].quantities)
     field = magnetic[name].field

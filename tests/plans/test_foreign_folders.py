@@ -142,6 +142,7 @@ def test_a_result_of_millions_of_wrong_values_is_refused_before_they_are_told(
     assert refused.returncode in (1, 2) and "it holds over 200000 values" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_recording_with_an_endless_text_is_refused(foreign: Path) -> None:
     with h5py.File(foreign / "run.h5", "r+", libver="latest") as file:
         file.attrs["config"] = "# " + "x" * 2_000_000
@@ -211,6 +212,7 @@ def test_a_recording_full_of_holes_is_refused(foreign: Path) -> None:
     assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and " bytes to " in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("time_s", "name"), [(3e7, "impossible_times"), (float("nan"), "not_finite")])
 def test_a_recording_that_claims_to_last_for_a_year_is_not_replayed(foreign: Path, time_s: float, name: str) -> None:
     with h5py.File(foreign / "run.h5", "r+") as file:

@@ -27,6 +27,7 @@ def outcome() -> Outcome:
     return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
 
 
+@pytest.mark.slow
 def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     old = json.loads((FIXTURES / "calibration" / "result.json").read_text(encoding="utf-8"))
     new = json.loads(document_of(outcome).text())

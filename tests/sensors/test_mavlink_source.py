@@ -97,6 +97,7 @@ def test_three_imus_at_one_port_are_read_at_once() -> None:
                 assert rates.mean(axis=0) == pytest.approx(np.negative(BIAS_RAD_S), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> None:
     with autopilot_on_a_wire() as wire, Listening({"imu": section(wire.port)}) as heard:
         wire.faults.doubled = 0.3

@@ -99,6 +99,7 @@ def ticks(robot: Robot, time_s: float) -> None:
         robot.step()
 
 
+@pytest.mark.slow
 def test_a_change_of_the_safety_mode_is_told_at_the_primary_interface(robot: Robot) -> None:
     session = PrimarySession(robot)
     robot.protective_stop()

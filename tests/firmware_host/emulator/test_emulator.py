@@ -112,6 +112,7 @@ def test_bytes_come_at_the_pace_of_the_line() -> None:
     np.testing.assert_allclose(np.diff(arrivals_s), byte_s, atol=1.1 * tick_s)
 
 
+@pytest.mark.slow
 def test_noise_on_the_line_harms_nothing() -> None:
     session = Session()
     session.run(0.2)
@@ -125,6 +126,7 @@ def test_noise_on_the_line_harms_nothing() -> None:
     assert session.ask("status").values["rx_errors"] > 20
 
 
+@pytest.mark.slow
 def test_reboot_starts_the_image_afresh() -> None:
     session = Session()
     session.run(0.2)
@@ -245,6 +247,7 @@ def test_an_access_may_be_right_many_times_before_it_is_wrong(tmp_path: Path) ->
     assert "unaligned access by address 0x20000101" in error.what
 
 
+@pytest.mark.slow
 def test_memory_is_not_zero_at_power_up(tmp_path: Path) -> None:
     source = "uint8_t bytes[8]; int main(void) { setup(); for (int i = 0; i < 8; i++) put(bytes[i]); for (;;); }"
     assert run(source, tmp_path) == b"\xa5" * 8

@@ -72,6 +72,7 @@ def test_each_tells_its_own_truth_in_its_own_counts() -> None:
         assert np.all(np.abs(counts * per_count[part] - reading) <= 0.5 * per_count[part])
 
 
+@pytest.mark.slow
 def test_accelerations_of_all_come_along_in_the_same_axes_without_a_loss() -> None:
     """Motion and truth are in right-handed axes, and so is what arrives, of the LSM9DS1 too."""
     force_g = (0.5, -0.3, 0.8)

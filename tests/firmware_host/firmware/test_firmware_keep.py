@@ -90,6 +90,7 @@ def test_an_observation_is_the_mean_of_exactly_the_samples_it_names() -> None:
     assert observed["mean_rad_s"] == pytest.approx(counts[used].mean(axis=0) * RAD_S, rel=3e-7, abs=1e-7)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.floats(0.5, 60.0), st.integers(0, 250), st.integers(1, 250), st.integers(0, PERIOD_US))
 def test_whole_blocks_within_the_span_are_averaged_whatever_their_length(

@@ -58,6 +58,7 @@ def test_three_sensors_stream_at_their_own_rates_with_their_own_time_stamps_and_
         assert batches[-1].values["dropped"] == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(st.lists(st.sampled_from(("read", "late", "stale", "line busy")), min_size=1, max_size=120), st.integers(1, 9))
 def test_every_conversion_of_every_sensor_is_received_or_counted_as_dropped(fates: list[str], stride: int) -> None:
