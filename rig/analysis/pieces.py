@@ -29,7 +29,7 @@ from rig.observation.tapered_weights import noise_at_zero
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
-ONCE_AND_TWICE = np.array([1.0, 2.0])  # cycles: what a sensor feels comes and goes in a turn, and so do encoders err
+ONCE_AND_TWICE = (1, 2)  # cycles: what a sensor feels comes and goes in a turn, and so do encoders err
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -180,7 +180,9 @@ def _lines_in(readings: Array, share: Array, known_cycles: Array, *, turns: bool
     They are told beside what comes and goes smoothly in a turn: beside means of parts they would leave steps, which
     look like slow lines of another sign each way.
     """
-    smooth = np.column_stack([np.ones(len(readings)), waves(ONCE_AND_TWICE if turns else NONE, share, beats=0)])
+    turn = 2 * np.pi * share
+    turning = [wave(times * turn) for times in ONCE_AND_TWICE for wave in (np.cos, np.sin)] if turns else []
+    smooth = np.column_stack([np.ones(len(readings)), *turning])
     return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles)
 
 
