@@ -20,7 +20,7 @@ from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, fitted, in_hertz, lines, swings, waves
+from rig.observation.lines import NONE, SAME, fitted, in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -178,12 +178,12 @@ def _lines_in(readings: Array, share: Array, known_cycles: Array, *, turns: bool
     """(k,) cycles of what vibrates in readings (n, 3), where a share (n,) of the time is over.
 
     They are told beside what comes and goes smoothly in a turn: beside means of parts they would leave steps, which
-    look like slow lines of another sign each way.
+    look like slow lines of another sign each way. Two that are near each other do not average out in a part.
     """
     turn = 2 * np.pi * share
     turning = [wave(times * turn) for times in ONCE_AND_TWICE for wave in (np.cos, np.sin)] if turns else []
     smooth = np.column_stack([np.ones(len(readings)), *turning])
-    return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles)
+    return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles, apart_cycles=SAME)
 
 
 def _cut(

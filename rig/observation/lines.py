@@ -13,7 +13,7 @@ STANDS_OUT = 30.0  # over the median power: of noise one bin in 10⁹ does
 AROUND = 161  # bins, of which the median is taken
 MOST_LINES = 8  # three of a servo, and what shakes in the room, which a turning sensor may feel as two
 SLOWEST = 8  # cycles in all the readings: what is slower is told badly from what the parts differ by
-APART = 1.5  # cycles in all the readings, from a line that was found
+APART = 2.5  # cycles in all the readings, from a line that was found
 SAME = 1.5  # cycles in all the readings: lines that come so near each other are no lines, but a jerk
 PASSES = 2
 WIDE = 4  # columns of a line, and of each of its beats
@@ -23,11 +23,18 @@ NONE: Array = np.zeros(0)
 ALIKE = 1e-2  # columns that differ by less are one
 
 
-def lines(residuals: Array, stands_out: float = STANDS_OUT, known_cycles: Array = NONE, beats: int = BEATS) -> Array:
+def lines(
+    residuals: Array,
+    stands_out: float = STANDS_OUT,
+    known_cycles: Array = NONE,
+    beats: int = BEATS,
+    apart_cycles: float = APART,
+) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero.
 
-    A line `stands_out` so far over the median power around it, each with its `beats`: see `waves`. One that comes to be
-    another is none. Those that are known are among them, as they are.
+    A line `stands_out` so far over the median power around it, each with its `beats`: see `waves`. None is looked for
+    nearer to another than `apart_cycles`, and one that comes to be another is none. Those that are known are among
+    them, as they are.
     """
     count, merged, held = len(residuals), NONE, len(known_cycles)
     cycles = known_cycles
@@ -36,7 +43,7 @@ def lines(residuals: Array, stands_out: float = STANDS_OUT, known_cycles: Array 
     while len(cycles) < most and len(merged) < most:
         found = waves(cycles, share, beats)
         beside = np.append(cycles, merged)
-        strongest = _strongest(residuals - found @ fitted(found, residuals), beside, stands_out)
+        strongest = _strongest(residuals - found @ fitted(found, residuals), beside, stands_out, apart_cycles)
         if strongest is None:
             break
         refined = _refined(np.append(cycles, strongest), residuals, held, beats)
@@ -89,7 +96,7 @@ def swings(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     return found
 
 
-def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
+def _strongest(left: Array, known: Array, stands_out: float, apart_cycles: float) -> float | None:
     """Cycles of the line in readings (n, 3) that stands out most; None where there is none beside those known."""
     from scipy.ndimage import median_filter
 
@@ -98,7 +105,7 @@ def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
     around = np.column_stack([median_filter(axis, AROUND) for axis in powers.T])  # in one dimension it takes a tenth
     powers /= around + np.finfo(np.float64).tiny  # noise may have a colour
     bins = np.arange(len(powers))
-    free = (bins >= SLOWEST) & (bins < len(powers) - 1) & (np.abs(bins[:, None] - known) > APART).all(axis=1)
+    free = (bins >= SLOWEST) & (bins < len(powers) - 1) & (np.abs(bins[:, None] - known) > apart_cycles).all(axis=1)
     best = int(np.argmax(np.where(free, powers.max(axis=1), 0.0)))
     axis = int(np.argmax(powers[best]))
     if not (free[best] and powers[best, axis] > stands_out):
