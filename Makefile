@@ -37,7 +37,7 @@ DIST := worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
 # of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011. Nothing waits there.
-NUMERIC := -n 2 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
+NUMERIC := -n 2 --dist worksteal -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
   tests/history/test_store.py
 
 system:
