@@ -20,7 +20,7 @@ from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, SAME, fitted, in_hertz, lines, swings, waves
+from rig.observation.lines import NONE, SAME, fitted, in_hertz, lines, swings, turning, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -29,7 +29,7 @@ from rig.observation.tapered_weights import noise_at_zero
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
-ONCE_AND_TWICE = (1, 2)  # cycles: what a sensor feels comes and goes in a turn, and so do encoders err
+TWICE = 2  # in a turn, at most, what a sensor feels comes and goes, and encoders err
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -180,9 +180,7 @@ def _lines_in(readings: Array, share: Array, known_cycles: Array, *, turns: bool
     They are told beside what comes and goes smoothly in a turn: beside means of parts they would leave steps, which
     look like slow lines of another sign each way. Two that are near each other do not average out in a part.
     """
-    turn = 2 * np.pi * share
-    turning = [wave(times * turn) for times in ONCE_AND_TWICE for wave in (np.cos, np.sin)] if turns else []
-    smooth = np.column_stack([np.ones(len(readings)), *turning])
+    smooth = np.column_stack([np.ones(len(readings)), turning(2 * np.pi * share, TWICE if turns else 0)])
     return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles, apart_cycles=SAME)
 
 

@@ -79,6 +79,12 @@ def waves(cycles: Array, share: Array, beats: int = BEATS) -> Array:
     return columns.reshape(len(share), wide(beats) * len(cycles))
 
 
+def turning(turned_rad: Array, most: int) -> Array:
+    """(n, 2 most) cosine and sine of what comes once, twice, up to `most` times in a turn, at its angles (n,)."""
+    each = [wave(times * turned_rad) for times in range(1, most + 1) for wave in (np.cos, np.sin)]
+    return np.reshape(each, (2 * most, len(turned_rad))).T
+
+
 def fitted(columns: Array, values: Array) -> Array:
     """(k, m) least squares of values (n, m) by such columns (n, k), some of which may be nearly alike."""
     return np.asarray(np.linalg.lstsq(columns, values, rcond=ALIKE)[0], dtype=np.float64)

@@ -27,6 +27,7 @@ from rig.observation.arm_beside_lines import turned_beside
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
 from rig.observation.averaging import Averaging, Passing, averaging_of
 from rig.observation.known_motion import Motion
+from rig.observation.lines import turning
 from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
@@ -221,8 +222,7 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-    often = range(1, 2 * turn.beats + 1)
-    waves = np.array([wave(times * turned_rad) for times in often for wave in (np.cos, np.sin)]).T
+    waves = turning(turned_rad, 2 * turn.beats)
     if not turn.closed:
         waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
     passing = Passing(
