@@ -26,6 +26,7 @@ LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and mo
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
+SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
 FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
 SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0  # then, and so often, what is left is gone at once, at most so far
 
@@ -224,7 +225,7 @@ def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: Know
         before, last = clock, moved
         clock = _refined(clock, board_time_s, readings, motion)
         moved = np.array([clock.offset_s - before.offset_s, clock.drift - before.drift])
-        if abs(moved[0]) < 1e-3 * clock.offset_std_s:
+        if abs(moved[0]) < SETTLED * clock.offset_std_s and abs(moved[1]) < UNDERWAY * clock.drift_std:
             return clock
         if number >= SLOW_STEPS and number % LEAP_STEPS == 0:
             further = moved * _left_to_go(float(moved[0] / last[0]))
