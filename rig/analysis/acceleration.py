@@ -19,6 +19,7 @@ from rig.estimation.accelerometer import solve_accelerometer, specific_force
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
+from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
@@ -158,7 +159,7 @@ def _calibrated(
         sheet = sheet_of(settings.uncertainty, name, sensor.part, end_of_scale)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
-        movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
+        movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
     weighted = or_fault(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
         check_axes(SensorAxes.of(weighted.matrix).axes, np.eye(3))
@@ -173,6 +174,7 @@ def _calibrated(
         repeatability_rad=movement.repeatability_rad,
         own=movement.own,
         arm_turns=movement.arm_turns,
+        own_shares=OWN_SHARES if settings.finds_own_share else (movement.own_share,),
     )
     axes = SensorAxes.of(solution.matrix)
     check_axes(axes.axes, np.eye(3))

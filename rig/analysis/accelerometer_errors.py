@@ -11,7 +11,7 @@ from rig.config.judged_by import OfSensor
 from rig.data.budget_entries import IN_U
 from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.settings import Uncertainty
+from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
@@ -139,12 +139,12 @@ def with_errors(
     sheet: Sheet,
     arm: DenavitHartenberg,
     *,
-    second_order: bool,
+    settings: RunSettings,
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
-    own = errors_of(sheet, pieces, sensor.channel(TEMPERATURE).resolution, second_order=second_order)
+    own = errors_of(sheet, pieces, sensor.channel(TEMPERATURE).resolution, second_order=settings.second_order)
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
-    return replace(movement, own=own, arm_turns=turns)
+    return replace(movement, own=replace(own, disturbed_share=settings.disturbed_share), arm_turns=turns)
 
 
 def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -> tuple[Spread, list[Contributor]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.vector_inputs import WAVE_SHARE
-from rig.estimation.accelerometer_model import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
+from rig.estimation.accelerometer_model import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 from rig.estimation.arrays import Array
 from rig.motion.geometry import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
 
@@ -45,7 +45,7 @@ def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known
 
 def arm_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
     """(18, 3 N + 10 M) `arm_turns` of a `Movement`, for an arm that is off by δ = 1."""
-    turns: Array = ARM_SHARE * _shares()[:, None] * _all_turns(stood, arm, mounting)
+    turns: Array = _shares()[:, None] * _all_turns(stood, arm, mounting)
     return turns
 
 

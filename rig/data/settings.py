@@ -32,7 +32,7 @@ SCHEMA = "rig.settings/7"
 # The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found,
 # the fifth no extension, the sixth one way of reckoning.
 SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
-RECKONING = 2  # of new recordings; see `RunSettings`
+RECKONING = 3  # of new recordings; see `RunSettings`
 
 Vector3 = tuple[Finite, Finite, Finite]
 
@@ -183,8 +183,10 @@ class RunSettings:
     beyond the noise. `second_order` says that accelerometers are looked for terms of that order, `finds_earth_rate`
     that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
     the extension ends on which the sensors sit, in the flange's frame. `reckoning` numbers the way of solving and
-    checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, what
-    docs/uncertainty.md says of today. `home_q_rad` are the angles of the turner's joints, of which there may be none.
+    checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, dwells are averaged
+    as before, one of a run's is as likely disturbed as not, and a fifth of what the arm is off by is new in each; 3,
+    what docs/uncertainty.md says of today.
+    `home_q_rad` are the angles of the turner's joints, of which there may be none.
     Readings from `elsewhere` have no home and no limits.
 
     `mounts` are the nominal rotations from the flange's frame to the item's in the stages of the procedure, of which
@@ -282,6 +284,21 @@ class RunSettings:
     def leaves_dwells_early(self) -> bool:
         """Whether a dwell's last readings are left out."""
         return self.reckoning >= 2
+
+    @property
+    def dwells_beside_lines(self) -> bool:
+        """Whether what vibrates in a dwell is taken out of its noise as lines, as in a gyroscope's rest."""
+        return self.reckoning >= 3
+
+    @property
+    def finds_own_share(self) -> bool:
+        """Whether the readings tell how much of what an arm is off by is new in each dwell."""
+        return self.reckoning >= 3
+
+    @property
+    def disturbed_share(self) -> float:
+        """The share of runs in which a dwell, or the sweeps, are disturbed: what is believed before they are seen."""
+        return 1 / 20 if self.reckoning >= 3 else 1 / 2
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.

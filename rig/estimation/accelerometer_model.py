@@ -33,7 +33,7 @@ PARAMETERS = 22
 OWN_ERRORS = 3  # of a dwell: a small turn of the flange
 SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
 TURNS = 6  # of these ten, both turns
-OWN_SHARE, ARM_SHARE = 0.2**0.5, 0.8**0.5  # of δ, in what is off anew each time, and in what each wrist always errs by
+OWN_SHARE = 0.2  # of δ², in what is off anew in each dwell; the others are what each wrist always errs by
 SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
 
 
@@ -91,7 +91,7 @@ class Movement:
     axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
     `own`: what the sensor itself adds; None of recordings of before, and of sensors of which nothing is known.
     `arm_turns` (P, 3 N + 10 M): what P errors of the arm's do to each dwell and sweep, by δ, as `effects` counts their
-    turns; None where nothing is known of the arm but that it errs.
+    turns; None where nothing is known of the arm but that it errs. `own_share` of δ² is off anew in each dwell.
     """
 
     dwells: Dwells
@@ -99,6 +99,7 @@ class Movement:
     repeatability_rad: float = 0.0
     own: AccelerometerErrors | None = None
     arm_turns: Array | None = None
+    own_share: float = OWN_SHARE
 
     def without(self, dwell: int) -> "Movement":
         """The movement with all but one dwell."""
@@ -207,11 +208,22 @@ def effects(theta: Array, movement: Movement) -> Array:
     and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept. Where
     the wrists' errors are known by kind they follow, shared by all.
     """
+    return shared_out(*new_and_always(theta, movement), movement.own_share)
+
+
+def new_and_always(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
+    """The columns of `effects` by what is off anew each time, and by what each wrist always errs by, if it is known."""
     own = turned(theta, movement)
     if movement.arm_turns is None:
+        return own, None
+    return own, turned(theta, replace(movement, sweeps=movement.sweeps.alone())) @ movement.arm_turns.T
+
+
+def shared_out(own: Array, always: Array | None, own_share: float) -> Array:
+    """(3 K, P) both together, of δ² as they share it."""
+    if always is None:
         return own
-    by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
-    return np.concatenate([OWN_SHARE * own, by_turns @ movement.arm_turns.T], axis=1)
+    return np.concatenate([np.sqrt(own_share) * own, np.sqrt(1 - own_share) * always], axis=1)
 
 
 def turned(theta: Array, movement: Movement) -> Array:

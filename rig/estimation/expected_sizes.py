@@ -5,7 +5,7 @@ How far an arm is off, how far a bias walks, and what disturbed one dwell alone:
 and too large in the next, and so would be every uncertainty.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
 SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the first
 
+OWN_SHARES = (1e-3, 1e-2, 1e-1, 1.0)  # of δ²: an arm's errors may nearly all come back, or none
 LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
 
 
@@ -24,43 +25,58 @@ LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the no
 class Scattered:
     """What a fit leaves (n,) of readings, its columns `slopes` (n, q), and what is known of their errors.
 
-    `known` (n, n) is the covariance without arm and walk, `effects` (n, P) what the arm's errors do, `walk` (n, n) the
-    covariance of a walk of rate 1; `noise` (n,) the variances of the readings' own, by which a walk's order of
-    magnitude is reckoned.
+    `known` (n, n) is the covariance without arm and walk, `effects(share)` (n, P) what the arm's errors do of which
+    that share is new in each dwell, `walk` (n, n) the covariance of a walk of rate 1; `noise` (n,) the variances of the
+    readings' own, by which a walk's order of magnitude is reckoned.
     """
 
     left: Array
     slopes: Array
     known: Array
-    effects: Array
+    effects: Callable[[float], Array]
     walk: Array
     noise: Array
 
 
-def expected_sizes(seen: Scattered, std_rad: float | None) -> tuple[float, float]:
-    """The walk's rate, and δ: root mean squares over all, each as likely as it makes the readings.
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Of the walk, in a second; δ; and which share of δ² is new in each dwell."""
 
-    Before, the walk was as likely to be there as not, and both were of any order of magnitude. `std_rad` holds δ.
+    walk: float
+    std_rad: float
+    own_share: float
+
+
+def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[float]) -> Sizes:
+    """Mean squares over all sizes, each as likely as it makes the readings.
+
+    Before, the walk was as likely to be there as not, it and δ were of any order of magnitude, and each of the `shares`
+    was as likely as the others. `std_rad` holds δ.
     """
     standing = np.diag(seen.walk) > 0
     typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
     walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES) if std_rad is None else np.array([std_rad])
-    belief = np.array([_likelihood(seen, seen.known + rate**2 * seen.walk, sizes) for rate in walks])
-    belief[1:] -= np.log(WALKS)
+    belief = np.array(
+        [
+            [_likelihood(seen, seen.known + rate**2 * seen.walk, seen.effects(share), sizes) for rate in walks]
+            for share in shares
+        ]
+    )
+    belief[:, 1:] -= np.log(WALKS)
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
-    return float(np.sqrt(weights.sum(axis=1) @ walks**2)), float(np.sqrt(weights.sum(axis=0) @ sizes**2))
+    walked, turned = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
+    return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(turned @ shares / turned.sum()))
 
 
-def expected_disturbances(seen: Scattered, walk: float, std_rad: float, causes: Sequence[Array]) -> Array:
+def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array], share: float) -> Array:
     """(k,) variance of each of the `causes`, of which (n, …) are the columns by one standard deviation.
 
-    Before, one of them was as likely to be there as none, by any order of magnitude.
+    Before, one of them was there in that `share` of runs, by any order of magnitude.
     """
-    white = np.linalg.inv(
-        np.linalg.cholesky(seen.known + walk**2 * seen.walk + std_rad**2 * seen.effects @ seen.effects.T)
-    )
+    effects = sizes.std_rad * seen.effects(sizes.own_share)
+    white = np.linalg.inv(np.linalg.cholesky(seen.known + sizes.walk**2 * seen.walk + effects @ effects.T))
     basis = np.linalg.qr(white @ seen.slopes)[0]
     left = white @ seen.left
     left = left - basis @ (basis.T @ left)
@@ -69,20 +85,20 @@ def expected_disturbances(seen: Scattered, walk: float, std_rad: float, causes: 
     for place, columns in enumerate(causes):
         told = white @ columns
         told = told - basis @ (basis.T @ told)
-        sizes, directions = np.linalg.eigh(told.T @ told)
+        growth, directions = np.linalg.eigh(told.T @ told)
         along = np.square(directions.T @ (told.T @ left))
-        grown = 1 + volumes[:, None] * sizes.clip(min=0.0)
+        grown = 1 + volumes[:, None] * growth.clip(min=0.0)
         belief[place] = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
     belief -= np.log(belief.size)
     most = max(float(belief.max()), 0.0)
     weights = np.exp(belief - most)
-    expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))
+    expected: Array = weights @ volumes / (weights.sum() + (1 - share) / share * np.exp(-most))
     return expected
 
 
-def _likelihood(seen: Scattered, noise: Array, sizes: Array) -> Array:
+def _likelihood(seen: Scattered, noise: Array, effects: Array, sizes: Array) -> Array:
     """(k,) logarithms of the restricted likelihood, up to a constant, for `sizes` (k,) of δ."""
-    found = apart(noise, seen.effects)
+    found = apart(noise, effects)
     basis, triangle = np.linalg.qr(found.turn @ seen.slopes)
     left = found.turn @ seen.left
     left = left - basis @ (basis.T @ left)  # the likelihood does not know what the columns explain

@@ -6,6 +6,7 @@ it says. Each dwell is turned by small angles of its own, the points of a sweep 
 common size δ: restricted likelihood over dwells and sweeps together finds it (`rig.estimation.shared_errors`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from rig.estimation.accelerometer_model import (
     LEVER,
     NO_DWELLS,
     NO_SWEEPS,
+    OWN_SHARE,
     PARAMETERS,
     SECOND,
     Dwells,
@@ -52,7 +54,7 @@ class ImuSolution:
     - `dwell_residuals_m_s2` (N, 3): reading less model; `chi_square` of these and of the sweeps', which
       left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
-    - `own`: what the sensor adds, with what the readings say of it; None where nothing is known.
+    - `own`: what the sensor adds, with what the readings say of it; None where nothing is known. `own_share`: of δ².
     """
 
     matrix: Array
@@ -72,6 +74,7 @@ class ImuSolution:
     iterations: int
     warnings: tuple[str, ...]
     own: AccelerometerErrors | None = None
+    own_share: float = OWN_SHARE
 
     @property
     def theta(self) -> Array:
@@ -96,12 +99,13 @@ def solve_imu(
     repeatability_rad: float = 0.0,
     own: AccelerometerErrors | None = None,
     arm_turns: Array | None = None,
+    own_shares: Sequence[float] = (OWN_SHARE,),
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
     `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`,
-    `arm_turns`: see `Movement`.
+    `arm_turns`: see `Movement`; of `own_shares` the readings tell which.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
@@ -119,7 +123,9 @@ def solve_imu(
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
         if own is not None:
-            movement, fit = as_expected(fit, movement, own, held, attitude_std_rad)
+            movement, fit = as_expected(
+                fit, movement, own, held, attitude_std_rad=attitude_std_rad, own_shares=own_shares
+            )
         covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
@@ -148,6 +154,7 @@ def solve_imu(
         condition=told.condition,
         iterations=fit.iterations,
         own=movement.own,
+        own_share=movement.own_share,
         warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
     )
 

@@ -1,11 +1,24 @@
 """The most likely θ of `rig.estimation.accelerometer_model`, and how well the readings tell it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rig.estimation.accelerometer_errors import AccelerometerErrors
-from rig.estimation.accelerometer_model import DELAY, LEVER, PARAMETERS, SECOND, Movement, effects, jacobian, predicted
+from rig.estimation.accelerometer_model import (
+    DELAY,
+    LEVER,
+    PARAMETERS,
+    SECOND,
+    Movement,
+    effects,
+    jacobian,
+    new_and_always,
+    predicted,
+    shared_out,
+)
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import PASSES, SETTLED
 from rig.estimation.expected_sizes import Scattered, expected_disturbances, expected_sizes
@@ -95,21 +108,29 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
 
 
 def as_expected(
-    fit: Fit, movement: Movement, own: AccelerometerErrors, held: list[int], attitude_std_rad: float | None
+    fit: Fit,
+    movement: Movement,
+    own: AccelerometerErrors,
+    held: list[int],
+    *,
+    attitude_std_rad: float | None,
+    own_shares: Sequence[float],
 ) -> tuple[Movement, Fit]:
-    """Movement and fit with the walk of the bias, the δ and the disturbances to be expected by what the fit leaves."""
+    """Movement and fit with the sizes to be expected by what the fit leaves, and disturbances."""
     left = (movement.readings() - predicted(fit.theta, movement)).ravel()
-    known, of_arm, alike = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
+    known, alike = noise(fit.theta, movement), np.diag(movement.noise())
+    of_arm = partial(shared_out, *new_and_always(fit.theta, movement))
     scattered = Scattered(left, fit.jacobian, known, of_arm, walking(own, movement), alike)
-    walk, delta = expected_sizes(scattered, attitude_std_rad)
+    sizes = expected_sizes(scattered, attitude_std_rad, own_shares)
     unit = float(np.sqrt(np.median(alike)))
     alone = [np.diag(np.sqrt(alike))[:, piece] for piece in movement.pieces()]
-    *louder, turning = expected_disturbances(scattered, walk, delta, [*alone, unit * in_sweeps(movement)])
+    causes = [*alone, unit * in_sweeps(movement)]
+    *louder, turning = expected_disturbances(scattered, sizes, causes, own.disturbed_share)
     disturbed = replace(
-        own, walk_m_s2_sqrt_s=walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
+        own, walk_m_s2_sqrt_s=sizes.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )
-    movement = replace(movement, own=disturbed)
-    found = most_likely(fit.theta, movement, held, delta)
+    movement = replace(movement, own=disturbed, own_share=sizes.own_share)
+    found = most_likely(fit.theta, movement, held, sizes.std_rad)
     readings = apart(noise(found.theta, movement), effects(found.theta, movement))
     return movement, replace(found, readings=readings, iterations=fit.iterations + found.iterations)
 

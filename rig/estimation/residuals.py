@@ -32,7 +32,7 @@ def residual_std_rad_s(explained: Explained) -> Array:
 
 def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
     """(N, 3) standard deviations of what is left in an accelerometer's dwells, solved from the `movement`."""
-    movement, theta = replace(movement, own=solution.own), solution.theta
+    movement, theta = replace(movement, own=solution.own, own_share=solution.own_share), solution.theta
     arm = solution.attitude_error.std_rad * accelerometer_model.effects(theta, movement)
     fit = accelerometer_model.jacobian(theta, movement) @ solution.response
     return _left(fit, noise(theta, movement) + arm @ arm.T)[: len(movement.dwells.readings_m_s2)]

@@ -13,8 +13,9 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, between
+from rig.observation.averaging import Averaging, dwelling_of
 from rig.observation.known_motion import Motion
-from rig.observation.mean import Mean, mean_at_rest
+from rig.observation.mean import Mean
 from rig.observation.windows import Dwelt, Window, dwelt
 
 MAX_DWELL_TRAVEL_RAD = 1e-3  # of any joint, while it stands
@@ -46,7 +47,7 @@ def dwell_readings(
     """
     for each in dwelt(run):
         if each.dwell.index not in superseded:
-            yield dwell_reading(stream, motion, without_leaving(run, each), settings)
+            yield dwell_reading(stream, motion, without_leaving(run, each), settings, dwelling_of(run.settings))
 
 
 def each_dwell(
@@ -58,7 +59,8 @@ def each_dwell(
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
         try:
-            found[each.dwell.index] = dwell_reading(stream, motion, without_leaving(run, each), settings)
+            finished = without_leaving(run, each)
+            found[each.dwell.index] = dwell_reading(stream, motion, finished, settings, dwelling_of(run.settings))
         except Fault as fault:
             found[each.dwell.index] = fault
     return found
@@ -97,8 +99,10 @@ def _is_noisy(stream: Stream) -> bool:
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
 
-def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds) -> DwellReading:
-    """One finished dwell. Raises Fault as `dwell_readings` does."""
+def dwell_reading(
+    stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds, averaging: Averaging
+) -> DwellReading:
+    """One finished dwell, averaged in such a way. Raises Fault as `dwell_readings` does."""
     dwell, window = finished.dwell, finished.window
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = between(stream, window.start_s, window.end_s)
@@ -107,7 +111,7 @@ def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: Obs
     check_acceleration(stream, inside, where)
     readings = accelerations(stream, inside)
     count = stream.sensor.channel(ACCELERATION).resolution_of(readings)
-    reading, _ = mean_at_rest(readings, stream.time_s[inside], window, count)
+    reading, _ = averaging.rested(readings, stream.time_s[inside], window, count)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,

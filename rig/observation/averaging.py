@@ -57,6 +57,11 @@ def averaging_of(settings: RunSettings) -> Averaging:
     return BESIDE_LINES if settings.averages_beside_lines else AUTOREGRESSIVE
 
 
+def dwelling_of(settings: RunSettings) -> Averaging:
+    """The way a recording's dwells are averaged."""
+    return BESIDE_LINES if settings.dwells_beside_lines else AUTOREGRESSIVE
+
+
 def _turned_correlated(readings: Array, count: float | Array, passing: Passing) -> Mean:
     """Takes what comes once or twice in a turn for noise, and all that vibrates."""
     return mean_of(readings, count, passing.rate_rad_s[:, None], passing.covered, left_by_correlations)

@@ -112,8 +112,8 @@ def test_how_well_the_encoders_tell_arcs_can_be_stated_anew() -> None:
 
 def test_a_recording_of_before_can_be_reckoned_as_of_today() -> None:
     text = json.dumps({**json.loads(settings().to_json()), "schema": "rig.settings/6"})
-    before = settings_from_json(text.replace('"reckoning": 2', '"reckoning": 1'))
-    assert before.reckoning == 1 and before.with_overrides(["reckoning=2"]).reckoning == settings().reckoning == 2
+    before = settings_from_json(text.replace('"reckoning": 3', '"reckoning": 1'))
+    assert before.reckoning == 1 and before.with_overrides(["reckoning=3"]).reckoning == settings().reckoning == 3
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import flicker_covariance
 from rig.estimation.budget import Budget
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reading_errors import of_pieces, of_sensor, per_axis
 from rig.motion.geometry import NOMINAL, WRIST_1
@@ -124,7 +125,12 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
     """The solution, its budget, and by how much scale and bias (6,) are off."""
     movement = session.movement
     solution = solve_imu(
-        movement.dwells, movement.sweeps, gravity_m_s2=GRAVITY, own=movement.own, arm_turns=movement.arm_turns
+        movement.dwells,
+        movement.sweeps,
+        gravity_m_s2=GRAVITY,
+        own=movement.own,
+        arm_turns=movement.arm_turns,
+        own_shares=OWN_SHARES,
     )
     freedom = np.full(movement.readings().size, AVERAGED)
     budget = accelerometer_budget(solution, movement, SITE, 0.0, sheet=sheet_of(session.part), noise_freedom=freedom)
