@@ -1,7 +1,8 @@
 """The uncertainty that a plan's attitudes, and its sweeps, will reach of accelerometers, before it is run. Pure.
 
-The plan says what is felt, the data sheet how readings scatter; the arm is as far off as is stated of its axes. What
-readings alone tell is left out: how a bias wandered beside its flicker, and what disturbed single readings.
+The plan says what is felt, the data sheet how readings scatter; the arm is as far off as is stated of its axes, and as
+far anew in each dwell as is stated of its repeatability. What readings alone tell is left out: how a bias wandered
+beside its flicker, and what disturbed single readings.
 """
 
 from dataclasses import replace
@@ -12,9 +13,11 @@ from rig.analysis.accelerometer_errors import FLICKER
 from rig.analysis.planned_reference import PlannedAccelerometer, planned_accelerometers, planned_read
 from rig.analysis.reference_budgets import accelerometer_lines
 from rig.config.models import RigConfig
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import scale_of
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import Budget
+from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_budget import Spread, scale_and_bias
 from rig.estimation.reference_model import matrix
@@ -45,10 +48,17 @@ def predicted_accelerations(
 def _budget(of: PlannedAccelerometer) -> Budget:
     read, known = planned_read(of), of.known
     off_rad = float(np.radians(known.axis_deg) / np.sqrt(3))
-    covariance, response = covariance_bound(read.theta, read.movement, off_rad, second_order=of.settings.second_order)
+    movement = replace(read.movement, own_share=_own_share(known))
+    covariance, response = covariance_bound(read.theta, movement, off_rad, second_order=of.settings.second_order)
     scale = scale_of(matrix(read.theta))
     told = scale_and_bias(matrix(read.theta), scale, len(read.theta))
     off = AttitudeError(off_rad, 0.0)
-    spread = Spread(scale, told @ covariance @ told.T, told @ response, read.movement.noise(), off, 0.0, 0)
+    spread = Spread(scale, told @ covariance @ told.T, told @ response, movement.noise(), off, 0.0, 0)
     lag_s = 1e-3 * known.acceleration_lag_ms
-    return accelerometer_lines(spread, read.theta, read.movement, of.site, lag_s, sheet=of.sheet)
+    return accelerometer_lines(spread, read.theta, movement, of.site, lag_s, sheet=of.sheet)
+
+
+def _own_share(known: Uncertainty) -> float:
+    """Of δ², among what a solve looks for."""
+    share = known.repeatability_deg**2 / max(known.repeatability_deg**2 + known.axis_deg**2, np.finfo(np.float64).tiny)
+    return float(np.clip(share, OWN_SHARES[0], OWN_SHARES[-1]))

@@ -301,7 +301,7 @@ class RunSettings:
         return 1 / 20 if self.reckoning >= 3 else 1 / 2
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.
+        """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=3`.
 
         Or with encoders of arcs that are better or worse than was stated: `uncertainty.angle_std_deg=0.02`.
 

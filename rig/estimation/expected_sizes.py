@@ -17,7 +17,7 @@ WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
 SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the first
 
-OWN_SHARES = (1e-3, 1e-2, 1e-1, 1.0)  # of δ²: an arm's errors may nearly all come back, or none
+OWN_SHARES = (0.001, 0.01, 0.1, 0.5)  # of δ²: an arm's errors may nearly all come back, or half of them
 LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
 
 

@@ -12,7 +12,7 @@ from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_bu
 from rig.config.attitude_sets import EIGHTEEN
 from rig.data.quantity import ACCELERATION
 from rig.data.settings import Site
-from rig.estimation.accelerometer_model import Movement
+from rig.estimation.accelerometer_model import OWN_ERRORS, Movement, turned
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.imu import solve_imu
@@ -145,6 +145,23 @@ def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: 
     print(f"{part}: error / u {rms[0]:.2f} (scale), {rms[1]:.2f} (bias); within U {share[0]:.3f}, {share[1]:.3f}")
     assert all(within[0] < each < within[1] for each in rms)
     assert all(each > (0.92 if thorough else 0.8) for each in share)
+
+
+@pytest.mark.parametrize(("new_rad", "least", "most"), [(0.0, 0.0, 0.01), (1e-4, 0.01, 0.2), (5e-4, 0.1, 0.5)])
+def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwell(
+    new_rad: float, least: float, most: float
+) -> None:
+    """Of an arm that always errs by 0.3 mrad, and besides stands a little elsewhere whenever it comes back."""
+    shares, off = [], []
+    for seed in range(6):
+        session = drawn_accelerations.drawn("adis16465", seed, arm_rad=3e-4)
+        turns = turned(session.truth.theta(), session.movement)[:, : OWN_ERRORS * len(JOINTS)]
+        elsewhere = new_rad * np.random.default_rng([9, seed]).standard_normal(turns.shape[1])
+        solution, budget, error = drawn_accelerations.solved(session.reading(turns @ elsewhere))
+        shares.append(solution.own_share)
+        off.append(error[3:] / budget.std[3:])
+    assert least <= np.median(shares) <= most
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5  # of 18 values, which scatter by 0.17
 
 
 def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:

@@ -1,7 +1,7 @@
 """Recordings of every schema and kind still open, and solve to the numbers that were stored with them."""
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,7 @@ from rig.config.sensor_catalogue import has_own_port
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.schema import TEXTS
-from rig.data.settings import SCHEMAS
+from rig.data.settings import RECKONING, SCHEMAS
 from rig.plans.recorded import RecordedRun, judged, open_run
 from rig.plans.registry import installed
 from rig.report.document import document_of
@@ -19,6 +19,12 @@ from support.paths import FIXTURES
 from support.stated import SHARE, differences
 
 FREEZE = "freeze one, as CONTRIBUTING.md says"
+
+
+def _reckoned(way: int, run: RecordedRun) -> bool:
+    return run.movement[0].settings.reckoning == way
+
+
 KINDS: dict[str, Callable[[RecordedRun], bool]] = {
     "sweeps alone": lambda run: bool(run.raw) and not run.raw[0].settings.planned_dwells,
     "dwells alone": lambda run: not run.movement[0].settings.planned_sweeps,
@@ -31,6 +37,7 @@ KINDS: dict[str, Callable[[RecordedRun], bool]] = {
     "resumed": lambda run: len(run.raw) > 1,
     "verified": lambda run: bool(run.raw and run.corrected),
     "a reference beside": lambda run: run.movement[0].settings.reference is not None,
+    **{f"reckoning {way}": partial(_reckoned, way) for way in range(1, RECKONING + 1)},
     "the Earth's rate found": lambda run: run.movement[0].settings.finds_earth_rate,
 }
 
