@@ -143,8 +143,10 @@ def with_errors(
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
     own = errors_of(sheet, pieces, sensor.channel(TEMPERATURE).resolution, second_order=settings.second_order)
+    if not settings.expects_few_disturbed:
+        own = replace(own, disturbed_odds=len(pieces) / (len(pieces) + 1), turning_odds=1 / (len(pieces) + 1))
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
-    return replace(movement, own=replace(own, disturbed_share=settings.disturbed_share), arm_turns=turns)
+    return replace(movement, own=own, arm_turns=turns)
 
 
 def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -> tuple[Spread, list[Contributor]]:

@@ -296,9 +296,9 @@ class RunSettings:
         return self.reckoning >= 3
 
     @property
-    def disturbed_share(self) -> float:
-        """The share of runs in which a dwell, or the sweeps, are disturbed: what is believed before they are seen."""
-        return 1 / 20 if self.reckoning >= 3 else 1 / 2
+    def expects_few_disturbed(self) -> bool:
+        """Whether one run in twenty is taken to have a disturbed dwell before its readings are seen, not one in two."""
+        return self.reckoning >= 3
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=3`.

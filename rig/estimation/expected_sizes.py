@@ -70,10 +70,10 @@ def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[floa
     return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(turned @ shares / turned.sum()))
 
 
-def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array], share: float) -> Array:
+def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array], odds: Sequence[float]) -> Array:
     """(k,) variance of each of the `causes`, of which (n, …) are the columns by one standard deviation.
 
-    Before, one of them was there in that `share` of runs, by any order of magnitude.
+    Before, each was there by these `odds` (k,) against none, by any order of magnitude.
     """
     effects = sizes.std_rad * seen.effects(sizes.own_share)
     white = np.linalg.inv(np.linalg.cholesky(seen.known + sizes.walk**2 * seen.walk + effects @ effects.T))
@@ -88,11 +88,11 @@ def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array]
         growth, directions = np.linalg.eigh(told.T @ told)
         along = np.square(directions.T @ (told.T @ left))
         grown = 1 + volumes[:, None] * growth.clip(min=0.0)
-        belief[place] = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
-    belief -= np.log(belief.size)
+        told_of_it = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
+        belief[place] = np.log(odds[place] / VOLUMES) + told_of_it
     most = max(float(belief.max()), 0.0)
     weights = np.exp(belief - most)
-    expected: Array = weights @ volumes / (weights.sum() + (1 - share) / share * np.exp(-most))
+    expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))
     return expected
 
 

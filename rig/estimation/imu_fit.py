@@ -125,7 +125,8 @@ def as_expected(
     unit = float(np.sqrt(np.median(alike)))
     alone = [np.diag(np.sqrt(alike))[:, piece] for piece in movement.pieces()]
     causes = [*alone, unit * in_sweeps(movement)]
-    *louder, turning = expected_disturbances(scattered, sizes, causes, own.disturbed_share)
+    odds = [*np.full(len(alone), own.disturbed_odds / len(alone)), own.turning_odds]
+    *louder, turning = expected_disturbances(scattered, sizes, causes, odds)
     disturbed = replace(
         own, walk_m_s2_sqrt_s=sizes.walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )

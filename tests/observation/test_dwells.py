@@ -15,9 +15,9 @@ NOISE_M_S2, SHAKEN_M_S2, LASTING_S = 0.004, 0.02, 3.0
 
 
 def dwelt(reckoning: int, seed: int) -> tuple[Mean, Array]:
-    """What 300 readings of a dwell tell of their mean, and what is true of it: the part that was drawn."""
+    """What 300 readings of a dwell tell of their mean, and what is true of it."""
     settings = SETTINGS.with_overrides([f"reckoning={reckoning}"])
-    rng, time_s = np.random.default_rng(seed), LASTING_S / 300 * np.arange(300)
+    rng, time_s = np.random.default_rng(seed), LASTING_S / 300 * np.arange(300, dtype=np.float64)
     true = rng.normal(size=3)
     shaken = np.sin(2 * np.pi * rng.uniform(10, 18) * time_s[:, None] + rng.uniform(0, 6, 3))
     readings = true + NOISE_M_S2 * rng.normal(size=(300, 3)) + SHAKEN_M_S2 * shaken
@@ -29,7 +29,7 @@ def test_a_shaken_dwell_s_noise_is_that_of_all_its_readings(reckoning: int, scat
     """Of few low frequencies in recordings of before; then one dwell weighs three times as much as another like it."""
     found = [dwelt(reckoning, seed) for seed in range(60)]
     stds = np.sqrt([mean.variance for mean, _ in found])
-    over_u = np.array([(mean.mean - true) / std for (mean, true), std in zip(found, stds, strict=True)])
+    over_u = np.array([mean.mean - true for mean, true in found]) / stds
     assert scatter[0] < np.std(np.log(stds)) < scatter[1]
     assert 0.85 < np.sqrt(np.mean(over_u**2)) < 1.2
     assert np.median(stds) == pytest.approx(NOISE_M_S2 / np.sqrt(300), rel=0.1)
