@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from scipy.stats import kstest
+from scipy.stats import ksone
 
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference_consistency import reference_consistency
@@ -25,6 +25,7 @@ NORM = 9.80665
 JOINTS = joints_rad(EIGHTEEN)
 WRIST_1 = 3
 WAVE_SHARE = 0.3
+SMALL = 0.25  # p-values
 EVERY = ("bias_changed", "scale_changed", "loose_mounting", "even_term", "odd_term", "asymmetry", "residuals")
 
 Poses = Callable[[Array], Array]
@@ -89,13 +90,24 @@ def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
     assert beyond < expected + 3 * 1.5 * np.sqrt(expected)  # of one recording several may be beyond
 
 
+def chance_of(values: list[float]) -> float:
+    """How likely p-values that are uniform below a quarter have as many small ones, by Kolmogorov and Smirnov."""
+    ranked = np.sort(values)
+    early = np.arange(1, len(ranked) + 1) / len(ranked) - ranked
+    return float(ksone.sf(early[ranked < SMALL].max(initial=0.0), len(ranked)))
+
+
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
-def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(part: str) -> None:
-    """Kolmogorov and Smirnov do not refuse at 1 % that they are no smaller than that."""
+def test_small_p_values_of_sensors_as_their_data_sheets_let_them_be_are_as_rare_as_they_say(part: str) -> None:
+    """Kolmogorov and Smirnov do not refuse it at 1 %, for p below a quarter.
+
+    A curve that a data sheet bounds is drawn evenly within its bounds, where the check takes it to be normal: it is
+    more often of middling size than that (three of four have a p below a half), and never large.
+    """
     found: dict[str, list[float]] = {}
     for seed in range(50):
         session = drawn_accelerations.drawn(part, seed)
@@ -104,8 +116,8 @@ def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(part: 
         for name, rate in p_values(held).items():
             found.setdefault(name, []).append(rate)
     for name, values in found.items():
-        print(f"{part}, {name}: {kstest(values, 'uniform', alternative='greater').pvalue:.3f}, least {min(values):.4f}")
-    assert all(kstest(values, "uniform", alternative="greater").pvalue > 0.01 for values in found.values())
+        print(f"{part}, {name}: {chance_of(values):.3f}, least {min(values):.4f}")
+    assert all(chance_of(values) > 0.01 for values in found.values())
 
 
 def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:
