@@ -59,6 +59,6 @@ def _budget(of: PlannedAccelerometer) -> Budget:
 
 
 def _own_share(known: Uncertainty) -> float:
-    """Of δ², among what a solve looks for."""
+    """The share of δ² that is new in each dwell, as it is stated, among those that a solve looks for."""
     share = known.repeatability_deg**2 / max(known.repeatability_deg**2 + known.axis_deg**2, np.finfo(np.float64).tiny)
     return float(np.clip(share, OWN_SHARES[0], OWN_SHARES[-1]))

@@ -220,7 +220,7 @@ def new_and_always(theta: Array, movement: Movement) -> tuple[Array, Array | Non
 
 
 def shared_out(own: Array, always: Array | None, own_share: float) -> Array:
-    """(3 K, P) both together, of δ² as they share it."""
+    """(3 K, P) columns of the arm's errors, of δ² as the new ones and those of always share it."""
     if always is None:
         return own
     return np.concatenate([np.sqrt(own_share) * own, np.sqrt(1 - own_share) * always], axis=1)

@@ -40,7 +40,7 @@ class Scattered:
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Of the walk, in a second; δ; and which share of δ² is new in each dwell."""
+    """What readings tell: what the bias walks in a second, δ, and which share of δ² is new in each dwell."""
 
     walk: float
     std_rad: float
