@@ -67,7 +67,8 @@ def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[floa
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
     walked, turned = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
-    return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(turned @ shares / turned.sum()))
+    new = turned @ shares / (turned.sum() or 1.0)  # of an exact arm's nothing, none
+    return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(new))
 
 
 def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array], odds: Sequence[float]) -> Array:
