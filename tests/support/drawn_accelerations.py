@@ -82,8 +82,11 @@ def sheet_of(part: str) -> Sheet:
     )
 
 
-def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_K) -> Session:
-    """Eighteen dwells after sweeps about six axes, at temperatures that stray by so much."""
+def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_K, *, evenly: bool = True) -> Session:
+    """Eighteen dwells after sweeps about six axes, at temperatures that stray by so much.
+
+    What a data sheet bounds is `evenly` drawn within its bounds, or normal with the standard deviation of that.
+    """
     rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
     density = PARTS[part].acceleration_noise_ug_sqrt_hz
     truth = Truth(
@@ -109,12 +112,16 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_
     own = errors_of(sheet, pieces, STEPS_K[part], second_order=False)
     movement = replace(straight, own=own, arm_turns=arm_turns(stood, NOMINAL, np.eye(3)))
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
-    chi, theta = rng.uniform(-odd, odd, 3), truth.theta()
+
+    def within(half_width: float) -> Array:
+        return rng.uniform(-half_width, half_width, 3) if evenly else half_width / STANDARD * rng.normal(size=3)
+
+    chi, theta = within(odd), truth.theta()
     warm = of_pieces(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
-    bent = of_sensor(theta, movement, np.square) @ rng.uniform(-even, even, 3)
+    bent = of_sensor(theta, movement, np.square) @ within(even)
     bent += of_sensor(theta, movement, lambda along: along**3) @ chi
-    bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ rng.uniform(-bias_k, bias_k, 3)
-    bent += per_axis(_along(session) * warm[:, None]) @ (1e-6 * sheet.scale_ppm_k * rng.uniform(-1, 1, 3))
+    bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ within(bias_k)
+    bent += per_axis(_along(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
     flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
     flickering = movement.constant() * [of_pieces(each, movement) for each in flickered]
     bent += own.instability_m_s2 * flickering.T.ravel()
