@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.shared_errors import apart
+from rig.estimation.shared_errors import of_white
 
 WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
@@ -57,12 +57,9 @@ def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[floa
     typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
     walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES) if std_rad is None else np.array([std_rad])
-    belief = np.array(
-        [
-            [_likelihood(seen, seen.known + rate**2 * seen.walk, seen.effects(share), sizes) for rate in walks]
-            for share in shares
-        ]
-    )
+    whites = [np.linalg.inv(np.linalg.cholesky(seen.known + rate**2 * seen.walk)) for rate in walks]
+    of_arm = [seen.effects(share) for share in shares]
+    belief = np.array([[_likelihood(seen, white, effects, sizes) for white in whites] for effects in of_arm])
     belief[:, 1:] -= np.log(WALKS)
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
@@ -97,9 +94,12 @@ def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array]
     return expected
 
 
-def _likelihood(seen: Scattered, noise: Array, effects: Array, sizes: Array) -> Array:
-    """(k,) logarithms of the restricted likelihood, up to a constant, for `sizes` (k,) of δ."""
-    found = apart(noise, effects)
+def _likelihood(seen: Scattered, white: Array, effects: Array, sizes: Array) -> Array:
+    """(k,) logarithms of the restricted likelihood, up to a constant, for `sizes` (k,) of δ.
+
+    `white` (n, n), triangular, leaves white all that is known beside the `effects` (n, P) of the arm.
+    """
+    found = of_white(white, effects)
     basis, triangle = np.linalg.qr(found.turn @ seen.slopes)
     left = found.turn @ seen.left
     left = left - basis @ (basis.T @ left)  # the likelihood does not know what the columns explain
@@ -108,5 +108,5 @@ def _likelihood(seen: Scattered, noise: Array, effects: Array, sizes: Array) -> 
     information, rest = basis.T @ weighted, left @ weighted
     explained = np.sum(rest * np.linalg.solve(information, rest[..., None])[..., 0], axis=1)
     lost = np.log(variance).sum(axis=1) + np.linalg.slogdet(information)[1] + (left**2 / variance).sum(axis=1)
-    turned = np.linalg.slogdet(found.turn)[1] - np.log(np.abs(np.diag(triangle))).sum()
+    turned = np.log(np.diag(white)).sum() - np.log(np.abs(np.diag(triangle))).sum()
     return np.asarray(turned - (lost - explained) / 2, dtype=np.float64)

@@ -28,7 +28,11 @@ class Apart:
 
 def apart(noise: Array, effects: Array) -> Apart:
     """Readings of noise V (n, n) and errors E (n, P) made independent. Raises LinAlgError for a V not positive."""
-    white = np.linalg.inv(np.linalg.cholesky(noise))
+    return of_white(np.linalg.inv(np.linalg.cholesky(noise)), effects)
+
+
+def of_white(white: Array, effects: Array) -> Apart:
+    """Readings made independent whose noise `white` (n, n) leaves white, with errors E (n, P)."""
     growth, directions = np.linalg.eigh(white @ effects @ effects.T @ white.T)
     return Apart(directions.T @ white, np.maximum(growth, 0.0))
 

@@ -13,7 +13,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, between
-from rig.observation.averaging import Averaging, dwelling_of
+from rig.observation.averaging import dwelling_of
 from rig.observation.known_motion import Motion
 from rig.observation.mean import Mean
 from rig.observation.windows import Dwelt, Window, dwelt
@@ -47,7 +47,7 @@ def dwell_readings(
     """
     for each in dwelt(run):
         if each.dwell.index not in superseded:
-            yield dwell_reading(stream, motion, without_leaving(run, each), settings, dwelling_of(run.settings))
+            yield _dwell_reading(run, stream, motion, each, settings)
 
 
 def each_dwell(
@@ -59,8 +59,7 @@ def each_dwell(
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
         try:
-            finished = without_leaving(run, each)
-            found[each.dwell.index] = dwell_reading(stream, motion, finished, settings, dwelling_of(run.settings))
+            found[each.dwell.index] = _dwell_reading(run, stream, motion, each, settings)
         except Fault as fault:
             found[each.dwell.index] = fault
     return found
@@ -99,11 +98,10 @@ def _is_noisy(stream: Stream) -> bool:
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
 
-def dwell_reading(
-    stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds, averaging: Averaging
+def _dwell_reading(
+    run: RunData, stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds
 ) -> DwellReading:
-    """One finished dwell, averaged in such a way. Raises Fault as `dwell_readings` does."""
-    dwell, window = finished.dwell, finished.window
+    dwell, window = finished.dwell, without_leaving(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = between(stream, window.start_s, window.end_s)
     _check_standing(motion, window, where)
@@ -111,7 +109,7 @@ def dwell_reading(
     check_acceleration(stream, inside, where)
     readings = accelerations(stream, inside)
     count = stream.sensor.channel(ACCELERATION).resolution_of(readings)
-    reading, _ = averaging.rested(readings, stream.time_s[inside], window, count)
+    reading, _ = dwelling_of(run.settings).rested(readings, stream.time_s[inside], window, count)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
