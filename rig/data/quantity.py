@@ -58,6 +58,14 @@ class Quantity:
         """The name in a file of `what` in this quantity's unit: `bias_rad_s`."""
         return f"{what}_{self.suffix}"
 
+    def of(self, sensor: str) -> str:
+        """How the readings of a sensor of that name are called: that a gyroscope reads rates goes without saying."""
+        return sensor if self is RATE else self.beside(sensor)
+
+    def beside(self, sensor: str) -> str:
+        """The same where others of that sensor stand too."""
+        return f"{sensor}, {self.sensor}"
+
     @property
     def columns(self) -> tuple[str, ...]:
         """The columns of its readings in a table, one for each axis."""

@@ -3,21 +3,20 @@
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
-from rig.data.quantity import RATE, Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
 from rig.report.kinds.kind import Three
 from rig.report.kinds.registry import shown
-from rig.report.kinds.triad import beside
 from rig.report.rounding import in_print
 from rig.station.events import Since
 
+PARAMETERS: Final = ("scale", "bias")
 Row = dict[str, Any]
 
 
@@ -27,18 +26,17 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
     `parts` are the sensors' parts and serial numbers.
     """
     limits = {check.means: check.limit for check in result.checks}
-    quantity_of = {_name(sensor, each): (sensor, each) for sensor in parts for each in quantities().values()}
     rows = []
     for found in shown(result):
-        sensor, quantity = quantity_of.get(found.name, ("", RATE))
-        allowed = {of: limits.get(Meaning("conformity", sensor, quantity.name, of)) for of in ("scale", "bias")}
-        bias = allowed["bias"]
+        scale, bias = (limits.get(Meaning("conformity", found.sensor, found.quantity.name, of)) for of in PARAMETERS)
+        if found.scale is None:  # limits are those of a calibration
+            bias = None
         rows.append(
             {
                 "name": found.name,
-                "part": parts.get(sensor, ""),
+                "part": parts.get(found.sensor, ""),
                 "unit": found.unit.name,
-                "scale": None if found.scale is None else _numbers(found.scale, 1.0, allowed["scale"]),
+                "scale": None if found.scale is None else _numbers(found.scale, 1.0, scale),
                 "bias": _numbers(found.numbers, 0.0, None if bias is None else bias / found.unit.size),
             }
         )
@@ -63,7 +61,7 @@ def since_rows(since: Iterable[Since]) -> dict[str, Row]:
                     "normalised_error": [round(each.normalised_error[name], 2) for name in names],
                 }
         row["beyond"] = [name for name, error in each.normalised_error.items() if error > 1]
-        rows[_name(each.sensor, quantity)] = row
+        rows[quantity.of(each.sensor)] = row
     return rows
 
 
@@ -93,10 +91,6 @@ def after_fault(command: str, *, repeats: bool) -> Row:
 
 def _next(words: str, command: str) -> Row:
     return {"words": words, "command": command}
-
-
-def _name(sensor: str, quantity: Quantity) -> str:
-    return sensor if quantity == RATE else beside(sensor, quantity)
 
 
 def _numbers(found: Three, nominal: float, limit: float | None) -> Row:

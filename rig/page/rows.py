@@ -18,7 +18,6 @@ from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
 from rig.report.kinds.kind import Shown, Three
 from rig.report.kinds.registry import shown
-from rig.report.kinds.triad import beside
 
 NOISE_ONLY, COMBINED = "noise only", "combined"
 Row = dict[str, Any]
@@ -63,7 +62,7 @@ def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> R
     mean, size = dwell.reading.mean, float(np.linalg.norm(dwell.reading.mean))
     axis, sign = nearest_axis(mean)
     return {
-        "sensor": beside(sensor, ACCELERATION),
+        "sensor": ACCELERATION.of(sensor),
         "sweep": dwell.index,
         "by": "host",
         "dwell": dwell.name,
@@ -99,7 +98,7 @@ def _sweep(sensor: str, sweep: int, observation: Observation | Fault) -> Row:
 def _dwell(sensor: str, index: int, reading: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
     if isinstance(reading, DwellReading):
         return dwell_row(sensor, reading, gravity_m_s2)
-    return {"sensor": beside(sensor, ACCELERATION), "sweep": index, "by": "host", "dwell": "", "refused": str(reading)}
+    return {"sensor": ACCELERATION.of(sensor), "sweep": index, "by": "host", "dwell": "", "refused": str(reading)}
 
 
 def _parameters_so_far(name: str, partial: SoFar) -> Row:
@@ -107,7 +106,7 @@ def _parameters_so_far(name: str, partial: SoFar) -> Row:
     if isinstance(solution, VectorSolution):
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = Three(solution.bias_rad_s.tolist(), u[3:]), Three(solution.scale.tolist(), u[:3])
-        return _row(Shown(name, RATE.bias, bias, combined=False, scale=scale))
+        return _row(Shown(name, RATE, name, RATE.bias, bias, combined=False, scale=scale))
     if partial.bias_rad_s is None:
         return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": solution.what}
     mean, std = partial.bias_rad_s

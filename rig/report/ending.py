@@ -133,10 +133,8 @@ def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
 
 
 def _heading(item: _Item) -> str:
-    """What the numbers beside the scale factors are, with their unit."""
-    if item.shown.scale is not None:
-        return f"bias, {item.shown.unit.name}"
-    return f"{item.shown.name.partition(': ')[2] or item.kind}, {item.shown.unit.name}"
+    """What the numbers are that are no scale factors, with their unit."""
+    return f"{item.shown.noun}, {item.shown.unit.name}"
 
 
 def _plus_minus(three: Three) -> list[str]:

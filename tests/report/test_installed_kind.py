@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -77,10 +78,30 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     assert "imu_inclination_scale[2]" in (tmp_path / "run" / "calibration.h").read_text(encoding="utf-8")
     ran(installed, "-m", "rig", "report", run, "--dcc", "--set", "site.country=DE", "--history", history)
     assert "calibration of inclinometer" in (tmp_path / "run" / "certificate.xml").read_text(encoding="utf-8")
+    assert "the only standard of an inclinometer's scale" in unescape(page) and "NOT A CERT" not in page.upper()
     assert "inclination" in ran(installed, "-m", "rig", "history", "list", "--history", history)
     scale, bias, rows = json.loads(ran(installed, "-c", SHOWN, run))
     assert (scale, bias) == (entry["scale"], entry["bias_rad"])
     assert rows[0]["sensor"] == "imu, inclinometer" and rows[0]["unit"] == "mrad" and len(rows[0]["bias"]) == 2
+
+
+@pytest.mark.slow
+def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(
+    tmp_path: Path, installed: dict[str, str]
+) -> None:
+    run = tmp_path / "run"
+    ran(installed, "-m", "rig", "solve", *files(tmp_path), "--out", str(run))
+    result = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    result["others"]["inclinometers"]["imu"]["covariance_combined"] = None
+    (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "rig", "report", str(run), "--dcc", "--set", "site.country=DE"],
+        capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=installed,
+    )  # fmt: skip
+    assert done.returncode == 2 and "no_digital_certificate" in done.stderr, done.stderr
+    ran(installed, "-m", "rig", "report", str(run))
+    page = (run / "certificate.html").read_text(encoding="utf-8")
+    assert "Not a certificate: the uncertainty is not known" in page and "Calibration record" in page
 
 
 @pytest.mark.thorough

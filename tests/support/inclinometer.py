@@ -5,7 +5,7 @@ m = φ / k + b.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,11 +28,12 @@ from rig.observation.placements import Placements
 from rig.report.certificate.xml_parts import dcc, real_list, text
 from rig.report.expanded import expanded
 from rig.report.kinds.followed import Followed, known, scale_and_bias
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
-from rig.report.kinds.triad import beside, shown_of, tables
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Standard, Without
+from rig.report.kinds.triad import shown_of, tables
 
 KEY, FEWEST = "inclinometers", 4
 DEGREE = np.pi / 180
+TABLE_STD_RAD = 2e-5  # how well the table that it lies on is known, in each attitude
 INCLINATION = Quantity(
     name="inclination",
     sensor="inclinometer",
@@ -70,16 +71,16 @@ class InclinometerEntry(Entry):
     scale: tuple[float, float]
     bias_rad: tuple[float, float]
     covariance: tuple[tuple[float, ...], ...]
-    covariance_combined: None = None
+    covariance_combined: tuple[tuple[float, ...], ...] | None
     budget: None = None
     residuals_rad: tuple[tuple[float, float], ...]
 
 
 def solve(name: str, placements: Placements, site: Site) -> OfKind:
-    """Lines through the readings over the angles of rise, axis by axis, weighted by the readings' variances."""
+    """Lines through the readings over the angles of rise, axis by axis, weighted by their and the table's variances."""
     read = placements.read
     up = placements.attitudes.swapaxes(1, 2) @ np.array(site.up)
-    rise, means, variances = np.arcsin(up[:, :2]), read.means[INCLINATION], read.variances[INCLINATION]
+    rise, means, variances = np.arcsin(up[:, :2]), read.means[INCLINATION], read.variances[INCLINATION] + TABLE_STD_RAD**2
     if len(means) < FEWEST:
         raise Fault("too_few_observations", f"{len(means)} attitudes do not tell two lines", "Lay it down more often")
     found = [_line(*each) for each in zip(rise.T, means.T, variances.T, strict=True)]
@@ -107,7 +108,7 @@ def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
         if each.quantity == INCLINATION and isinstance(each.found, OfKind) and isinstance(each.found.found, Solution):
             found = {key: np.asarray(value).tolist() for key, value in vars(each.found.found).items()}
             of = each.sensor.part, each.sensor.serial_number
-            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
+            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", covariance_combined=found["covariance"], **found)
     return made
 
 
@@ -121,7 +122,7 @@ def _printed(found: Found[InclinometerEntry]) -> Iterator[Table | str]:
 
 
 def _shown(found: Found[InclinometerEntry]) -> Shown:
-    return shown_of(beside(found.sensor, INCLINATION), INCLINATION, found.entry)
+    return replace(shown_of(found), combined=found.entry.covariance_combined is not None)
 
 
 def _followed(found: Found[InclinometerEntry], document: ResultDocument) -> Followed:
@@ -157,6 +158,13 @@ RESULT = ResultKind(
     block="inclinometer.html.j2:inclinometer",
     templates=Path(__file__).parent,
     measured=_measured,
+    standard=Standard(
+        size="The rise of its axes above the horizontal",
+        value=lambda _: "as the attitudes give it",
+        origin=lambda _: None,
+        known="the rise of an axis above the horizontal",
+        method=lambda _: "Inclinometers are held still in known attitudes.",
+    ),
 )
 
 

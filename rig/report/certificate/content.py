@@ -8,17 +8,16 @@ from types import MappingProxyType
 from typing import Any
 
 from rig.analysis.clock import BY_COMPUTER
-from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
-from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.provenance import calls_itself_simulated
+from rig.data.quantity import FIELD, RATE
 from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.stated import Stated
-from rig.report.kinds.kind import Found, Without
+from rig.report.kinds.kind import Found, Standard, Without
 from rig.report.kinds.registry import kinds, shown
 from rig.report.mounts import mount_lines
 from rig.turners.kind import Words
@@ -33,10 +32,25 @@ class Gyroscope:
     sensor: SensorEntry
     verification: VerificationEntry | None
 
+
+@dataclass(frozen=True, slots=True)
+class HeldStill:
+    """The sensors of one `kind` that were calibrated at rest, and what their scale factors hang on.
+
+    Of its size they took the `value`; `origin` is where the laboratory says that comes from.
+    """
+
+    kind: str
+    standard: Standard
+    entries: tuple[Any, ...]
+    value: str
+    origin: str | None
+    traceable: bool
+
     @property
-    def has_uncertainty(self) -> bool:
-        """Whether more than noise is known of its uncertainty."""
-        return self.sensor.budget is not None and self.sensor.covariance_combined is not None
+    def whose(self) -> str:
+        """The scale of one of them, in words."""
+        return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +85,11 @@ class Certificate:
     stated: Stated
     result: ResultDocument
     gyroscopes: tuple[Gyroscope, ...]
-    accelerometers: Mapping[str, AccelerometerEntry]
+    held_still: tuple[HeldStill, ...]
     verified: Mapping[str, VerificationEntry]
     conformity: tuple[CheckEntry, ...]
     fitness: tuple[CheckEntry, ...]
     traceable: bool
-    traceable_gravity: bool
-    traceable_field: bool
     deviations: tuple[str, ...]
     references: tuple[str, ...]
     reversals: Mapping[str, ReversalEntry]
@@ -156,16 +168,9 @@ class Certificate:
         return days[0], days[-1]
 
     @property
-    def magnetometers(self) -> Mapping[str, MagnetometerEntry]:
-        """The magnetometers that were calibrated."""
-        found = self.result.magnetometers.items()
-        return {name: each for name, each in found if isinstance(each, MagnetometerEntry)}
-
-    @property
-    def drifts(self) -> tuple[tuple[str, str, DriftEntry], ...]:
-        """Sensor, quantity, and its bias by repeat."""
-        found = self.result.bias_drift.items()
-        return tuple((name, quantity, each) for name, drifts in found for quantity, each in drifts.items())
+    def finds_attitudes(self) -> bool:
+        """Whether the readings told how far attitudes were off."""
+        return any(hasattr(entry, "attitude_error_rad") for each in self.held_still for entry in each.entries)
 
     @property
     def blocks(self) -> tuple[Block, ...]:
@@ -188,7 +193,7 @@ class Certificate:
     @property
     def without_uncertainty(self) -> tuple[str, ...]:
         """What was calibrated, and of whose uncertainty the solution's spread alone is known."""
-        return tuple(_without_uncertainty(self.result, self.gyroscopes))
+        return tuple(_without_uncertainty(self.result))
 
     @property
     def guarded(self) -> bool:
@@ -215,19 +220,17 @@ def certificate_of(
     )
     return Certificate(
         number=_number(result, stated, reversals),
-        title=_title(result, gyroscopes),
-        marks=tuple(_marks(result, stated, gyroscopes, fitness)),
+        title=_title(result),
+        marks=tuple(_marks(result, stated, fitness)),
         issued=stated.certificate.issued or datetime.fromisoformat(result.provenance.solved_utc).date(),
         stated=stated,
         result=result,
         gyroscopes=gyroscopes,
-        accelerometers={n: each for n, each in result.accelerometers.items() if each.role == "calibrate"},
+        held_still=tuple(_held_still(result, stated)),
         verified=verified,
         conformity=conformity,
         fitness=fitness,
         traceable=_traceable(result, stated),
-        traceable_gravity=_referred(result, stated, result.accelerometers.values(), stated.where.gravity_reference),
-        traceable_field=_referred(result, stated, result.magnetometers.values(), stated.where.magnetic_field_reference),
         deviations=tuple(_deviations(result)),
         references=tuple(_references(result)),
         reversals=reversals,
@@ -256,19 +259,18 @@ def _calibrates(result: ResultDocument) -> bool:
     return any(each.scale is not None for each in shown(result))
 
 
-def _title(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> str:
+def _title(result: ResultDocument) -> str:
     if not _calibrates(result):
         return "Verification report"
-    return "Calibration record" if any(_without_uncertainty(result, gyroscopes)) else "Calibration certificate"
+    return "Calibration record" if any(_without_uncertainty(result)) else "Calibration certificate"
 
 
-def _without_uncertainty(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> Iterator[str]:
+def _without_uncertainty(result: ResultDocument) -> Iterator[str]:
     """Sensors of which noise alone is known: in recordings of before there was a budget, and by some estimators."""
-    yield from (each.name for each in gyroscopes if not each.has_uncertainty)
-    at_rest = {**result.accelerometers, **result.magnetometers}
-    for name, each in at_rest.items():
-        if not isinstance(each, ErrorEntry) and each.budget is None:
-            yield name
+    references = {(name, RATE) for name, sensor in result.sensors.items() if sensor.role == "reference"}
+    for each in shown(result):
+        if each.scale is not None and not each.combined and (each.sensor, each.quantity) not in references:
+            yield each.sensor
 
 
 def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
@@ -284,12 +286,10 @@ def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) 
         raise Refused("another_sensor", why, "Give one of the runs that `rig reversal` was given")
 
 
-def _marks(
-    result: ResultDocument, stated: Stated, gyroscopes: Sequence[Gyroscope], fitness: Sequence[CheckEntry]
-) -> Iterator[str]:
+def _marks(result: ResultDocument, stated: Stated, fitness: Sequence[CheckEntry]) -> Iterator[str]:
     if is_simulated(result, stated):
         yield "Simulated laboratory: no real item was calibrated"
-    if any(_without_uncertainty(result, gyroscopes)):
+    if any(_without_uncertainty(result)):
         yield "Not a certificate: the uncertainty is not known"
     if not all(check.passed for check in fitness):
         yield "Not valid: the measurement failed its own checks"
@@ -314,16 +314,16 @@ def _traceable(result: ResultDocument, stated: Stated) -> bool:
     return measured and compared and whole and stated.where.time_reference is not None
 
 
-def _referred(
-    result: ResultDocument,
-    stated: Stated,
-    found: Iterable[AccelerometerEntry | MagnetometerEntry | ErrorEntry],
-    reference: str | None,
-) -> bool:
-    """Whether the size of gravity or of the field, their only standard, has an uncertainty and an origin."""
-    budgets = [each.budget for each in found if not isinstance(each, ErrorEntry)]
-    known = all(budget is not None and _size_stated(budget) for budget in budgets)
-    return known and reference is not None and not is_simulated(result, stated)
+def _held_still(result: ResultDocument, stated: Stated) -> Iterator[HeldStill]:
+    """Traceable where the size of their only standard has an uncertainty and an origin, and was measured."""
+    for kind in kinds():
+        entries = tuple(found.entry for found in kind.found(result))
+        if isinstance(kind.standard, Without) or not entries:
+            continue
+        origin, budgets = kind.standard.origin(stated.where), (each.budget for each in entries)
+        known = all(budget is not None and _size_stated(budget) for budget in budgets)
+        traceable = known and origin is not None and not is_simulated(result, stated)
+        yield HeldStill(kind.name, kind.standard, entries, kind.standard.value(entries[0]), origin, traceable)
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
@@ -340,13 +340,13 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
         if lost:
             yield f"{name}: {lost} samples were lost within sweeps and left out."
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
-    for name, accelerometer in result.accelerometers.items():
-        yield from (f"{name}, accelerometer: {warning}" for warning in accelerometer.warnings)
+    for kind in kinds():
+        for found in () if isinstance(kind.standard, Without) else kind.found(result):
+            said = getattr(found.entry, "warnings", ())
+            yield from (f"{found.quantity.of(found.sensor)}: {warning}" for warning in said)
     for name, magnetometer in result.magnetometers.items():
         if isinstance(magnetometer, ErrorEntry):
-            yield f"{name}, magnetometer, was recorded and not calibrated: {magnetometer.error}"
-        else:
-            yield from (f"{name}, magnetometer: {warning}" for warning in magnetometer.warnings)
+            yield f"{FIELD.of(name)}, was recorded and not calibrated: {magnetometer.error}"
     for name, faults in result.unsolved.items():
         yield from (f"{name}, {what}, was recorded and not calibrated: {each.error}" for what, each in faults.items())
     if not provenance.model_dump().get("script_installed", True):

@@ -154,14 +154,9 @@ def _statements(c: Certificate) -> Iterator[Element]:
     if c.gyroscopes:
         angles = "as a file states them" if c.elsewhere else _angles(c)
         yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
-    if c.accelerometers:
-        origin = c.stated.where.gravity_reference or "not stated"
-        said = f"Gravity is stated by the laboratory, its origin: {origin}. {_claimed(c.traceable_gravity)}"
-        yield _chain("accelerometers", said, c.traceable_gravity)
-    if c.magnetometers:
-        origin = c.stated.where.magnetic_field_reference or "not stated"
-        said = f"The size of the field is stated by the laboratory, its origin: {origin}. {_claimed(c.traceable_field)}"
-        yield _chain("magnetometers", said, c.traceable_field)
+    for each in c.held_still:
+        said = f"{each.standard.size} is stated by the laboratory, its origin: {each.origin or UNSAID}."
+        yield _chain(f"{each.kind}s", f"{said} {_claimed(each.traceable)}", each.traceable)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"

@@ -33,6 +33,7 @@ from rig.report.elsewhere_entries import accelerometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.followed import Further
+from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
@@ -145,6 +146,12 @@ def _further(found: AccelerometerEntry) -> Iterator[Further]:
         yield Further("second order", AXES, found.second_order_s2_m, *known, dcc_results.PER_FORCE)
 
 
+def _method(swept: bool) -> str:
+    felt = ", and felt in the sweeps" if swept else ""
+    held = f"Accelerometers are held still in known attitudes to gravity{felt}"
+    return f"{held}, and solved for together with the arm's error of attitude."
+
+
 ACCELEROMETER = triad_kind(
     ACCELERATION,
     "accelerometers",
@@ -152,4 +159,11 @@ ACCELEROMETER = triad_kind(
     Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c, _further),
     header=accelerometer_lines,
     block="at_rest.html.j2:accelerometer",
+    standard=Standard(
+        size="Gravity",
+        value=lambda entry: f"{entry.gravity_m_s2:.6g} m/s²",
+        origin=lambda site: site.gravity_reference,
+        known="gravity",
+        method=_method,
+    ),
 )

@@ -100,8 +100,9 @@ def _shown(found: Found[DriftEntry]) -> Shown:
     entry, unit = found.entry, found.quantity.drift
     widths = expanded(_change_std(entry), entry.freedom).widths
     change, known_to = ([each / unit.size for each in values] for values in (entry.largest_change, widths))
-    name = f"{found.sensor}, {found.quantity.sensor}: largest change of the bias"
-    return Shown(name, unit, Three(change, known_to), combined=True)
+    noun, three = "largest change of the bias", Three(change, known_to)
+    name = f"{found.quantity.beside(found.sensor)}: {noun}"
+    return Shown(found.sensor, found.quantity, name, unit, three, combined=True, noun=noun)
 
 
 def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | None:
@@ -207,4 +208,5 @@ BIAS_DRIFT = ResultKind(
     figures="rig.report.drift_figures:write_drift_figures",
     block="at_rest.html.j2:drift",
     measured=_measured,
+    standard=Without("it hangs on that of the sensor whose bias it is"),
 )

@@ -32,9 +32,11 @@ def _shown(found: Found[SensorEntry]) -> Shown:
     """The Earth's rate in the axes of the arm's base."""
     entry, unit = _of(found), RATE.drift
     widths = expanded(_stds(entry), entry.freedoms(3)).widths
-    name = f"{found.sensor}: the Earth's rate in the arm's base"
+    noun = "the Earth's rate in the arm's base"
+    name = f"{found.sensor}: {noun}"
     rates, known_to = ([each / unit.size for each in values] for values in (entry.rate_rad_s, widths))
-    return Shown(name, unit, Three(rates, known_to), combined=True)
+    three = Three(rates, known_to)
+    return Shown(found.sensor, RATE, name, unit, three, combined=True, noun=noun)
 
 
 def _followed(found: Found[SensorEntry], _: object) -> Followed:
@@ -80,4 +82,5 @@ EARTH_RATE = ResultKind(
     figures="rig.report.earth_rate_figures:write_earth_rate_figures",
     block=Without("it stands in the block of its gyroscope"),
     measured=_measured,
+    standard=Without("it hangs on that of its gyroscope"),
 )

@@ -72,7 +72,7 @@ def _printed(found: Found[SensorEntry]) -> Iterator[Table | str]:
 def _shown(found: Found[SensorEntry]) -> Shown:
     speeds = speed_words(found.entry)
     held_at = f"at {speeds} °/s" if speeds else ""
-    return replace(shown_of(found.sensor, RATE, found.entry), held_at=held_at, model=found.entry.model)
+    return replace(shown_of(found), held_at=held_at, model=found.entry.model)
 
 
 def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
@@ -264,4 +264,5 @@ GYROSCOPE = ResultKind(
     figures=Without("its residuals are on the certificate and in the notebook"),
     block="gyroscope.html.j2:gyroscope",
     measured=_measured,
+    standard=Without("its standards are time and angle, of which every certificate speaks"),
 )

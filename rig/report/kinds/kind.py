@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 from xml.etree.ElementTree import Element
 
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
+from rig.config.judging_sections import SiteSection
 from rig.data.magnetometer_entries import ReversalEntry
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
@@ -47,12 +48,15 @@ class Three:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Three numbers as page and notebook show them, in `unit`; where there are any, scale factors beside.
+    """Three numbers as page and notebook show them under a `name`, in `unit`; where there are any, scale factors beside.
 
-    `combined` tells whether U holds all that is known, else it is two standard deviations of noise. `held_at` says at
-    what the numbers hold ("at ±60.0 °/s") and `model` what they are of ("g = K (m + b)"), where a run's end says that.
+    They are of a `sensor` and what it measures. `combined` tells whether U holds all that is known, else it is two
+    standard deviations of noise. `held_at` says at what the numbers hold ("at ±60.0 °/s") and `model` what they are of
+    ("g = K (m + b)"), where a run's end says that; `noun` is what numbers without scale factors are.
     """
 
+    sensor: str
+    quantity: Quantity
     name: str
     unit: Unit
     numbers: Three
@@ -60,6 +64,7 @@ class Shown:
     scale: Three | None = None
     held_at: str = ""
     model: str = ""
+    noun: str = "bias"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +85,22 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True)
+class Standard:
+    """What the scale factors of sensors that were held still hang on, as certificates say it.
+
+    `size` is what has to be known of it, `value` how large an entry took it to be, `origin` where the laboratory says
+    that this comes from. `known` is what was to be read where a file tells the motion; `method` says how an arm showed
+    it to them, with or without sweeps of a gyroscope beside.
+    """
+
+    size: str
+    value: Callable[[Any], str]
+    origin: Callable[[SiteSection], str | None]
+    known: str
+    method: Callable[[bool], str]
+
+
+@dataclass(frozen=True, slots=True)
 class ResultKind(Generic[EntryT]):
     """A kind of result, by what it says to each outlet, or why it says nothing there.
 
@@ -92,7 +113,8 @@ class ResultKind(Generic[EntryT]):
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
     - `block` names the macro of the certificate's page (`template:macro`) that prints one; the template lies in
       `templates`.
-    - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor.
+    - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor; `standard`
+      what both certificates say of traceability.
     """
 
     name: str
@@ -106,6 +128,7 @@ class ResultKind(Generic[EntryT]):
     figures: str | Without
     block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
+    standard: Standard | Without
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
     in_short: Callable[[Found[EntryT]], Iterable[str]] = lambda _: ()

@@ -30,6 +30,7 @@ from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.kinds.followed import Further
+from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
@@ -129,4 +130,11 @@ MAGNETOMETER = triad_kind(
     Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}, _further),
     header=magnetometer_lines,
     block="at_rest.html.j2:magnetometer",
+    standard=Standard(
+        size="The size of the magnetic field",
+        value=lambda entry: f"{entry.field_t / FIELD.bias.size:.6g} {FIELD.bias.name}",
+        origin=lambda site: site.magnetic_field_reference,
+        known="a field of stated size",
+        method=lambda _: "Magnetometers are held in known attitudes to a field of stated size.",
+    ),
 )

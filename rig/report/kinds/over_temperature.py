@@ -15,7 +15,7 @@ from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.certificate import dcc_results
 from rig.report.kinds.followed import SCALE_SLOPES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
 from rig.report.rounding import plus_minus
 from rig.report.temperature_c_functions import temperature_lines
 from rig.report.temperature_entry import temperature_entry
@@ -48,7 +48,7 @@ def _found(document: ResultDocument) -> Iterator[Found[OverTemperatureEntry]]:
 
 def _printed(found: Found[OverTemperatureEntry]) -> Iterator[Table | str]:
     entry, unit = found.entry, found.quantity.bias
-    title = f"{found.sensor}, {found.quantity.sensor}: over temperature, ± U"
+    title = f"{found.quantity.beside(found.sensor)}: over temperature, ± U"
     table = Table(title=plain(title, "table.title"))
     table.title_justify = "left"
     for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):
@@ -65,9 +65,10 @@ def _shown(found: Found[OverTemperatureEntry]) -> Shown:
     """The slopes at the reference."""
     entry, unit = found.entry, found.quantity.drift
     _, bias = _slopes(entry)
-    name = f"{found.sensor}, {found.quantity.sensor}: change per kelvin at {entry.reference_c:g} °C"
-    three = Three(*([each / unit.size for each in values] for values in bias))
-    return Shown(name, Unit(f"{unit.name}/K", unit.size), three, combined=True)
+    noun = f"change per kelvin at {entry.reference_c:g} °C"
+    name = f"{found.quantity.beside(found.sensor)}: {noun}"
+    three, per_kelvin = Three(*([each / unit.size for each in values] for values in bias)), f"{unit.name}/K"
+    return Shown(found.sensor, found.quantity, name, Unit(per_kelvin, unit.size), three, combined=True, noun=noun)
 
 
 def _slopes(entry: OverTemperatureEntry) -> tuple[tuple[Sequence[float], Sequence[float]], ...]:
@@ -101,7 +102,7 @@ def _followed(found: Found[OverTemperatureEntry], _: ResultDocument) -> Followed
 
 def _measured(found: Found[OverTemperatureEntry], _: object) -> Measured:
     entry, of = found.entry, found.quantity
-    name, results = f"{found.sensor}, {of.sensor}, over temperature", dcc_results.over_temperature(entry)
+    name, results = f"{of.beside(found.sensor)}, over temperature", dcc_results.over_temperature(entry)
     return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
 
 
@@ -117,4 +118,5 @@ OVER_TEMPERATURE = ResultKind(
     figures="rig.report.temperature_figures:write_temperature_figures",
     block="over_temperature.html.j2:over_temperature",
     measured=_measured,
+    standard=Without("it hangs on that of the sensor whose curve it is"),
 )

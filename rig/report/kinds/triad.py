@@ -22,7 +22,7 @@ from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.certificate import dcc_results
 from rig.report.certificate.tables import ANGLES
 from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Standard, Three
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +47,14 @@ def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
     return found
 
 
-def beside(sensor: str, quantity: Quantity) -> str:
-    """How tables call the accelerometer or the magnetometer of that name."""
-    return f"{sensor}, {quantity.sensor}"
-
-
-def shown_of(name: str, quantity: Quantity, entry: Calibrated) -> Shown:
+def shown_of(found: Found[Any]) -> Shown:
     """The row of page and notebook."""
+    quantity, entry = found.quantity, found.entry
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
     axes = len(entry.scale)
     bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
-    return Shown(name, quantity.bias, bias, entry.budget is not None, Three(entry.scale, expanded[:axes]))
+    scale, combined = Three(entry.scale, expanded[:axes]), entry.budget is not None
+    return Shown(found.sensor, quantity, quantity.of(found.sensor), quantity.bias, bias, combined, scale)
 
 
 def angles(entry: Any) -> Further:
@@ -144,6 +141,7 @@ def triad_kind(
     *,
     header: Callable[[Found[Any], Mapping[str, Array]], Iterable[str]],
     block: str,
+    standard: Standard,
 ) -> ResultKind[Any]:
     """The kind of a sensor that attitudes calibrate, whose entries stand at `key`; its `words` are its own."""
 
@@ -155,17 +153,14 @@ def triad_kind(
         of_all: Mapping[str, Any] = getattr(document, key)
         for name, each in of_all.items():
             if isinstance(each, ErrorEntry):
-                yield f"{beside(name, quantity)}, not calibrated: {each.error}"
+                yield f"{quantity.of(name)}, not calibrated: {each.error}"
         yield from unsolved_lines(document, quantity)
 
     def printed(each: Found[Any]) -> Iterator[Table | str]:
         entry = each.entry
-        title = f"{beside(each.sensor, quantity)}{words.title}: {item_words(entry)}"
+        title = f"{quantity.of(each.sensor)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
         yield from words.lines(entry)
-
-    def shown(each: Found[Any]) -> Shown:
-        return shown_of(beside(each.sensor, quantity), quantity, each.entry)
 
     def followed(each: Found[Any], document: ResultDocument) -> Followed:
         return followed_of(each, document, words.further(each.entry))
@@ -183,10 +178,11 @@ def triad_kind(
         found=found,
         unsolved=unsolved,
         printed=printed,
-        shown=shown,
+        shown=shown_of,
         followed=followed,
         header=header,
         figures="rig.report.attitude_figures:write_attitude_figures",
         block=block,
         measured=measured,
+        standard=standard,
     )
