@@ -125,27 +125,25 @@ def _values(
     from math import degrees
 
     from rig.board.identify import refuse_other_sensor
+    from rig.data.quantity import RATE
     from rig.report.exports.autopilots import ARDUPILOT as ARDUPILOTS
-    from rig.report.exports.autopilots import PX4
+    from rig.report.exports.autopilots import IMU, PX4
+    from rig.report.exports.calibrations import calibrations
     from rig.sensors.mavlink.dialect import ARDUPILOT
     from rig.sensors.mavlink.source import line_of
 
     called = ARDUPILOTS if firmware == ARDUPILOT else PX4
     values: dict[str, float] = {}
-    for name, section in sections.items():
-        place = line_of(section).instance
-        gyroscope, accelerometer = result.sensors.get(name), result.accelerometers.get(name)
-        said = f"{path}: the calibration of {name}"
-        if gyroscope is not None and gyroscope.role == "calibrate":
-            range_deg_s = degrees(gyroscope.range_rad_s or 0.0)
-            refuse_other_sensor(said, gyroscope.part, gyroscope.serial_number, range_deg_s, section)
-            values |= dict(called.gyroscope(place, gyroscope))
-            if firmware == ARDUPILOT:
-                values["INS_GYR_CAL"] = 0.0  # or it finds offsets of its own at each boot
-        if accelerometer is not None:
-            of = accelerometer
-            refuse_other_sensor(said, of.part, of.serial_number, section.range_deg_s, section)
-            values |= dict(called.accelerometer(place, accelerometer))
+    for found in calibrations(result).sensors:
+        section = sections.get(found.sensor)
+        if section is None or found.quantity not in IMU:
+            continue
+        of = found.part, found.serial_number
+        range_deg_s = degrees(found.full_scale or 0.0) if found.quantity == RATE else section.range_deg_s
+        refuse_other_sensor(f"{path}: the calibration of {found.sensor}", *of, range_deg_s, section)
+        values |= dict(called[found.quantity](line_of(section).instance, found))
+        if found.quantity == RATE and firmware == ARDUPILOT:
+            values["INS_GYR_CAL"] = 0.0  # or it finds offsets of its own at each boot
     if not values:
         raise Refused(
             "not_in_result", f"{path} has no calibration for {', '.join(sections)}", "Give a run that calibrated them"

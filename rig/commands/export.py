@@ -10,7 +10,7 @@ from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibratio
 from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
-    from rig.data.result_file import ResultDocument
+    from rig.report.exports.calibrations import Calibrations
 
 
 def add(parser: ArgumentParser) -> None:
@@ -39,7 +39,7 @@ def files(options: Namespace) -> list[Path]:
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
     Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of
-    readings as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
+    readings as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and the format do.
     """
     from rig.observation.observed_run import observe_runs
     from rig.plans.recorded import open_run
@@ -59,7 +59,7 @@ def files(options: Namespace) -> list[Path]:
             _made(folder, own=out is not None)
             written = write(recordings, folder)
         else:
-            texts = texts_of_calibrations(name)(_calibration(run, moved))
+            texts = texts_of_calibrations(name)(_calibrations(run, moved))
             _made(folder, own=out is not None)
             written = [folder / file for file in texts]
             for path, text in zip(written, texts.values(), strict=True):
@@ -82,17 +82,18 @@ def _made(folder: Path, *, own: bool) -> None:
     refuse_links(*folder.rglob("*"))
 
 
-def _calibration(run: Path, moved: tuple[str, str] | None) -> "ResultDocument":
+def _calibrations(run: Path, moved: tuple[str, str] | None) -> "Calibrations":
     from rig.data.result_file import passed_result, read_result
+    from rig.report.exports.calibrations import calibrations
     from rig.report.exports.temperature import at_temperature
 
-    result = passed_result(run)
+    found = calibrations(passed_result(run))
     if moved is None:
-        return result
+        return found
     temperature, drift = moved
     try:
         temperature_c = float(temperature)
     except ValueError as error:
         remedy = "Give it as in --at-temperature 31.5 DRIFT_RUN"
         raise Refused("bad_option", f"--at-temperature {temperature} is no temperature", remedy) from error
-    return at_temperature(result, read_result(Path(drift)), temperature_c)
+    return at_temperature(found, read_result(Path(drift)), temperature_c)

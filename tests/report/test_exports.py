@@ -22,12 +22,12 @@ from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded import open_run
 from rig.report.exports.autopilots import ardupilot_files, px4_files
+from rig.report.exports.calibrations import calibrations
 from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
-from rig.report.exports.parameters import exported
-from support.certified import accelerometer, result
+from support.certified import accelerometer, everything, result
 from support.frozen import RECORDINGS
 from support.paths import FIXTURES
 
@@ -82,7 +82,7 @@ def motion() -> tuple[Array, Array]:
 def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument) -> None:
     from imucal import CalibrationInfo
 
-    (text,) = imucal_files(sensed).values()
+    (text,) = imucal_files(calibrations(sensed)).values()
     found = CalibrationInfo.from_json(text)
     rate, up = motion()
     reading, acceleration = felt(sensed, rate, up)
@@ -97,14 +97,14 @@ def test_imucal_of_a_gyroscope_alone_leaves_accelerations_as_they_are() -> None:
     from imucal import CalibrationInfo
 
     old = read_result(FIXTURES / "calibration")
-    found = CalibrationInfo.from_json(*imucal_files(old).values())
+    found = CalibrationInfo.from_json(*imucal_files(calibrations(old)).values())
     force, _ = found.calibrate(np.ones((1, 3)), np.ones((1, 3)), "m/s^2", "rad/s")
     np.testing.assert_array_equal(force, np.ones((1, 3)))
     assert "No accelerometer" in found.comment and "K_ga is zero" in found.comment
 
 
 def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocument) -> None:
-    text = kalibr_files(sensed)["gyro_intrinsics.yaml"]
+    text = kalibr_files(calibrations(sensed))["gyro_intrinsics.yaml"]
     imu = yaml.safe_load(text)["imu0"]
     scaled, sensitivity, turned = (np.array(imu["gyroscopes"][name]) for name in ("M", "A", "C_gyro_i"))
     of_force = np.array(imu["accelerometers"]["M"])
@@ -125,20 +125,20 @@ def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocum
 
 
 def test_kalibr_s_noise_is_that_of_rests_over_the_root_of_the_rate(sensed: ResultDocument) -> None:
-    text = kalibr_files(sensed)["gyro_imu.yaml"]
+    text = kalibr_files(calibrations(sensed))["gyro_imu.yaml"]
     found = yaml.safe_load(text)
     assert found["update_rate"] == pytest.approx(238, rel=0.01)
     assert found["gyroscope_noise_density"] == pytest.approx(0.035 / 238**0.5, rel=0.05)
     assert found["accelerometer_noise_density"] == pytest.approx(0.02 / 200**0.5)
     assert "Lost: gyroscope_random_walk, accelerometer_random_walk" in text
-    alone = kalibr_files(read_result(FIXTURES / "calibration"))["gyro_imu.yaml"]
+    alone = kalibr_files(calibrations(read_result(FIXTURES / "calibration")))["gyro_imu.yaml"]
     assert "accelerometer_noise_density" not in yaml.safe_load(alone)
     assert "Lost: accelerometer_noise_density" in alone
 
 
 def test_autopilots_subtract_minus_b(sensed: ResultDocument) -> None:
     bias = sensed.sensors["gyro"].bias_rad_s
-    px4, ardupilot = px4_files(sensed)["px4.params"], ardupilot_files(sensed)["ardupilot.param"]
+    px4, ardupilot = texts_of(sensed)
     lines = [line.split("\t") for line in px4.splitlines() if not line.startswith("#")]
     assert [line[2] for line in lines[:3]] == ["CAL_GYRO0_XOFF", "CAL_GYRO0_YOFF", "CAL_GYRO0_ZOFF"]
     assert [float(line[3]) for line in lines[:3]] == [-b for b in bias]
@@ -175,7 +175,7 @@ def test_autopilots_correct_a_magnetometer_to_the_size_that_the_result_makes_it(
 
 def test_a_file_without_gyroscopes_leaves_their_calibration_at_boot_alone() -> None:
     document = read_result(RECORDINGS / "rig.settings-6" / "magnetometer")
-    text = ardupilot_files(document)["ardupilot.param"]
+    text = ardupilot_files(calibrations(document))["ardupilot.param"]
     assert "COMPASS_OFS_X" in text and "INS_GYR" not in text.replace("# ", "")
 
 
@@ -184,15 +184,21 @@ def test_sensors_keep_their_numbers_when_one_before_them_was_not_calibrated(sens
     fields = {"inner": ErrorEntry(error="no field"), "outer": field}
     two = {"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"]), "magnetometers": fields}
     document = sensed.model_copy(update={**two, "accelerometers": {"b": sensed.accelerometers["gyro"]}})
-    px4, ardupilot = px4_files(document)["px4.params"], ardupilot_files(document)["ardupilot.param"]
+    px4, ardupilot = texts_of(document)
     assert "CAL_ACC1_XOFF" in px4 and "CAL_ACC0" not in px4 and "INS_ACC2OFFS_X" in ardupilot
     assert "CAL_MAG1_XOFF" in px4 and "CAL_MAG0" not in px4 and "COMPASS_OFS2_X" in ardupilot
-    assert "# not calibrated: magnetometer inner" in px4
+    assert "# inner, magnetometer, not calibrated: no field" in px4
+
+
+def texts_of(document: ResultDocument) -> tuple[str, str]:
+    """The files of PX4 and ArduPilot."""
+    found = calibrations(document)
+    return px4_files(found)["px4.params"], ardupilot_files(found)["ardupilot.param"]
 
 
 def parameters_of(document: ResultDocument) -> tuple[Callable[[str], Array], Callable[[str], Array]]:
     """What the files of PX4 and ArduPilot say: three values by the name with `{}` for the axis."""
-    px4, ardupilot = px4_files(document)["px4.params"], ardupilot_files(document)["ardupilot.param"]
+    px4, ardupilot = texts_of(document)
     found = [
         {line.split("\t")[2]: float(line.split("\t")[3]) for line in px4.splitlines() if line[0] != "#"},
         {name: float(value) for name, value in (line.split(",") for line in ardupilot.splitlines() if line[0] != "#")},
@@ -212,21 +218,32 @@ def ellipsoid(diagonal: Array, beside: Array) -> Array:
 
 def test_a_second_gyroscope_has_parameters_of_its_own(sensed: ResultDocument) -> None:
     two = sensed.model_copy(update={"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"])})
-    assert "INS_GYR2OFFS_X," in ardupilot_files(two)["ardupilot.param"]
-    assert "CAL_GYRO1_XOFF" in px4_files(two)["px4.params"]
+    assert "INS_GYR2OFFS_X," in ardupilot_files(calibrations(two))["ardupilot.param"]
+    assert "CAL_GYRO1_XOFF" in px4_files(calibrations(two))["px4.params"]
 
 
 @pytest.mark.parametrize("name", OF_CALIBRATIONS)
 def test_a_hostile_serial_number_stays_in_its_comment(sensed: ResultDocument, name: str) -> None:
     sensor = sensed.sensors["gyro"].model_copy(update={"serial_number": "1\nINS_GYROFFS_X,9\n- ]}"})
     hostile = sensed.model_copy(update={"sensors": {"gyro": sensor}})
-    for text in texts_of_calibrations(name)(hostile).values():
+    for text in texts_of_calibrations(name)(calibrations(hostile)).values():
         assert "\nINS_GYROFFS_X,9" not in text
+
+
+@pytest.mark.parametrize("name", OF_CALIBRATIONS)
+def test_what_a_format_has_no_place_for_is_named_in_it(name: str) -> None:
+    found = calibrations(everything())
+    tilt = replace(found.sensors[0], sensor="tilt", quantity=replace(ACCELERATION, name="tilt", sensor="inclinometer"))
+    texts = texts_of_calibrations(name)(replace(found, sensors=(*found.sensors, tilt)))
+    said = "\n".join(texts.values())
+    assert "tilt, inclinometer" in said
+    takes_fields = "CAL_MAG0_XOFF" in said or "COMPASS_OFS_X" in said
+    assert takes_fields == (name in ("px4", "ardupilot")) and takes_fields != ("compass, magnetometer" in said)
 
 
 def test_nothing_calibrated_is_nothing_to_export() -> None:
     with pytest.raises(Refused, match="nothing_to_export"):
-        exported(result().model_copy(update={"sensors": {}}))
+        _ = calibrations(result().model_copy(update={"sensors": {}})).imus
 
 
 def test_names_stay_apart_where_blanks_are_not_taken() -> None:

@@ -86,9 +86,7 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(
-    tmp_path: Path, installed: dict[str, str]
-) -> None:
+def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(tmp_path: Path, installed: dict[str, str]) -> None:
     run = tmp_path / "run"
     ran(installed, "-m", "rig", "solve", *files(tmp_path), "--out", str(run))
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))

@@ -80,7 +80,8 @@ def solve(name: str, placements: Placements, site: Site) -> OfKind:
     """Lines through the readings over the angles of rise, axis by axis, weighted by their and the table's variances."""
     read = placements.read
     up = placements.attitudes.swapaxes(1, 2) @ np.array(site.up)
-    rise, means, variances = np.arcsin(up[:, :2]), read.means[INCLINATION], read.variances[INCLINATION] + TABLE_STD_RAD**2
+    rise, means = np.arcsin(up[:, :2]), read.means[INCLINATION]
+    variances = read.variances[INCLINATION] + TABLE_STD_RAD**2
     if len(means) < FEWEST:
         raise Fault("too_few_observations", f"{len(means)} attitudes do not tell two lines", "Lay it down more often")
     found = [_line(*each) for each in zip(rise.T, means.T, variances.T, strict=True)]
@@ -108,7 +109,8 @@ def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
         if each.quantity == INCLINATION and isinstance(each.found, OfKind) and isinstance(each.found.found, Solution):
             found = {key: np.asarray(value).tolist() for key, value in vars(each.found.found).items()}
             of = each.sensor.part, each.sensor.serial_number
-            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", covariance_combined=found["covariance"], **found)
+            found["covariance_combined"] = found["covariance"]
+            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
     return made
 
 
@@ -158,6 +160,7 @@ RESULT = ResultKind(
     block="inclinometer.html.j2:inclinometer",
     templates=Path(__file__).parent,
     measured=_measured,
+    corrected=Without("no autopilot and no library that takes exports knows two lines"),
     standard=Standard(
         size="The rise of its axes above the horizontal",
         value=lambda _: "as the attitudes give it",

@@ -1,7 +1,7 @@
 """What a certificate holds, from a result and from what the laboratory says: texts and numbers, no layout."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from types import MappingProxyType

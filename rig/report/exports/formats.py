@@ -8,11 +8,11 @@ if TYPE_CHECKING:  # the command line asks for the names alone
     from collections.abc import Sequence
     from pathlib import Path
 
-    from rig.data.result_file import ResultDocument
     from rig.observation.observed_run import ObservedRun
+    from rig.report.exports.calibrations import Calibrations
 
     ReadingsWriter = Callable[[Sequence[ObservedRun], Path], list[Path]]
-    CalibrationTexts = Callable[[ResultDocument], Mapping[str, str]]
+    CalibrationTexts = Callable[[Calibrations], Mapping[str, str]]
 
 # `module:function`. Of readings: (recordings, folder) → the files written.
 OF_READINGS: Final[Mapping[str, str]] = {
@@ -21,7 +21,7 @@ OF_READINGS: Final[Mapping[str, str]] = {
     "mat": "rig.report.exports.tables:write_mat",
     "ros2": "rig.report.exports.ros2:write_bag",
 }
-# Of calibrations: (result) → texts by name of the file.
+# Of calibrations: (those of a run) → texts by name of the file.
 OF_CALIBRATIONS: Final[Mapping[str, str]] = {
     "imucal": "rig.report.exports.imucal:imucal_files",
     "px4": "rig.report.exports.autopilots:px4_files",

@@ -8,21 +8,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rig.data.result_file import ResultDocument
-from rig.report.exports.parameters import Exported, comments, exported
+from rig.report.exports.calibrations import Calibrations, Imu
 
 FORMAT_VERSION = "2.0.0"
 
 
-def imucal_files(result: ResultDocument) -> Mapping[str, str]:
-    """One file for each sensor."""
-    return {
-        f"{each.name}_imucal.json": json.dumps(_document(result, each), indent=2) + "\n" for each in exported(result)
-    }
+def imucal_files(found: Calibrations) -> Mapping[str, str]:
+    """One file for each IMU. Raises Refused `nothing_to_export`."""
+    return {f"{each.name}_imucal.json": json.dumps(_document(found, each), indent=2) + "\n" for each in found.imus}
 
 
-def _document(result: ResultDocument, sensor: Exported) -> dict[str, object]:
-    acceleration, rates = sensor.accelerometer, sensor.gyroscope
+def _document(found: Calibrations, imu: Imu) -> dict[str, object]:
+    acceleration, rates = imu.accelerometer, imu.gyroscope
     return {
         "cal_type": "Turntable",
         "_format_version": FORMAT_VERSION,
@@ -30,23 +27,24 @@ def _document(result: ResultDocument, sensor: Exported) -> dict[str, object]:
         "gyr_unit": "rad/s",
         "from_acc_unit": "m/s^2",
         "from_gyr_unit": "rad/s",
-        "comment": ". ".join([*comments(result, sensor), *_convention(sensor)]),
-        "K_a": (np.eye(3) if acceleration is None else acceleration.scale).tolist(),
+        "comment": ". ".join([*found.origin(rates), *_convention(found, imu)]),
+        "K_a": (np.eye(3) if acceleration is None else acceleration.gains).tolist(),
         "R_a": (np.eye(3) if acceleration is None else acceleration.axes).tolist(),
         "b_a": (np.zeros(3) if acceleration is None else acceleration.offset).tolist(),
-        "K_g": rates.scale.tolist(),
+        "K_g": rates.gains.tolist(),
         "R_g": rates.axes.tolist(),
-        "K_ga": sensor.g_sensitivity.tolist(),
+        "K_ga": imu.g_sensitivity.tolist(),
         "b_g": rates.offset.tolist(),
     }
 
 
-def _convention(sensor: Exported) -> list[str]:
+def _convention(found: Calibrations, imu: Imu) -> list[str]:
     said = ["w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"]
-    if sensor.accelerometer is None:
+    if imu.accelerometer is None:
         said.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
-    if not sensor.found_g_sensitivity:
+    if imu.gyroscope.g_sensitivity is None:
         said.append("The g-sensitivity was not found: K_ga is zero")
-    if sensor.second_order:
+    if imu.accelerometer is not None and imu.accelerometer.second_order:
         said.append("Left out: the accelerometer's second order")
+    said += [f"Left out: {name}, for which there is no place" for name in found.elsewhere]
     return [*said, "Left out: uncertainties, temperature, nonlinearity; they are in result.json"]

@@ -9,21 +9,19 @@ from collections.abc import Mapping
 import numpy as np
 import yaml
 
-from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.report.exports.calibrations import Calibrations, Imu
 from rig.report.exports.names import plain_names
-from rig.report.exports.parameters import Exported, comments, exported
 
 
-def kalibr_files(result: ResultDocument) -> Mapping[str, str]:
-    """Kalibr's files: for each sensor `…_imu.yaml` (noise) and `…_intrinsics.yaml`."""
+def kalibr_files(found: Calibrations) -> Mapping[str, str]:
+    """Kalibr's files: for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raises Refused `nothing_to_export`."""
     files = {}
-    sensors = exported(result)
-    names = plain_names(each.name for each in sensors)
-    for each in sensors:
+    names = plain_names(each.name for each in found.imus)
+    for each in found.imus:
         topic = f"/{names[each.name]}/imu"  # as in the bag of `--format ros2`
-        files[f"{each.name}_imu.yaml"] = _noise(result, each, topic)
-        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(result, each, topic)
+        files[f"{each.name}_imu.yaml"] = _noise(found, each, topic)
+        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(found, each, topic)
     return files
 
 
@@ -34,16 +32,17 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
 
 
-def _noise(result: ResultDocument, sensor: Exported, topic: str) -> str:
+def _noise(found: Calibrations, imu: Imu, topic: str) -> str:
+    rates, forces = imu.gyroscope, imu.accelerometer
     known = {
         "rostopic": topic,
-        "update_rate": sensor.gyroscope.rate_hz,
-        "gyroscope_noise_density": sensor.gyroscope.density,
-        "accelerometer_noise_density": None if sensor.accelerometer is None else sensor.accelerometer.density,
+        "update_rate": rates.noise.rate_hz,
+        "gyroscope_noise_density": rates.noise.density,
+        "accelerometer_noise_density": None if forces is None else forces.noise.density,
     }
     unknown = [name for name, value in known.items() if value is None]
     said = [
-        *comments(result, sensor),
+        *found.origin(rates),
         "Noise densities in rad/s/sqrt(Hz), m/s^2/sqrt(Hz): of a sample at rest over the rate's root, worst axis.",
         "Lost: gyroscope_random_walk, accelerometer_random_walk, which take hours at rest; add your own.",
         *(f"Lost: {name}, which this run does not tell" for name in unknown),
@@ -51,26 +50,28 @@ def _noise(result: ResultDocument, sensor: Exported, topic: str) -> str:
     return _yaml(said, {name: value for name, value in known.items() if value is not None})
 
 
-def _intrinsics(result: ResultDocument, sensor: Exported, topic: str) -> str:
-    imu: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
+def _intrinsics(found: Calibrations, imu: Imu, topic: str) -> str:
+    rates, forces = imu.gyroscope, imu.accelerometer
+    intrinsics: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)
-    if sensor.accelerometer is not None:
-        scaled, to_body = triangular(sensor.accelerometer.matrix)
-        imu["accelerometers"] = {"M": scaled.tolist()}
-    scaled, turned = triangular(sensor.gyroscope.matrix @ to_body.T)
-    in_body = sensor.g_sensitivity @ to_body.T
-    imu["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
+    if forces is not None:
+        scaled, to_body = triangular(forces.matrix)
+        intrinsics["accelerometers"] = {"M": scaled.tolist()}
+    scaled, turned = triangular(rates.matrix @ to_body.T)
+    in_body = imu.g_sensitivity @ to_body.T
+    intrinsics["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
     said = [
-        *comments(result, sensor),
+        *found.origin(rates),
         "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr keeps no bias here:",
-        f"b = -b of result.json = {sensor.gyroscope.offset.tolist()} rad/s",
+        f"b = -b of result.json = {rates.offset.tolist()} rad/s",
     ]
-    if sensor.accelerometer is not None:
-        said.append(f"accelerometer: m = M a + b, b = {sensor.accelerometer.offset.tolist()} m/s^2")
-    if not sensor.found_g_sensitivity:
+    if forces is not None:
+        said.append(f"accelerometer: m = M a + b, b = {forces.offset.tolist()} m/s^2")
+    if rates.g_sensitivity is None:
         said.append("A is zero: the g-sensitivity was not found.")
     said.append("Lost: uncertainties, temperature, the accelerometer's second order and place.")
-    return _yaml(said, {"imu0": imu})
+    said += [f"Lost: {name}, for which there is no place" for name in found.elsewhere]
+    return _yaml(said, {"imu0": intrinsics})
 
 
 def _yaml(lines: list[str], document: Mapping[str, object]) -> str:

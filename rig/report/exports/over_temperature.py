@@ -12,13 +12,13 @@ A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither has 
 from collections.abc import Iterator, Mapping
 from math import comb
 
-from rig.data.result_file import ResultDocument
 from rig.data.temperature_entries import OverTemperatureEntry
 
 ARDUPILOT_REFERENCE_C, ARDUPILOT_SIZE = 35.0, 1e6
 AXES = "XYZ"
 LETTERS: Mapping[str, tuple[str, str]] = {"rate": ("G", "GYR"), "acceleration": ("A", "ACC")}
 Parameters = Iterator[tuple[str, float | int]]
+Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and quantity
 
 
 def offset_of(quantity: str, found: OverTemperatureEntry, order: int) -> tuple[float, ...]:
@@ -27,11 +27,11 @@ def offset_of(quantity: str, found: OverTemperatureEntry, order: int) -> tuple[f
     return tuple(sign * each for each in found.bias[order])
 
 
-def px4_parameters(result: ResultDocument, places: Mapping[str, int]) -> Parameters:
+def px4_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
     """The parameters TC_… of every sensor that was calibrated over temperature; nothing where none was."""
     enabled = set()
     for name, number in places.items():
-        for quantity, found in result.over_temperature.get(name, {}).items():
+        for quantity, found in polynomials.get(name, {}).items():
             letter = LETTERS[quantity][0]
             enabled.add(letter)
             yield f"TC_{letter}{number}_TREF", found.reference_c
@@ -44,10 +44,10 @@ def px4_parameters(result: ResultDocument, places: Mapping[str, int]) -> Paramet
         yield f"TC_{letter}_ENABLE", 1
 
 
-def ardupilot_parameters(result: ResultDocument, places: Mapping[str, int]) -> Parameters:
+def ardupilot_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
     """The parameters INS_TCAL… of every IMU of which a sensor was calibrated over temperature, of the other zeros."""
     for name, number in places.items():
-        found = result.over_temperature.get(name, {})
+        found = polynomials.get(name, {})
         if not found:
             continue
         of = f"INS_TCAL{number + 1}"

@@ -4,50 +4,48 @@ A slope holds in the range it was seen in, and nowhere else: neither the calibra
 asked for may lie outside.
 """
 
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from rig.data.drift_entries import SlopeEntry
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import Vector3
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+from rig.report.exports.calibrations import Calibrations
+from rig.report.kinds.corrected import Corrected
+
+WATCHED = (RATE, ACCELERATION)  # whose biases a run of `bias_drift` follows
 
 
-def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c: float) -> ResultDocument:
-    """`result` with the biases of the sensors it calibrated as they are at that temperature, by the slopes in `drift`.
+def at_temperature(found: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
+    """The calibrations with biases as they are at that temperature, by the slopes in `drift`.
 
-    Raises Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
+    Raises Refused `another_sensor`, `temperature_slope_unknown`,
+    `temperature_outside`.
     """
-    _check_same(result, drift)
-    sensors, accelerometers = dict(result.sensors), dict(result.accelerometers)
-    for name, sensor in result.sensors.items():
-        if sensor.role == "calibrate":
-            change = _change(drift, name, "rate", sensor.temperature_c, temperature_c)
-            moved = _vector(np.array(sensor.bias_rad_s) - change)  # b is added to a reading, which the slope is of
-            sensors[name] = sensor.model_copy(update={"bias_rad_s": moved, "temperature_c": temperature_c})
-    for name, each in result.accelerometers.items():
-        change = _change(drift, name, "acceleration", each.temperature_c, temperature_c)
-        moved = _vector(np.array(each.bias_m_s2) + change)
-        accelerometers[name] = each.model_copy(update={"bias_m_s2": moved, "temperature_c": temperature_c})
-    polynomials: dict[str, object] = {}  # those that there are stand about the other temperature
-    changed = {"sensors": sensors, "accelerometers": accelerometers, "over_temperature": polynomials}
-    return result.model_copy(update=changed)
+    _check_same(found.result, drift)
+    sensors = tuple(
+        replace(each, offset=each.offset + _change(drift, each, temperature_c), temperature_c=temperature_c)
+        if each.quantity in WATCHED
+        else each
+        for each in found.sensors
+    )
+    return replace(found, sensors=sensors, over_temperature={})  # polynomials are about the calibration's temperature
 
 
-def _change(
-    drift: ResultDocument, name: str, quantity: Literal["rate", "acceleration"], from_c: float | None, to_c: float
-) -> Array:
+def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
     """(3,) change of the reading's bias."""
+    name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:
         raise Refused(
             "temperature_slope_unknown",
             f"the result does not say how warm {name} was",
-            "Leave out --temperature-c; calibrate it where its thermometer is read",
+            "Leave out --at-temperature; calibrate it where its thermometer is read",
         )
-    found = drift.bias_drift.get(name, {}).get(quantity)
-    slope = None if found is None else found.over_temperature
+    watched = drift.bias_drift.get(name, {}).get(quantity)
+    slope = None if watched is None else watched.over_temperature
     if not isinstance(slope, SlopeEntry):
         why = "it did not watch that bias" if slope is None else slope.error
         raise Refused(
@@ -78,8 +76,3 @@ def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
                 f"{name} is {serial_number}, and the run of bias_drift is of {watched[name]}",
                 "Give a run of bias_drift of the same sensor",
             )
-
-
-def _vector(values: Array) -> Vector3:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -209,4 +209,5 @@ BIAS_DRIFT = ResultKind(
     block="at_rest.html.j2:drift",
     measured=_measured,
     standard=Without("it hangs on that of the sensor whose bias it is"),
+    corrected=Without("it corrects nothing; `rig export --at-temperature` takes its slopes"),
 )

@@ -83,4 +83,5 @@ EARTH_RATE = ResultKind(
     block=Without("it stands in the block of its gyroscope"),
     measured=_measured,
     standard=Without("it hangs on that of its gyroscope"),
+    corrected=Without("it is the place's, not the sensor's"),
 )

@@ -24,6 +24,7 @@ from rig.report.earth_rate import earth_rate_lines
 from rig.report.elsewhere_entries import rates_in_attitudes, turned
 from rig.report.expanded import flat
 from rig.report.hand_entry import by_hand_lines
+from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.followed import Followed, Further
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
 from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, tables, unsolved_lines
@@ -114,6 +115,32 @@ def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
     results = chain(dcc_results.gyroscope(sensor), dcc_results.beside(_further(sensor)))
     warm = temperatures_c(sensor)
     return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
+
+
+def _corrected(found: Found[SensorEntry]) -> Corrected | None:
+    """Readings to rates, in the frame nearest to its axes."""
+    sensor = found.entry
+    if sensor.role == "reference":
+        return None
+    matrix, sensitivity = np.diag(1 / np.array(sensor.scale)), None
+    if isinstance(vector := sensor.vector_model, VectorEntry):
+        to_sensor = np.array(vector.mounting)
+        matrix = np.array(vector.matrix) @ to_sensor.T
+        if vector.g_sensitivity_rad_s_per_m_s2 is not None:  # of gravity, which points down where force points up
+            sensitivity = -np.array(vector.g_sensitivity_rad_s_per_m_s2) @ to_sensor.T
+    return Corrected(
+        sensor=found.sensor,
+        quantity=RATE,
+        part=sensor.part,
+        serial_number=sensor.serial_number,
+        full_scale=sensor.range_rad_s,
+        temperature_c=sensor.temperature_c,
+        scale=np.array(sensor.scale),
+        matrix=matrix,
+        offset=-np.array(sensor.bias_rad_s),
+        noise=noise_of(sensor.observations, [(rest.noise_rad_s, rest.samples) for rest in sensor.rests]),
+        g_sensitivity=sensitivity,
+    )
 
 
 def temperatures_c(sensor: SensorEntry) -> dict[str, float | None]:
@@ -264,5 +291,6 @@ GYROSCOPE = ResultKind(
     figures=Without("its residuals are on the certificate and in the notebook"),
     block="gyroscope.html.j2:gyroscope",
     measured=_measured,
+    corrected=_corrected,
     standard=Without("its standards are time and angle, of which every certificate speaks"),
 )

@@ -15,6 +15,7 @@ from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import Entry
 from rig.estimation.arrays import Array
+from rig.report.kinds.corrected import Corrected
 from rig.report.kinds.followed import Followed
 
 EntryT = TypeVar("EntryT", bound=Entry)
@@ -48,7 +49,7 @@ class Three:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Three numbers as page and notebook show them under a `name`, in `unit`; where there are any, scale factors beside.
+    """Three numbers as page and notebook show them under a `name`, in `unit`; scale factors beside, if there are any.
 
     They are of a `sensor` and what it measures. `combined` tells whether U holds all that is known, else it is two
     standard deviations of noise. `held_at` says at what the numbers hold ("at ±60.0 °/s") and `model` what they are of
@@ -115,6 +116,7 @@ class ResultKind(Generic[EntryT]):
       `templates`.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor; `standard`
       what both certificates say of traceability.
+    - `corrected` is how exports to other programs put the readings of one right; None of a reference.
     """
 
     name: str
@@ -129,6 +131,7 @@ class ResultKind(Generic[EntryT]):
     block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
     standard: Standard | Without
+    corrected: Callable[[Found[EntryT]], Corrected | None] | Without
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
     in_short: Callable[[Found[EntryT]], Iterable[str]] = lambda _: ()

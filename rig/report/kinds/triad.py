@@ -21,6 +21,7 @@ from rig.report.axes import scale_and_bias_table, skew_known, triple
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.certificate import dcc_results
 from rig.report.certificate.tables import ANGLES
+from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Standard, Three
 
@@ -133,6 +134,25 @@ def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"
 
 
+def _corrected(found: Found[Any]) -> Corrected:
+    """Readings to what they are of, in the right-angled frame that the entry's matrix leads to."""
+    quantity, entry = found.quantity, found.entry
+    noise = [(getattr(dwell, quantity.named("noise")), dwell.samples) for dwell in entry.dwells]
+    return Corrected(
+        sensor=found.sensor,
+        quantity=quantity,
+        part=entry.part,
+        serial_number=entry.serial_number,
+        full_scale=getattr(entry, quantity.named("range")),
+        temperature_c=getattr(entry, "temperature_c", None),
+        scale=np.array(entry.scale),
+        matrix=np.linalg.inv(np.array(entry.correction_matrix)),
+        offset=np.array(bias_of(quantity, entry)),
+        noise=noise_of(entry.dwells, noise),
+        second_order=getattr(entry, "second_order_s2_m", None) is not None,
+    )
+
+
 def triad_kind(
     quantity: Quantity,
     key: str,
@@ -185,4 +205,5 @@ def triad_kind(
         block=block,
         measured=measured,
         standard=standard,
+        corrected=_corrected,
     )
