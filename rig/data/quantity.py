@@ -24,6 +24,15 @@ class Unit:
 
 
 @dataclass(frozen=True, slots=True)
+class Mistaken:
+    """A `unit` that readings are often given in by mistake, how to `mend` that, and more than any part reads, in SI."""
+
+    unit: str
+    mend: str
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
 class Quantity:
     """One quantity that a sensor measures along its axes.
 
@@ -33,6 +42,8 @@ class Quantity:
     - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
     - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
       so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
+    - `d_si` is the unit as a digital certificate writes it. `towards` is what a sensor at rest is turned towards.
+    - `mistaken` is for what unit its readings are taken by mistake.
     - `axes`: the letters of the axes that it is measured along.
     """
 
@@ -49,6 +60,9 @@ class Quantity:
     walk_suffix: str
     walk_unit: Unit
     steady: float
+    d_si: str
+    towards: str = "the reference"
+    mistaken: Mistaken | None = None
     axes: str = "xyz"
 
     def __str__(self) -> str:
@@ -124,6 +138,8 @@ RATE: Final = Quantity(
     walk_suffix="rad_sqrt_s",
     walk_unit=Unit("°/√h", pi / 180 / MINUTE_S),
     steady=5e-3,
+    d_si=r"\radian\second\tothe{-1}",
+    mistaken=Mistaken("°/s", "numpy.radians(readings)", 400.0),
 )
 ACCELERATION: Final = Quantity(
     name="acceleration",
@@ -139,6 +155,9 @@ ACCELERATION: Final = Quantity(
     walk_suffix="m_s_sqrt_s",
     walk_unit=Unit("m/s/√h", 1 / MINUTE_S),
     steady=0.05,
+    d_si=r"\metre\second\tothe{-2}",
+    towards="up",
+    mistaken=Mistaken("g or mg", "9.80665 * readings for readings in g", 5000.0),
 )
 FIELD: Final = Quantity(
     name="field",
@@ -154,6 +173,9 @@ FIELD: Final = Quantity(
     walk_suffix="t_sqrt_s",
     walk_unit=Unit("nT √s", 1e-9),
     steady=2e-6,
+    d_si=r"\tesla",
+    towards="the field",
+    mistaken=Mistaken("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
 )
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))

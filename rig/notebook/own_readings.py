@@ -1,36 +1,13 @@
 """Readings that somebody brings along: whether they are what a calibration corrects. Pure."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
+from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 
 BEYOND = 2.0  # times the nominal range: a part reads further than its range says, but not twice as far
-
-
-@dataclass(frozen=True, slots=True)
-class _Mistaken:
-    """What readings of a quantity are often in instead, and how one gets to SI.
-
-    `most` is more than any part on the market reads, in SI.
-    """
-
-    unit: str
-    mend: str
-    most: float
-
-
-_MISTAKEN: Final[Mapping[str, _Mistaken]] = {
-    RATE.name: _Mistaken("°/s", "numpy.radians(readings)", 400.0),
-    ACCELERATION.name: _Mistaken("g or mg", "9.80665 * readings for readings in g", 5000.0),
-    FIELD.name: _Mistaken("µT or gauss", "1e-6 * readings for readings in µT, 1e-4 for gauss", 0.1),
-}
 
 
 def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
@@ -46,8 +23,7 @@ def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, w
             "not_readings",
             f"the readings for {whose} are whole numbers ({given.dtype}), which are counts and not {quantity.unit}",
             f"Multiply them by the sensor's {quantity.unit} for each count; whole numbers that are already in "
-            f"{quantity.unit} "
-            "already become readings by .astype(float)",
+            f"{quantity.unit} become readings by .astype(float)",
         )
     if given.dtype.kind != "f" or given.ndim != 2 or given.shape[1] != axes:
         raise Refused(
@@ -61,7 +37,7 @@ def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, w
 
 
 def _refuse_other_units(found: Array, quantity: Quantity, limit: float | None, whose: str) -> None:
-    known = _MISTAKEN.get(quantity.name)
+    known = quantity.mistaken
     most = BEYOND * limit if limit is not None else np.inf if known is None else known.most
     largest = float(np.abs(found[~np.isnan(found)]).max(initial=0.0))
     instead = "another unit" if known is None else known.unit

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TOWARDS = {ACCELERATION: "up", FIELD: "the field"}
-
 
 @dataclass(frozen=True, slots=True)
 class HeldStill:
@@ -134,7 +132,7 @@ def _draw_sphere(axes: "Axes", held: HeldStill) -> None:
         axes.plot(centre + np.cos(circle), np.sin(circle), color="0.6", lw=0.8)
         axes.plot(centre + x, y, "o", ms=4)
         axes.text(centre, -1.25, "z upwards" if side > 0 else "z downwards", ha="center")
-    of = TOWARDS[held.quantity]
+    of = held.quantity.towards
     axes.set_title(f"where {of} was in the sensor's axes: x right, y up", fontsize=8)
     axes.set_aspect("equal")
     axes.set_axis_off()

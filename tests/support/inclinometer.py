@@ -48,6 +48,7 @@ INCLINATION = Quantity(
     walk_suffix="rad_sqrt_s",
     walk_unit=Unit("µrad √s", 1e-6),
     steady=1e-3,
+    d_si=r"\radian",
     axes="xy",
 )
 

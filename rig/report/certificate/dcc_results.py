@@ -8,6 +8,7 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
 from rig.data.temperature_entries import OverTemperatureEntry
@@ -21,8 +22,7 @@ from rig.report.kinds.followed import Further
 from rig.report.told_words import told_words
 from rig.report.validity_words import load_words, speed_words, when_words
 
-ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
-FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
+ONE, ANGLE, PER_FORCE = r"\one", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
 PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
 Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
@@ -39,14 +39,14 @@ def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
     yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{_told(sensor.told_from)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
     yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
-                  real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
-    yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
+                  real_list(AXES, sensor.bias_rad_s, [RATE.d_si], expanded=bias))  # fmt: skip
+    yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE.d_si)
 
 
 def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
     """Relative to the stated gravity, with U of the budget and the combined covariance."""
     said = f"{found.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {found.gravity_m_s2!r} m/s²."
-    yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION, said)
+    yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION.d_si, said)
 
 
 def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
@@ -59,7 +59,7 @@ def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iter
     said = f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {found.field_t!r} T."
     if found.arm_field_in_bias:
         said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
-    yield from _relative(found, [*found.scale, *found.bias_t], FIELD, said, ", as mounted")
+    yield from _relative(found, [*found.scale, *found.bias_t], FIELD.d_si, said, ", as mounted")
 
 
 def beside(found: Iterable[Further]) -> Iterator[Element]:
@@ -77,43 +77,43 @@ def _reversed(found: ReversalEntry) -> Iterator[Element]:
     if mixed:
         said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
     yield _spread("scale factor", said, AXES, (found.scale, found.scale_std, found.scale_freedom), ONE)
-    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t, found.bias_freedom), FIELD)
+    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t, found.bias_freedom), FIELD.d_si)
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*found.bias_t, *found.arm_field_t]
     yield _result(
         "own bias and the arm's field in the axes of the first run with their covariance",
         f"{said} The ellipsoid holds all six values at once with a probability of 95 %.",
-        real_list([name.replace(" ", "_") for name in names], values, [FIELD], region=(found.covariance, JOINT_FACTOR)),
+        real_list(
+            [name.replace(" ", "_") for name in names], values, [FIELD.d_si], region=(found.covariance, JOINT_FACTOR)
+        ),
     )
 
 
-def bias_drift(found: DriftEntry) -> Iterator[Element]:
+def bias_drift(found: DriftEntry, of: Quantity) -> Iterator[Element]:
     """The bias of each repeat, and over temperature where it could be told."""
-    unit = RATE if found.unit == "rad/s" else ACCELERATION
     labels = [str(number) for number in range(1, len(found.repeats) + 1)]
     for i, axis in enumerate(AXES):
         values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in found.repeats), strict=True)
         said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
 deviation of {found.common_std[i]!r} {found.unit}. ± U of what differs"
         freedom = None if found.freedom is None else [found.freedom[i]] * len(labels)
-        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), unit)
+        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
     slope = found.over_temperature
     if not isinstance(slope, ErrorEntry):
         low, high = slope.range_c
         said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
-        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), unit + KELVIN)
+        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), of.d_si + KELVIN)
 
 
-def over_temperature(found: OverTemperatureEntry) -> Iterator[Element]:
+def over_temperature(found: OverTemperatureEntry, of: Quantity) -> Iterator[Element]:
     """Scale and bias of each axis at the temperatures of the table, with U."""
-    unit = RATE if found.unit == "rad/s" else ACCELERATION
     low, high = found.range_c
     labels = [f"{row.temperature_c:.6g}_degC" for row in found.table]
     held = f"At temperatures of the item's own thermometer; holds from {low!r} to {high!r} °C only"
     for i, axis in enumerate(AXES):
-        for name, of, units in (("scale factor", "scale", ONE), ("bias", "bias", unit)):
-            values = [getattr(row, of)[i] for row in found.table]
-            widths = [getattr(row, f"expanded_{of}")[i] for row in found.table]
+        for name, which, units in (("scale factor", "scale", ONE), ("bias", "bias", of.d_si)):
+            values = [getattr(row, which)[i] for row in found.table]
+            widths = [getattr(row, f"expanded_{which}")[i] for row in found.table]
             stated = Expanded(widths, *([each] * len(labels) for each in (COVERAGE_FACTOR, PROBABILITY)))
             yield _result(f"{name} along {axis} over temperature", f"{held}. ± U, about 95 %.",
                           real_list(labels, values, [units], expanded=stated))  # fmt: skip
@@ -123,14 +123,14 @@ def verification(found: VerificationEntry) -> Iterator[Element]:
     """RMS against a reference, as found and as left."""
     said = f"RMS of reading less reference {found.reference}; holds the noise of both, no uncertainty was evaluated."
     if found.before is not None:
-        yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE]))
-    yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE]))
+        yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE.d_si]))
+    yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE.d_si]))
 
 
 def earth_rate(found: EarthRateEntry) -> Iterator[Element]:
     """The rate with its covariance, and the place by that rate."""
     said = "As found in the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
-    rate = real_list(AXES, found.rate_rad_s, [RATE], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
+    rate = real_list(AXES, found.rate_rad_s, [RATE.d_si], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", said, rate)
     yield _spread(
         "latitude by that rate",

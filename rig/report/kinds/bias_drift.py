@@ -127,7 +127,7 @@ def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | 
 
 def _measured(found: Found[DriftEntry], _: object) -> Measured:
     entry, of = found.entry, found.quantity
-    name, results = f"bias by repeat of {found.sensor}, {of}", dcc_results.bias_drift(entry)
+    name, results = f"bias by repeat of {found.sensor}, {of}", dcc_results.bias_drift(entry, of)
     return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
 
 

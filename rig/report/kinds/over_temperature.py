@@ -102,7 +102,7 @@ def _followed(found: Found[OverTemperatureEntry], _: ResultDocument) -> Followed
 
 def _measured(found: Found[OverTemperatureEntry], _: object) -> Measured:
     entry, of = found.entry, found.quantity
-    name, results = f"{of.beside(found.sensor)}, over temperature", dcc_results.over_temperature(entry)
+    name, results = f"{of.beside(found.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
     return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
 
 
