@@ -77,7 +77,7 @@ class Quantity:
         return sensor if self is RATE else self.beside(sensor)
 
     def beside(self, sensor: str) -> str:
-        """The same where others of that sensor stand too."""
+        """How they are called where others of that sensor stand too."""
         return f"{sensor}, {self.sensor}"
 
     @property

@@ -13,7 +13,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.own_readings import own_readings
-from rig.report.kinds.kind import Found, Shown
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Shown
 from rig.report.kinds.triad import bias_of
 
 HEADINGS = ("axis", "scale factor", "± U", "bias", "± U", "unit")

@@ -1,6 +1,6 @@
 """Pictures of readings, residuals and comparisons. Needs matplotlib, which the extra `study` brings."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.comparison import Comparison
-from rig.data.result_file import SensorEntry, VectorEntry
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
+from rig.report.certificate.plots import reach_in
 from rig.report.figures import draw_comparison
+from rig.report.kinds.unexplained import Unexplained
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,37 +55,26 @@ def plot_readings(time_s: Array, values: Mapping[str, Array], sweeps: Iterable[W
     return Plot(figure)
 
 
-def plot_residuals(sensors: Mapping[str, SensorEntry]) -> Plot:
-    """Reading less vector model of every sweep and rest, with U of each mean. Raises Refused `nothing_to_plot`."""
-    solved = {
-        name: (found, model)
-        for name, found in sensors.items()
-        if isinstance(model := found.vector_model, VectorEntry) and (found.observations or found.rests)
-    }
-    if not solved:
+def plot_residuals(left: Sequence[tuple[str, Unexplained]]) -> Plot:
+    """What is left of every mean, a panel for each, under its name. Raises Refused `nothing_to_plot`."""
+    if not left:
         raise Refused(
             "nothing_to_plot",
-            "no sweeps were solved by the vector model here",
+            "nothing here was solved by a model that leaves residuals",
             "The result says why, sensor by sensor",
         )
-    figure = _figure(10, 3 * len(solved))
-    panels = figure.subplots(len(solved), sharex=True, squeeze=False)[:, 0]
-    for axes, (name, (found, model)) in zip(panels, solved.items(), strict=True):
-        stds = [turn.mean_std_rad_s for turn in found.observations] + [rest.mean_std_rad_s for rest in found.rests]
-        expanded = COVERAGE_FACTOR * np.array(stds)
-        residuals = np.array(model.residuals_rad_s)
-        for i, axis in enumerate("xyz"):
-            places = np.arange(len(expanded)) + (i - 1) * 0.15
-            axes.errorbar(places, residuals[:, i], expanded[:, i], fmt="o", ms=3, lw=0.8, label=axis)
+    figure = _figure(10, 3 * len(left))
+    for axes, (name, found) in zip(figure.subplots(len(left), squeeze=False)[:, 0], left, strict=True):
+        places, largest = np.arange(len(found.values)), float(np.abs(found.values).max())
+        _, unit = reach_in(largest, found.quantity.residuals)
+        values, bars = found.values / unit.size, COVERAGE_FACTOR * found.stds / unit.size
+        for i, axis in enumerate(found.quantity.axes):
+            beside = places + (i - 1) * 0.15
+            axes.errorbar(beside, values[:, i], bars[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
-        axes.set(ylabel="residual rad/s")
-        axes.set_xticks(
-            range(len(expanded)),
-            [f"{o.joint} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
-            rotation=60,
-            ha="right",
-        )
-        _finish(axes, f"{name}: reading − model, ± U of the mean (k = 2)")
+        axes.set(ylabel=f"{found.shown} {unit.name}")
+        axes.set_xticks(places, found.labels, rotation=60, ha="right")
+        _finish(axes, f"{name}: ± 2 σ of {found.of}")
     return Plot(figure)
 
 

@@ -56,13 +56,21 @@ class Result(Mapping[str, Calibration]):
         return self.document.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def plot(self) -> "Plot":
-        """A plot of what each sweep and rest leaves unexplained, gyroscope by gyroscope, with U of each mean.
+        """A plot of what models leave of each sweep, rest, attitude and repeat, sensor by sensor, and were expected to.
 
         Raises Refused `nothing_to_plot`, `missing_extra`.
         """
         from rig.notebook.plots import plot_residuals
 
-        return plot_residuals(self.document.sensors)
+        return plot_residuals(
+            [
+                (f"{found.sensor}, {kind.name}", left)
+                for kind in kinds()
+                if not isinstance(kind.unexplained, Without)
+                for found in kind.found(self.document)
+                if (left := kind.unexplained(found)) is not None
+            ]
+        )
 
     def __getitem__(self, name: str) -> Calibration:
         known = self._calibrations

@@ -11,7 +11,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import SensorEntry
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.kinds.kind import Found
+from rig.report.kinds.found import Found
 
 
 def gyroscope_lines(found: Found[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:

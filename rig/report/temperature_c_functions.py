@@ -8,7 +8,7 @@ from rig.data.quantity import RATE
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.c_functions import c_rows, prefix_of
-from rig.report.kinds.kind import Found
+from rig.report.kinds.found import Found
 
 
 def temperature_lines(found: Found[OverTemperatureEntry], _: Mapping[str, Array]) -> Iterator[str]:

@@ -28,8 +28,10 @@ from rig.observation.placements import Placements
 from rig.report.certificate.xml_parts import dcc, real_list, text
 from rig.report.expanded import expanded
 from rig.report.kinds.followed import Followed, known, scale_and_bias
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Standard, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Without
 from rig.report.kinds.triad import shown_of, tables
+from rig.report.kinds.unexplained import Unexplained
 
 KEY, FEWEST = "inclinometers", 4
 DEGREE = np.pi / 180
@@ -135,6 +137,12 @@ def _followed(found: Found[InclinometerEntry], document: ResultDocument) -> Foll
     return Followed(found.sensor, INCLINATION.name, *of, known(rows))
 
 
+def _unexplained(found: Found[InclinometerEntry]) -> Unexplained:
+    left = np.array(found.entry.residuals_rad)
+    labels = [f"attitude {number}" for number in range(1, len(left) + 1)]
+    return Unexplained(INCLINATION, labels, left, np.full(left.shape, TABLE_STD_RAD), "the table's attitudes")
+
+
 def _header(found: Found[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
     x, y = found.entry.scale
     yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
@@ -161,6 +169,7 @@ RESULT = ResultKind(
     block="inclinometer.html.j2:inclinometer",
     templates=Path(__file__).parent,
     measured=_measured,
+    unexplained=_unexplained,
     corrected=Without("no autopilot and no library that takes exports knows two lines"),
     standard=Standard(
         size="The rise of its axes above the horizontal",

@@ -17,7 +17,8 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.stated import Stated
-from rig.report.kinds.kind import Found, Standard, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Standard, Without
 from rig.report.kinds.registry import kinds, shown
 from rig.report.mounts import mount_lines
 from rig.turners.kind import Words

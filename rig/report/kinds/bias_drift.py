@@ -21,7 +21,9 @@ from rig.report.certificate import dcc_results
 from rig.report.entry import counted
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.followed import CHANGES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.unexplained import of_repeats
 from rig.station.plain_text import plain
 
 
@@ -210,4 +212,5 @@ BIAS_DRIFT = ResultKind(
     measured=_measured,
     standard=Without("it hangs on that of the sensor whose bias it is"),
     corrected=Without("it corrects nothing; `rig export --at-temperature` takes its slopes"),
+    unexplained=of_repeats,
 )

@@ -10,8 +10,9 @@ from rig.data.result_file import ResultDocument, SensorEntry
 from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded
 from rig.report.kinds.followed import EARTH, Followed, known, parameters
+from rig.report.kinds.found import Found
 from rig.report.kinds.gyroscope import temperatures_c
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
 
 
 def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
@@ -84,4 +85,5 @@ EARTH_RATE = ResultKind(
     measured=_measured,
     standard=Without("it hangs on that of its gyroscope"),
     corrected=Without("it is the place's, not the sensor's"),
+    unexplained=Without("it is told by what its gyroscope's picture shows"),
 )

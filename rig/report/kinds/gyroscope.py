@@ -26,8 +26,10 @@ from rig.report.expanded import flat
 from rig.report.hand_entry import by_hand_lines
 from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.followed import Followed, Further
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Without
 from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, tables, unsolved_lines
+from rig.report.kinds.unexplained import of_sweeps_and_rests
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import load_words, speed_words, when_words
@@ -292,5 +294,6 @@ GYROSCOPE = ResultKind(
     block="gyroscope.html.j2:gyroscope",
     measured=_measured,
     corrected=_corrected,
+    unexplained=of_sweeps_and_rests,
     standard=Without("its standards are time and angle, of which every certificate speaks"),
 )

@@ -13,12 +13,12 @@ from rig.config.judging_sections import SiteSection
 from rig.data.magnetometer_entries import ReversalEntry
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import Entry
 from rig.estimation.arrays import Array
 from rig.report.kinds.corrected import Corrected
 from rig.report.kinds.followed import Followed
+from rig.report.kinds.found import EntryT, Found
+from rig.report.kinds.unexplained import Unexplained
 
-EntryT = TypeVar("EntryT", bound=Entry)
 SaidT = TypeVar("SaidT")
 OWN_TEMPLATES = Path(__file__).parents[1] / "certificate"
 
@@ -28,15 +28,6 @@ class Without:
     """Why a kind of result has no such outlet."""
 
     why: str
-
-
-@dataclass(frozen=True, slots=True)
-class Found(Generic[EntryT]):
-    """One entry of a result, the sensor it is of, and the quantity that sensor measures."""
-
-    sensor: str
-    quantity: Quantity
-    entry: EntryT
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +107,8 @@ class ResultKind(Generic[EntryT]):
       `templates`.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor; `standard`
       what both certificates say of traceability.
-    - `corrected` is how exports to other programs put the readings of one right; None of a reference.
+    - `corrected` is how exports to other programs put the readings of one right; None of a reference. `unexplained` is
+      what the model leaves of its means, for pictures; None of one that has none.
     """
 
     name: str
@@ -132,6 +124,7 @@ class ResultKind(Generic[EntryT]):
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
     standard: Standard | Without
     corrected: Callable[[Found[EntryT]], Corrected | None] | Without
+    unexplained: Callable[[Found[EntryT]], Unexplained | None] | Without
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
     in_short: Callable[[Found[EntryT]], Iterable[str]] = lambda _: ()

@@ -15,7 +15,8 @@ from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.certificate import dcc_results
 from rig.report.kinds.followed import SCALE_SLOPES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
 from rig.report.rounding import plus_minus
 from rig.report.temperature_c_functions import temperature_lines
 from rig.report.temperature_entry import temperature_entry
@@ -120,4 +121,5 @@ OVER_TEMPERATURE = ResultKind(
     measured=_measured,
     standard=Without("it hangs on that of the sensor whose curve it is"),
     corrected=Without("exports that know polynomials take its entries as they are"),
+    unexplained=Without("its curves are drawn instead, with their points"),
 )

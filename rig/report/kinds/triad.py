@@ -23,7 +23,9 @@ from rig.report.certificate import dcc_results
 from rig.report.certificate.tables import ANGLES
 from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Standard, Three
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Three
+from rig.report.kinds.unexplained import of_attitudes
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,4 +208,5 @@ def triad_kind(
         measured=measured,
         standard=standard,
         corrected=_corrected,
+        unexplained=of_attitudes,
     )

@@ -19,7 +19,8 @@ from rig.data.result_file import (
 )
 from rig.report.certificate import dcc_results
 from rig.report.entry import entry
-from rig.report.kinds.kind import Found, Measured, ResultKind, Without
+from rig.report.kinds.found import Found
+from rig.report.kinds.kind import Measured, ResultKind, Without
 from rig.station.plain_text import plain
 
 
@@ -122,5 +123,6 @@ VERIFICATION = ResultKind(
     measured=_measured,
     standard=Without("it hangs on that of the reference beside it"),
     corrected=Without("it changes nothing of what readings mean"),
+    unexplained=Without("the run draws its readings beside those of the reference"),
     in_short=_in_short,
 )

@@ -1,0 +1,18 @@
+"""An entry of a result beside what it is of."""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from rig.data.quantity import Quantity
+from rig.data.result_types import Entry
+
+EntryT = TypeVar("EntryT", bound=Entry)
+
+
+@dataclass(frozen=True, slots=True)
+class Found(Generic[EntryT]):
+    """One entry of a result, the sensor it is of, and the quantity that sensor measures."""
+
+    sensor: str
+    quantity: Quantity
+    entry: EntryT
