@@ -1,7 +1,7 @@
 """What recordings amount to: they are solved, verified and judged here for `rig.analysis.analyses`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TypeVar
@@ -12,14 +12,15 @@ from rig.analysis.acceleration import AccelerometerResult, calibrate_acceleromet
 from rig.analysis.bias_drift import bias_drifts
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check
+from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, known_estimator
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
 from rig.analysis.magnetic_field import calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.of_kinds import kinds_on_arm
-from rig.analysis.onboard_check import agreement
+from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.over_temperature import (
     Polynomials,
@@ -28,6 +29,7 @@ from rig.analysis.over_temperature import (
     with_rate_polynomials,
 )
 from rig.analysis.surroundings import surroundings_of
+from rig.analysis.told_from import ToldFrom
 from rig.analysis.vector_inputs import arms_of
 from rig.analysis.verdict import (
     acceleration_checks,
@@ -69,34 +71,21 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     if settings.reference_c is not None:
         taken = taken_to_reference(recordings, settings, settings.reference_c)
         recordings, found = taken.recordings, taken.polynomials
-    if not settings.planned_sweeps:
-        return _in_attitudes(runs, recordings, found, drifting=drifting)
-    surroundings = surroundings_of(recordings)
-    results = solve_observed(runs[0].measuring(RATE), recordings, chosen, surroundings, settings.matrix_corrected)
-    results, found = _over_temperature(results, RATE, with_rate_polynomials, found)
-    accelerometers = calibrate_accelerometers(recordings, settings, results)
-    accelerometers, found = _over_temperature(accelerometers, ACCELERATION, with_acceleration_polynomials, found)
+    swept = _swept(runs, recordings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
+    accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
+    accelerometers, found = _over_temperature(
+        accelerometers, ACCELERATION, with_acceleration_polynomials, swept.polynomials
+    )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
-    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
     among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
-    onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
-    checks = judge(
-        {name: results[name].solution for name in settings.to_calibrate},
-        settings.limits,
-        {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
-        _decision_rule(settings),
-    )
     return Outcome(
         recordings=recordings,
         settings=settings,
-        results=results,
-        onboard=onboard,
+        results=swept.results,
+        onboard=swept.onboard,
         checks=(
-            *checks,
-            *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
-            *among_rates.checks,
-            *clock_checks(surroundings.clocks if surroundings is not None else ()),
+            *swept.checks,
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
             *(check for each in of_kinds for check in each.checks),
@@ -104,12 +93,53 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         of_kinds=of_kinds,
         mounts=mounts,
         provenance=_origin(runs),
-        clock=None if surroundings is None else surroundings.clock,
+        clock=swept.clock,
         accelerometers=accelerometers,
         magnetometers=magnetometers,
-        told_from=among_rates.told_from,
+        told_from=swept.told_from,
         told_from_in_reference=among_dwells.told_from,
         polynomials=found,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Swept:
+    """What sweeps tell of gyroscopes; nothing where none was planned."""
+
+    polynomials: Polynomials
+    results: Mapping[str, SensorResult] = field(default_factory=dict)
+    onboard: Mapping[str, Agreement] = field(default_factory=dict)
+    checks: tuple[Check, ...] = ()
+    clock: ClockCheck | None = None
+    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+
+
+def _swept(
+    runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], estimator: Estimator, polynomials: Polynomials
+) -> _Swept:
+    settings, surroundings = runs[0].settings, surroundings_of(recordings)
+    results = solve_observed(runs[0].measuring(RATE), recordings, estimator, surroundings, settings.matrix_corrected)
+    results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
+    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
+    onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
+    checks = judge(
+        {name: results[name].solution for name in settings.to_calibrate},
+        settings.limits,
+        {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
+        _decision_rule(settings),
+    )
+    return _Swept(
+        polynomials=polynomials,
+        results=results,
+        onboard=onboard,
+        checks=(
+            *checks,
+            *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
+            *among_rates.checks,
+            *clock_checks(surroundings.clocks if surroundings is not None else ()),
+        ),
+        clock=None if surroundings is None else surroundings.clock,
+        told_from=among_rates.told_from,
     )
 
 
@@ -149,31 +179,6 @@ def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
     found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
     checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
     return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
-
-
-def _in_attitudes(
-    runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], polynomials: Polynomials, *, drifting: bool
-) -> Outcome:
-    """Accelerometers alone: no sweep was planned, from which a gyroscope could be calibrated."""
-    settings = runs[0].settings
-    found: dict[str, AccelerometerResult] = calibrate_accelerometers(recordings, settings)
-    found, polynomials = _over_temperature(found, ACCELERATION, with_acceleration_polynomials, polynomials)
-    magnetometers = calibrate_magnetometers(recordings, settings, found)
-    among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
-    of_kinds = kinds_on_arm(recordings, settings)
-    more = (check for each in of_kinds for check in each.checks)
-    checks = (*_acceleration_checks(found, settings), *among_dwells.checks, *more)
-    return Outcome(
-        settings=settings,
-        provenance=_origin(runs),
-        recordings=recordings,
-        checks=checks,
-        accelerometers=found,
-        magnetometers=magnetometers,
-        told_from_in_reference=among_dwells.told_from,
-        of_kinds=of_kinds,
-        polynomials=polynomials,
-    )
 
 
 def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
