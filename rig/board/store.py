@@ -49,7 +49,7 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
             yield name, store(board, index, calibration_of(results[name]))
 
 
-def calibration_of(solved: Solved, found: OverTemperatureEntry | None = None) -> Calibration:
+def calibration_of(solved: Solved, entry: OverTemperatureEntry | None = None) -> Calibration:
     """A sensor's solution as the board keeps it, dated now, with the polynomials of one over temperature.
 
     Raises Refused `not_in_result` without a temperature.
@@ -67,18 +67,18 @@ def calibration_of(solved: Solved, found: OverTemperatureEntry | None = None) ->
         model="matrix_times_m_plus_b" if solved.correction == "matrix" else "k_times_m_plus_b",
         serial_number=solved.serial_number,
         written_utc=datetime.now(UTC),
-        temperature_c=solved.temperature_c if found is None else found.reference_c,
+        temperature_c=solved.temperature_c if entry is None else entry.reference_c,
         matrix=(x, y, z),
         bias_rad_s=(bx, by, bz),
-        polynomials=None if found is None else _polynomials(found),
+        polynomials=None if entry is None else _polynomials(entry),
     )
 
 
-def _polynomials(found: OverTemperatureEntry) -> StoredPolynomials:
-    shares = np.array(found.scale[1:]) / np.array(found.scale[0])
+def _polynomials(entry: OverTemperatureEntry) -> StoredPolynomials:
+    shares = np.array(entry.scale[1:]) / np.array(entry.scale[0])
     one, two, three = ((x, y, z) for x, y, z in shares.tolist())
-    first, second, third = found.bias[1:]
-    return StoredPolynomials(found.range_c, (one, two, three), (first, second, third))
+    first, second, third = entry.bias[1:]
+    return StoredPolynomials(entry.range_c, (one, two, three), (first, second, third))
 
 
 def store(board: Board, index: int, calibration: Calibration) -> StoredCalibration:

@@ -42,12 +42,12 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))
 
 
-def changed(found: Configured, overrides: Sequence[str]) -> Configured:
+def changed(configured: Configured, overrides: Sequence[str]) -> Configured:
     """A configuration with values changed, as `load` takes them, and its script. Raises Refused as `configured`."""
-    procedures: Procedures = {**installed(), found.script.procedure.name: found.script.procedure}
-    with script_errors(f"the section of {found.script.name} fails"):
-        loaded = parse(found.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
-    return Configured(loaded, found.script, first_phase(found.script.procedure, loaded.config, procedures))
+    procedures: Procedures = {**installed(), configured.script.procedure.name: configured.script.procedure}
+    with script_errors(f"the section of {configured.script.name} fails"):
+        loaded = parse(configured.loaded.text, "configuration", overrides, sections(procedures), turners.sections())
+    return Configured(loaded, configured.script, first_phase(configured.script.procedure, loaded.config, procedures))
 
 
 @contextmanager

@@ -147,14 +147,14 @@ def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tup
         yield board, name, found
 
 
-def _document(name: str, found: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> dict[str, Any]:
-    agreement = found.agreement
+def _document(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> dict[str, Any]:
+    agreement = by_board.agreement
     return {
         "sensor": name,
         "serial_number": calibration.serial_number,
-        "moves": found.solved.taken,
+        "moves": by_board.solved.taken,
         "scale": list(calibration.scale),
-        "scale_std_of_session": found.solved.scale_std,
+        "scale_std_of_session": by_board.solved.scale_std,
         "expanded_scale": scale_u,
         "matrix": [list(row) for row in calibration.matrix],
         "bias_rad_s": list(calibration.bias_rad_s),
@@ -164,11 +164,11 @@ def _document(name: str, found: "CalibratedByBoard", calibration: Calibration, s
     }
 
 
-def _lines(name: str, found: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> Iterator[str]:
+def _lines(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> Iterator[str]:
     scale = " ".join(f"{value:.5f}" for value in calibration.scale)
     bias = " ".join(f"{value:+.6f}" for value in calibration.bias_rad_s)
-    agreement, std = found.agreement, found.solved.scale_std
-    yield f"{name}: the board has calibrated it from {found.solved.taken} moves"
+    agreement, std = by_board.agreement, by_board.solved.scale_std
+    yield f"{name}: the board has calibrated it from {by_board.solved.taken} moves"
     yield f"  scale  {scale}, U (k = 2) {scale_u:.1e}, of which {2 * std:.1e} by this session"
     yield f"  bias   {bias} rad/s"
     if agreement is None:

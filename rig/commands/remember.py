@@ -174,14 +174,14 @@ def why(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def _since(each: Beside) -> Since:
+def _since(calibration: Beside) -> Since:
     return Since(
-        each.now.sensor,
-        each.now.quantity,
-        each.before.id,
-        each.before.started_utc[:10],
-        {change.name: (change.before.value, change.before.expanded) for change in each.changes},
-        {change.name: change.normalised_error for change in each.changes},
+        calibration.now.sensor,
+        calibration.now.quantity,
+        calibration.before.id,
+        calibration.before.started_utc[:10],
+        {change.name: (change.before.value, change.before.expanded) for change in calibration.changes},
+        {change.name: change.normalised_error for change in calibration.changes},
     )
 
 

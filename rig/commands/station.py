@@ -73,7 +73,7 @@ def run(options: Namespace) -> int:
         return _carried_out(options, found, Asked(voice, numbers, present.asking), present)
 
 
-def _carried_out(options: Namespace, found: "Configured", operator: "Asked", present: "Present") -> int:
+def _carried_out(options: Namespace, configured: "Configured", operator: "Asked", present: "Present") -> int:
     from rig.batch.batch import Begun
     from rig.batch.journal import opened
     from rig.batch.table import CSV, summary
@@ -81,15 +81,15 @@ def _carried_out(options: Namespace, found: "Configured", operator: "Asked", pre
     from rig.commands.bench import Station, bench
     from rig.station.events import Interrupted
 
-    config = found.loaded.config
-    begun = Begun(options.operator, options.work_order, now_utc(), simulated=found.loaded.simulated)
+    config = configured.loaded.config
+    begun = Begun(options.operator, options.work_order, now_utc(), simulated=configured.loaded.simulated)
     journal = opened(options.out, Path(config.output.folder), begun)
     folder, said = journal.folder, journal.batch.begun
     say(f"batch folder: {folder}", sys.stderr)
     same = going_on(options, folder)
     station = Station(operator.attended, said.operator, said.work_order, (present,), same)
     try:
-        with _beating(config, present), bench(found, folder, station) as at:
+        with _beating(config, present), bench(configured, folder, station) as at:
             try:
                 Work(journal, config.station, operator, at, present.batch).all_parts()
             except KeyboardInterrupt as interrupt:

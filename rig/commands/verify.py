@@ -123,9 +123,9 @@ def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: An
     return _Found(file, look.signatures, said, attached_to, (*problems, *(() if known is None else known.problems)))
 
 
-def _tell(found: _Found) -> None:
-    say(f"{found.file}: {'NOT WHOLE, or not to be relied on' if found.problems else 'whole'}")
-    for each in found.signatures:
+def _tell(documents: _Found) -> None:
+    say(f"{documents.file}: {'NOT WHOLE, or not to be relied on' if documents.problems else 'whole'}")
+    for each in documents.signatures:
         when = "at a time it does not say" if each.when is None else f"{each.when:%Y-%m-%d %H:%M:%S %Z}"
         clock = "the signer's own clock" if each.time_server is None else f"the time server {each.time_server}"
         say(f"  signed by {each.signer}, {when} by {clock}")
@@ -133,11 +133,11 @@ def _tell(found: _Found) -> None:
         if each.long_term:
             say("  its certificate was not revoked at that time, by the authorities' lists in the file")
         say(f"  reason: {each.reason.text}")
-    if found.attached_to is not None:
-        say(f"  attached to {found.attached_to}, which is signed")
-    for words in found.history:
+    if documents.attached_to is not None:
+        say(f"  attached to {documents.attached_to}, which is signed")
+    for words in documents.history:
         say(f"  in the history: {words}")
-    for problem in found.problems:
+    for problem in documents.problems:
         say(f"  {problem}")
 
 
@@ -148,10 +148,10 @@ _TRUSTED = {
 }
 
 
-def _entry(found: _Found) -> dict[str, Any]:
+def _entry(documents: _Found) -> dict[str, Any]:
     return {
-        "file": str(found.file),
-        "whole": not found.problems,
+        "file": str(documents.file),
+        "whole": not documents.problems,
         "signatures": [
             {
                 "signer": each.signer,
@@ -162,9 +162,9 @@ def _entry(found: _Found) -> dict[str, Any]:
                 "trusted": each.trusted,
                 "long_term": each.long_term,
             }
-            for each in found.signatures
+            for each in documents.signatures
         ],
-        "attached_to": found.attached_to,
-        "history": list(found.history),
-        "problems": [{"name": each.name, "what": each.what, "remedy": each.remedy} for each in found.problems],
+        "attached_to": documents.attached_to,
+        "history": list(documents.history),
+        "problems": [{"name": each.name, "what": each.what, "remedy": each.remedy} for each in documents.problems],
     }

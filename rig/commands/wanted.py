@@ -63,12 +63,12 @@ def print_shortest_run(options: Namespace) -> int:
     return 0
 
 
-def wanted_of(said: Sequence[str], at_most_s: float | None) -> "Wanted":
+def wanted_of(options: Sequence[str], at_most_s: float | None) -> "Wanted":
     """What the words `scale=U`, `bias=U` and the like say. Raises Refused `bad_option`."""
     from rig.analysis.shortest import Wanted
 
     sizes: dict[str, float] = {}
-    for each in said:
+    for each in options:
         name, _, value = each.partition("=")
         try:
             sizes[name] = float(value)

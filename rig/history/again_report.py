@@ -117,30 +117,30 @@ def _lines(outcome: Outcome) -> Iterator[dict[str, str]]:
             yield _line(each, past)
 
 
-def _line(each: Compared, past: Past | None) -> dict[str, str]:
+def _line(compared: Compared, past: Past | None) -> dict[str, str]:
     """What a person reads of one calibration."""
-    move = _most_moved(each, past)
-    moved = past is not None and past.id in each.moved
+    move = _most_moved(compared, past)
+    moved = past is not None and past.id in compared.moved
     return {
         "number": "" if past is None else str(past.id),
-        "started": each.stated.started_utc.replace("T", " ")[:16],
+        "started": compared.stated.started_utc.replace("T", " ")[:16],
         "serial": "" if past is None else past.serial_number,
         "quantity": "" if past is None else past.quantity,
-        "rig": each.stated.rig,
-        "verdict": _verdict(each),
+        "rig": compared.stated.rig,
+        "verdict": _verdict(compared),
         "moved": _move_words(move) if moved and move is not None else "",
         "change": "" if not moved or move is None else _change(move),
-        "withdraw": _numbers(each.withdrawn),
-        "why": f"{STATE_WORDS[each.answer.state]}: {each.answer.why}" if isinstance(each.answer, Unsolved)
-        else "not reached" if each.answer is None else each.answer.left_out or "",
+        "withdraw": _numbers(compared.withdrawn),
+        "why": f"{STATE_WORDS[compared.answer.state]}: {compared.answer.why}" if isinstance(compared.answer, Unsolved)
+        else "not reached" if compared.answer is None else compared.answer.left_out or "",
     }  # fmt: skip
 
 
-def _verdict(each: Compared) -> str:
-    if not isinstance(each.answer, Given) or not each.verdict_changed:
-        return each.stated.verdict
-    by = f" ({', '.join(each.answer.failed)})" if each.answer.failed else ""
-    return f"{each.stated.verdict}, now {each.answer.verdict}{by}"
+def _verdict(compared: Compared) -> str:
+    if not isinstance(compared.answer, Given) or not compared.verdict_changed:
+        return compared.stated.verdict
+    by = f" ({', '.join(compared.answer.failed)})" if compared.answer.failed else ""
+    return f"{compared.stated.verdict}, now {compared.answer.verdict}{by}"
 
 
 def _move_words(move: Move) -> str:
@@ -159,21 +159,21 @@ def _numbers(certificates: tuple[Issued, ...]) -> str:
     return ", ".join(each.number for each in certificates)
 
 
-def _most_moved(each: Compared, past: Past | None) -> Move | None:
-    moves = () if past is None else each.moves.get(past.id, ())
+def _most_moved(compared: Compared, past: Past | None) -> Move | None:
+    moves = () if past is None else compared.moves.get(past.id, ())
     return moves[0] if moves else None
 
 
-def _rows(each: Compared) -> Iterator[dict[str, Any]]:
-    answer = each.answer
+def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
+    answer = compared.answer
     of_run: dict[str, Any] = {
-        "run": each.stated.run_id,
-        "started_utc": each.stated.started_utc,
-        "rig": each.stated.rig,
-        "verdict": each.stated.verdict,
-        "certificates_to_withdraw": _numbers(each.withdrawn),
-        "certificates_unconfirmed": _numbers(each.unconfirmed),
-        "folder": each.stated.places[0][1] if each.stated.places else None,
+        "run": compared.stated.run_id,
+        "started_utc": compared.stated.started_utc,
+        "rig": compared.stated.rig,
+        "verdict": compared.stated.verdict,
+        "certificates_to_withdraw": _numbers(compared.withdrawn),
+        "certificates_unconfirmed": _numbers(compared.unconfirmed),
+        "folder": compared.stated.places[0][1] if compared.stated.places else None,
     }
     if isinstance(answer, Given):
         of_run |= {
@@ -185,18 +185,18 @@ def _rows(each: Compared) -> Iterator[dict[str, Any]]:
         }
     else:
         of_run |= {"state": "unreached"} if answer is None else {"state": answer.state, "why": answer.why}
-    for past in each.stated.calibrations:
-        move = _most_moved(each, past)
+    for past in compared.stated.calibrations:
+        move = _most_moved(compared, past)
         yield {
             **of_run,
             "calibration": past.id,
             "part": past.part,
             "serial_number": past.serial_number,
             "quantity": past.quantity,
-            **({} if not isinstance(answer, Given) else {"moved": past.id in each.moved}),
+            **({} if not isinstance(answer, Given) else {"moved": past.id in compared.moved}),
             **({} if move is None else _of_move(move)),
         }
-    if not each.stated.calibrations:
+    if not compared.stated.calibrations:
         yield of_run
 
 

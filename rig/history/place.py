@@ -40,33 +40,33 @@ def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.
     return place(said or section.url)
 
 
-def own_place(said: str | None) -> Place | None:
-    """The user's: as `said` in a command, else in `RIG_HISTORY`, else the file of their own; None where it is off.
+def own_place(address: str | None) -> Place | None:
+    """The user's: `address` as in a command, else in `RIG_HISTORY`, else the file of their own; None where it is off.
 
     Raises Refused `history_address`.
     """
-    said = said or os.environ.get(ENVIRONMENT)
-    return None if said == OFF else place(said)
+    address = address or os.environ.get(ENVIRONMENT)
+    return None if address == OFF else place(address)
 
 
-def place(said: str | None) -> Place:
+def place(address: str | None) -> Place:
     """A file's name or a URL; None is the user's own file. Raises Refused `history_address`, and as `own_folder`."""
-    if not said:
-        said = str(own_folder() / NAME)
-    if "://" not in said:
+    if not address:
+        address = str(own_folder() / NAME)
+    if "://" not in address:
         try:
-            path = Path(said).expanduser().absolute()
+            path = Path(address).expanduser().absolute()
         except RuntimeError as error:  # a `~` of somebody who has no home
             remedy = "Write out the folder in --history, RIG_HISTORY or the configuration"
-            raise Refused("history_address", f"the history {said} cannot be found: {error}", remedy) from None
+            raise Refused("history_address", f"the history {address} cannot be found: {error}", remedy) from None
         return Place(str(path), path)
     try:
-        url = history_url(said)
+        url = history_url(address)
     except ValueError as error:
         # Not with what was said: it may hold a password.
         raise Refused(
             "history_address",
-            f"the address of the history, {said.partition('://')[0]}://…, {error}",
+            f"the address of the history, {address.partition('://')[0]}://…, {error}",
             "Correct it in --history, RIG_HISTORY or the configuration; docs/how-to/shared-history.md says how",
         ) from error
     if url.drivername == "sqlite":

@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.own_readings import own_readings
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Shown
 from rig.report.kinds.triad import bias_of
 
@@ -31,7 +31,7 @@ class Calibration:
     """
 
     name: str
-    found: Found[Any]
+    found: Finding[Any]
     shown: Shown
 
     @property

@@ -172,8 +172,8 @@ def _followed(of: Run | Result) -> tuple[Followed, ...]:
     return followed((solve(of) if isinstance(of, Run) else of).document)
 
 
-def _named(found: Mapping[Subject, Followed]) -> str:
-    return "; ".join(title_of((*each, False)) for each in found) or "no sensor"
+def _named(sensors: Mapping[Subject, Followed]) -> str:
+    return "; ".join(title_of((*each, False)) for each in sensors) or "no sensor"
 
 
 def _about(past: Past, name: str) -> Any:

@@ -36,10 +36,10 @@ def own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, w
     return found
 
 
-def _refuse_other_units(found: Array, quantity: Quantity, limit: float | None, whose: str) -> None:
+def _refuse_other_units(values: Array, quantity: Quantity, limit: float | None, whose: str) -> None:
     known = quantity.mistaken
     most = BEYOND * limit if limit is not None else np.inf if known is None else known.most
-    largest = float(np.abs(found[~np.isnan(found)]).max(initial=0.0))
+    largest = float(np.abs(values[~np.isnan(values)]).max(initial=0.0))
     instead = "another unit" if known is None else known.unit
     mend = f"Give them in {quantity.unit}" + ("" if known is None else f": {known.mend}")
     if largest > most:
@@ -50,7 +50,7 @@ def _refuse_other_units(found: Array, quantity: Quantity, limit: float | None, w
             "or like counts",
             mend,
         )
-    sizes = np.linalg.norm(found[~np.isnan(found).any(axis=1)], axis=1)
+    sizes = np.linalg.norm(values[~np.isnan(values).any(axis=1)], axis=1)
     if quantity == ACCELERATION and len(sizes) and 0.9 < float(np.median(sizes)) < 1.1:
         raise Refused(
             "wrong_unit",

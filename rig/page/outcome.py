@@ -93,11 +93,11 @@ def _next(words: str, command: str) -> Row:
     return {"words": words, "command": command}
 
 
-def _numbers(found: Three, nominal: float, limit: float | None) -> Row:
-    texts = [in_print(value, u) for value, u in zip(found.values, found.expanded, strict=True)]
+def _numbers(three: Three, nominal: float, limit: float | None) -> Row:
+    texts = [in_print(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
     return {
-        "values": [float(value) for value in found.values],
-        "expanded": [float(u) for u in found.expanded],
+        "values": [float(value) for value in three.values],
+        "expanded": [float(u) for u in three.expanded],
         "texts": [value for value, _ in texts],
         "u": [u for _, u in texts],
         "nominal": nominal,

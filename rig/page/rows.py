@@ -114,9 +114,9 @@ def _parameters_so_far(name: str, partial: SoFar) -> Row:
     return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": solution.what}
 
 
-def _row(found: Shown) -> Row:
-    of = COMBINED if found.combined else NOISE_ONLY
-    return {**_row_of(found.name, found.unit, found.numbers, found.scale, of=of), "missing": None}
+def _row(shown: Shown) -> Row:
+    of = COMBINED if shown.combined else NOISE_ONLY
+    return {**_row_of(shown.name, shown.unit, shown.numbers, shown.scale, of=of), "missing": None}
 
 
 def _row_of(name: str, unit: Unit, bias: Three | None, scale: Three | None, *, of: str) -> Row:

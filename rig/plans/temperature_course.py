@@ -38,15 +38,15 @@ class Course:
             self.warming = self.sets[-1].warming
             self._turn_round(self.sets[-1])
 
-    def measured(self, each: SetMeasured) -> None:
+    def measured(self, step: SetMeasured) -> None:
         """Count a set, and turn round where it was at the end of the range."""
-        self.sets.append(each)
-        self._turn_round(each)
+        self.sets.append(step)
+        self._turn_round(step)
 
-    def _turn_round(self, each: SetMeasured) -> None:
-        if self.warming and min(each.temperatures_c.values()) >= self.to_c - AT_THE_END * self.gap_k:
+    def _turn_round(self, step: SetMeasured) -> None:
+        if self.warming and min(step.temperatures_c.values()) >= self.to_c - AT_THE_END * self.gap_k:
             self.warming = False
-        elif not self.warming and max(each.temperatures_c.values()) <= self.from_c + AT_THE_END * self.gap_k:
+        elif not self.warming and max(step.temperatures_c.values()) <= self.from_c + AT_THE_END * self.gap_k:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:

@@ -155,14 +155,14 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
             _print_polynomials(console, calibration.polynomials)
 
 
-def _print_polynomials(console: Console, found: StoredPolynomials) -> None:
-    low, high = found.range_c
+def _print_polynomials(console: Console, polynomials: StoredPolynomials) -> None:
+    low, high = polynomials.range_c
     words = "for each power of kelvins, as a share of the scale, and rad/s"
     console.print(f"corrected by temperature from {low:.1f} to {high:.1f} °C; {words}:", soft_wrap=True)
     table = Table(box=SIMPLE)
     for heading in ("power", "scale x", "scale y", "scale z", "bias x", "bias y", "bias z"):
         table.add_column(heading, justify="right")
-    for power, rows in enumerate(zip(found.scale_change, found.bias_change_rad_s, strict=True), start=1):
+    for power, rows in enumerate(zip(polynomials.scale_change, polynomials.bias_change_rad_s, strict=True), start=1):
         table.add_row(str(power), *(f"{each:+.2e}" for row in rows for each in row))
     console.print(table)
 

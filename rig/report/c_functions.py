@@ -11,35 +11,35 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import SensorEntry
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 
 
-def gyroscope_lines(found: Found[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
+def gyroscope_lines(finding: Finding[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
     """C of a gyroscope that was calibrated; none of a reference."""
-    if found.entry.role != "calibrate":
+    if finding.entry.role != "calibrate":
         return
-    prefix, sensitivity = prefix_of(found.sensor), sensed.get(found.sensor)
-    yield from _correction(prefix, found.entry)
+    prefix, sensitivity = prefix_of(finding.sensor), sensed.get(finding.sensor)
+    yield from _correction(prefix, finding.entry)
     if sensitivity is not None:
         yield from _without_gravity(prefix, sensitivity)
 
 
-def accelerometer_lines(found: Found[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
     """C of an accelerometer."""
-    entry = found.entry
+    entry = finding.entry
     axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
     left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
     about = f"{entry.part}, serial number {entry.serial_number}{_warm(entry.temperature_c)}"
-    return _subtracting(found, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
+    return _subtracting(finding, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
         f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
         f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
     ))  # fmt: skip
 
 
-def magnetometer_lines(found: Found[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
     """C of a magnetometer, as it was mounted."""
-    entry = found.entry
-    return _subtracting(found, entry.bias_t, entry.correction_matrix, "field_t", (
+    entry = finding.entry
+    return _subtracting(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
         f" * In the right-angled frame of its own axes, as mounted, relative to a field of {entry.field_t:g} T. */",
     ))  # fmt: skip
@@ -97,17 +97,17 @@ def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
 
 
 def _subtracting(
-    found: Found[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
+    finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
     """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
-    of, unit = f"{prefix_of(found.sensor)}_{found.quantity}", found.quantity.suffix
+    of, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
     yield from (
         "",
         *about,
         f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
         f"static const float {of}_matrix[3][3] = {c_rows(matrix)};",
         "",
-        f"static inline void {prefix_of(found.sensor)}_calibrate_{found.quantity}("
+        f"static inline void {prefix_of(finding.sensor)}_calibrate_{finding.quantity}("
         f"const float reading_{unit}[3], float {true}[3])",
         "{",
         "    for (int i = 0; i < 3; i++) {",

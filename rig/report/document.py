@@ -37,9 +37,9 @@ def document_of(outcome: Outcome) -> ResultDocument:
     )
 
 
-def _mount(found: FoundMount) -> MountEntry:
+def _mount(mount: FoundMount) -> MountEntry:
     return MountEntry.model_validate(
-        {"stage": found.stage + 1, "turn_rad": tuple(found.turn_rad), "std_rad": tuple(found.std_rad)}
+        {"stage": mount.stage + 1, "turn_rad": tuple(mount.turn_rad), "std_rad": tuple(mount.std_rad)}
     )
 
 

@@ -81,62 +81,64 @@ def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
     return told
 
 
-def rates_in_attitudes(found: OfSensor) -> InAttitudesRatesEntry | None:
+def rates_in_attitudes(sensor: OfSensor) -> InAttitudesRatesEntry | None:
     """What attitudes tell of a gyroscope beside scale and bias; None where it was swept."""
-    if found.rates is None:
+    if sensor.rates is None:
         return None
-    earth = _earth_rate(found.rates)
+    earth = _earth_rate(sensor.rates)
     return InAttitudesRatesEntry.model_validate(
         {
             "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.rate_rad_s.tolist(),
             "earth_rate_std_rad_s": None if isinstance(earth, Fault) else earth.std_rad_s.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
-            "followed": _followed(found.rates) if isinstance(found.rates, InIncrements) else None,
-            "covariance": found.rates.solution.covariance.tolist(),
+            "followed": _followed(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
+            "covariance": sensor.rates.solution.covariance.tolist(),
             "covariance_order": ORDER[:15],
-            "beside": {} if isinstance(found.rates, InIncrements) else _rates_beside(found.rates),
+            "beside": {} if isinstance(sensor.rates, InIncrements) else _rates_beside(sensor.rates),
         }
     )
 
 
-def turned(found: OfSensor) -> TurnedEntry | None:
+def turned(sensor: OfSensor) -> TurnedEntry | None:
     """What the turns were taken for that a gyroscope was solved by; None where means of sweeps or attitudes told it."""
-    if found.turned is None or found.gyroscope is None:
+    if sensor.turned is None or sensor.gyroscope is None:
         return None
-    turns = found.turned.turns
+    turns = sensor.turned.turns
     return TurnedEntry(
-        rows=found.turned.rows,
+        rows=sensor.turned.rows,
         angle_std_rad=max(turn.angle_std_rad for turn in turns),
         axis_std_rad=max(turn.axis_std_rad for turn in turns),
-        widened=getattr(found.gyroscope.solution, "widened", 1.0),
+        widened=getattr(sensor.gyroscope.solution, "widened", 1.0),
     )
 
 
-def _earth_rate(found: Result) -> EarthSeen | Fault:
+def _earth_rate(result: Result) -> EarthSeen | Fault:
     """The Earth's rate in the axes of the table, or the Fault for which it is not known."""
-    if isinstance(found, InIncrements):
-        return found.solution.earth
-    if found.reference_fault is not None:
-        return found.reference_fault
-    return EarthSeen(found.solution.reference, found.solution.covariance[REFERENCE, REFERENCE])
+    if isinstance(result, InIncrements):
+        return result.solution.earth
+    if result.reference_fault is not None:
+        return result.reference_fault
+    return EarthSeen(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
 
 
-def _followed(found: InIncrements) -> FollowedEntry:
-    residuals = found.solution.residuals_rad
+def _followed(increments: InIncrements) -> FollowedEntry:
+    residuals = increments.solution.residuals_rad
     return entry(
-        FollowedEntry, found.solution, found,
+        FollowedEntry, increments.solution, increments,
         increments=len(residuals),
         residual_rms_rad=float(np.sqrt(np.mean(residuals**2))),
-        left_out=[LeftOutEntry(error=each.name, count=each.count, first_s=each.first_s) for each in found.left_out],
+        left_out=[
+            LeftOutEntry(error=each.name, count=each.count, first_s=each.first_s) for each in increments.left_out
+        ],
     )  # fmt: skip
 
 
-def _rates_beside(found: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
+def _rates_beside(attitudes: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
     return {
         method: ErrorEntry(error=str(other))
         if isinstance(other, Fault)
         else entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
-        for method, other in found.beside.items()
+        for method, other in attitudes.beside.items()
     }
 
 
@@ -149,9 +151,9 @@ def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site,
     ]
 
 
-def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **own: Any) -> Any:
+def _at_rest(kind: Any, quantity: Quantity, item: Item, attitudes: InAttitudes, **own: Any) -> Any:
     """What the entries of accelerometers and magnetometers share, each in the unit of its quantity."""
-    solution, error, laid = found.solution, found.solution.attitude_error, found.laid
+    solution, error, laid = attitudes.solution, attitudes.solution.attitude_error, attitudes.laid
     axes = SensorAxes.of(solution.matrix)
     return entry(
         kind, solution,
@@ -162,8 +164,8 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **ow
         covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
         covariance_order=PARAMETERS,
         covariance_units=quantity.parameter_units,
-        covariance_combined=found.budget.covariance,
-        budget=budget_entry(found.budget),
+        covariance_combined=attitudes.budget.covariance,
+        budget=budget_entry(attitudes.budget),
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         attitude_error_rad=None if error is None else error.std_rad,
@@ -173,8 +175,8 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **ow
         laid_down=LaidDownEntry(
             placement_std=None if laid is None else laid.placement_std,
             placement_uncertainty=None if laid is None else laid.placement_uncertainty,
-            rests_elsewhere=found.elsewhere,
-            rows_left_out=found.moving,
+            rests_elsewhere=attitudes.elsewhere,
+            rows_left_out=attitudes.moving,
             covariance=solution.covariance.tolist(),
             covariance_order=ORDER[: len(solution.covariance)],
         ),
@@ -183,10 +185,10 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **ow
     )  # fmt: skip
 
 
-def _dwells(kind: Any, quantity: Quantity, found: InAttitudes) -> list[Any]:
-    assert found.seen is not None, "of placements"
-    expected = attitude_residual_std(found.solution, found.seen)
-    rows = zip(found.dwells, found.solution.residuals, expected, strict=True)
+def _dwells(kind: Any, quantity: Quantity, attitudes: InAttitudes) -> list[Any]:
+    assert attitudes.seen is not None, "of placements"
+    expected = attitude_residual_std(attitudes.solution, attitudes.seen)
+    rows = zip(attitudes.dwells, attitudes.solution.residuals, expected, strict=True)
     return [dwell_entry(kind, quantity, *each) for each in rows]
 
 

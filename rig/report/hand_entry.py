@@ -18,41 +18,41 @@ WORDS = {
 UNITS = {"repeat_rad": 1e3, "closure_rad": 1e3, "of_angle": 1e2}
 
 
-def by_hand_entry(found: HandSolution) -> ByHandEntry:
+def by_hand_entry(solution: HandSolution) -> ByHandEntry:
     """The entry of a solution."""
     return ByHandEntry(
-        rests=tuple(entry(RestByHandEntry, each) for each in found.rests),
-        moves=tuple(entry(MoveByHandEntry, each) for each in found.moves),
+        rests=tuple(entry(RestByHandEntry, each) for each in solution.rests),
+        moves=tuple(entry(MoveByHandEntry, each) for each in solution.moves),
         sizes=tuple(
             HandSizeEntry(name=name, found=size, stated=stated, refused=refused)
-            for name, (size, stated, refused) in found.sizes.items()
+            for name, (size, stated, refused) in solution.sizes.items()
         ),
-        chi_square=found.chi_square,
-        freedom=found.freedom,
-        session_std=tuple(np.sqrt(np.diag(found.covariance))[:3].tolist()),
+        chi_square=solution.chi_square,
+        freedom=solution.freedom,
+        session_std=tuple(np.sqrt(np.diag(solution.covariance))[:3].tolist()),
     )
 
 
-def by_hand_lines(found: ByHandEntry) -> Iterator[str]:
+def by_hand_lines(entry: ByHandEntry) -> Iterator[str]:
     """Faces, moves and sizes, in words."""
-    flips, turns = (sum(each.kind == kind for each in found.moves) for kind in ("flip", "turn"))
-    faces = " ".join(rest.face or "(none)" for rest in found.rests)
-    yield f"by hand: {len(found.rests)} rests, {flips} flips, {turns} turns; faces upwards: {faces}"
-    for number, move in enumerate(found.moves, 1):
+    flips, turns = (sum(each.kind == kind for each in entry.moves) for kind in ("flip", "turn"))
+    faces = " ".join(rest.face or "(none)" for rest in entry.rests)
+    yield f"by hand: {len(entry.rests)} rests, {flips} flips, {turns} turns; faces upwards: {faces}"
+    for number, move in enumerate(entry.moves, 1):
         if move.closure_rad is not None:
             closure = f"{1e3 * move.closure_rad:+.1f} mrad off where it began"
             yield f"move {number}: {move.turns:+d} turns, {np.degrees(move.angle_rad):.2f}°, {closure}"
-    there = {size.name: size for size in found.sizes}
-    used = {"closure_rad": any(move.closure_rad is not None for move in found.moves)}
+    there = {size.name: size for size in entry.sizes}
+    used = {"closure_rad": any(move.closure_rad is not None for move in entry.moves)}
     said = [
         WORDS[name].format(UNITS.get(name, 1.0) * there[name].found)
         for name in WORDS  # what a later version may add has no words here
         if name in there and used.get(name, True)
     ]
     yield f"as found (one standard deviation): {'; '.join(said)}"
-    worst = max([*(each.pull for each in found.rests), *(each.pull for each in found.moves)], default=0.0)
-    yield f"χ²/dof {found.chi_square / max(found.freedom, 1.0):.2f}, the largest pull {worst:.1f}"
-    known = ", ".join(f"{2 * std:.1e}" for std in found.session_std)
+    worst = max([*(each.pull for each in entry.rests), *(each.pull for each in entry.moves)], default=0.0)
+    yield f"χ²/dof {entry.chi_square / max(entry.freedom, 1.0):.2f}, the largest pull {worst:.1f}"
+    known = ", ".join(f"{2 * std:.1e}" for std in entry.session_std)
     yield (
         f"U of k by this session and its clock alone: {known}; the table has beside it how real hands' recordings "
         "disagree with themselves. Nothing shows an error of the clock but another clock"

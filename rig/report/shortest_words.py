@@ -51,40 +51,40 @@ def _said(section: ProcedureSection) -> dict[str, Any]:
     return said
 
 
-def print_shortest(found: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
+def print_shortest(shortest: Shortest, section: ProcedureSection, *, as_json: bool) -> None:
     """What was found, on stdout: tables for people, JSON in SI units for machines."""
     if as_json:
-        print(json.dumps(shortest_document(found, section), indent=2, allow_nan=False))
+        print(json.dumps(shortest_document(shortest, section), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
-    console.print(plain(_verdict(found)))
-    shown = found.best or found.nearest
+    console.print(plain(_verdict(shortest)))
+    shown = shortest.best or shortest.nearest
     if shown is not None:
-        console.print(_plans(found, shown, section))
+        console.print(_plans(shortest, shown, section))
         console.print(_limits("What limits it, as shares of the variance:", shown.budgets))
-    console.print(plain(_floor(found)))
-    if found.directions is not None:
-        console.print(_optimality(found.directions))
-    console.print(plain(f"{found.tried} of {found.among} plans were looked at. {ASSUMED}"))
+    console.print(plain(_floor(shortest)))
+    if shortest.directions is not None:
+        console.print(_optimality(shortest.directions))
+    console.print(plain(f"{shortest.tried} of {shortest.among} plans were looked at. {ASSUMED}"))
 
 
-def shortest_document(found: Shortest, section: ProcedureSection) -> dict[str, Any]:
+def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str, Any]:
     """What was found, for machines; null where there is no such plan or no such wish."""
-    shown = found.best or found.nearest
+    shown = shortest.best or shortest.nearest
     return {
         "schema": "rig.shortest/1",
         "wanted": {
-            **{size: _finite(getattr(found.wanted, size)) for size in SIZES},
-            "at_most_s": _finite(found.wanted.at_most_s),
+            **{size: _finite(getattr(shortest.wanted, size)) for size in SIZES},
+            "at_most_s": _finite(shortest.wanted.at_most_s),
         },
-        "reached": found.best is not None,
-        "cannot_be_had": found.cannot_be_had,
+        "reached": shortest.best is not None,
+        "cannot_be_had": shortest.cannot_be_had,
         "plan": None if shown is None else _plan_entry(shown, section),
-        "before": None if found.before is None else _plan_entry(found.before, section),
-        "at_any_length": _sizes_entry(found.at_any_length),
-        "optimality": None if found.directions is None else _efficiencies(found.directions),
-        "tried": found.tried,
-        "among": found.among,
+        "before": None if shortest.before is None else _plan_entry(shortest.before, section),
+        "at_any_length": _sizes_entry(shortest.at_any_length),
+        "optimality": None if shortest.directions is None else _efficiencies(shortest.directions),
+        "tried": shortest.tried,
+        "among": shortest.among,
     }
 
 
@@ -105,12 +105,12 @@ def _sizes_entry(reached: Reached) -> dict[str, float | None]:
     return {size: getattr(reached, size) or None for size in SIZES}
 
 
-def _verdict(found: Shortest) -> str:
-    wish = wish_words(found.wanted)
-    within = "" if found.wanted.at_most_s == inf else f" within {found.wanted.at_most_s:g} s"
-    if found.best is not None:
-        return f"The shortest run for {wish} takes {found.best.candidate.duration_s:.1f} s."
-    if found.cannot_be_had:
+def _verdict(shortest: Shortest) -> str:
+    wish = wish_words(shortest.wanted)
+    within = "" if shortest.wanted.at_most_s == inf else f" within {shortest.wanted.at_most_s:g} s"
+    if shortest.best is not None:
+        return f"The shortest run for {wish} takes {shortest.best.candidate.duration_s:.1f} s."
+    if shortest.cannot_be_had:
         return f"No run of this kind reaches {wish}, however long it is."
     return f"No plan that was looked at reaches {wish}{within}; this one comes nearest."
 
@@ -123,12 +123,12 @@ def wish_words(wanted: Wanted) -> str:
     )
 
 
-def _plans(found: Shortest, shown: Planned, section: ProcedureSection) -> Table:
+def _plans(shortest: Shortest, shown: Planned, section: ProcedureSection) -> Table:
     """The plan beside the file's own."""
     table = Table(box=SIMPLE)
-    for heading in ("", "as in the file", "shortest" if found.best else "nearest"):
+    for heading in ("", "as in the file", "shortest" if shortest.best else "nearest"):
         table.add_column(heading, justify="right" if heading else "left")
-    before = found.before
+    before = shortest.before
     was = _said(section)
     for key, value in changed_keys(section, shown.candidate.procedure).items():
         table.add_row(f"procedure.{key}", plain(_shown(was.get(key))), plain(_shown(value)))
@@ -177,11 +177,11 @@ def _share(part: float, whole: float) -> float:
     return float((part / whole) ** 2) if whole > 0 else 0.0
 
 
-def _floor(found: Shortest) -> str:
+def _floor(shortest: Shortest) -> str:
     """What no run of this kind gets below, and why."""
     parts = []
     for place, (size, (unit, what)) in enumerate(SHOWN.items()):
-        least = found.least(size)
+        least = shortest.least(size)
         of_kind = Budgets(least.rates) if place < len(SIZES) // 2 else Budgets({}, least.accelerations)
         lines = [each for each in _shares(of_kind).values() if each]
         largest = sorted({max(each, key=lambda line: line[1 + place % 2])[0] for each in lines})

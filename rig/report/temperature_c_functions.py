@@ -8,13 +8,13 @@ from rig.data.quantity import RATE
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.c_functions import c_rows, prefix_of
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 
 
-def temperature_lines(found: Found[OverTemperatureEntry], _: Mapping[str, Array]) -> Iterator[str]:
+def temperature_lines(finding: Finding[OverTemperatureEntry], _: Mapping[str, Array]) -> Iterator[str]:
     """C of a sensor over temperature, beside matrix and bias of its calibration at the reference temperature."""
-    entry, quantity = found.entry, found.quantity
-    sensor, unit = prefix_of(found.sensor), quantity.suffix
+    entry, quantity = finding.entry, finding.quantity
+    sensor, unit = prefix_of(finding.sensor), quantity.suffix
     of = sensor if quantity == RATE else f"{sensor}_{quantity}"
     function = f"{sensor}_calibrate" if quantity == RATE else f"{sensor}_calibrate_{quantity}"
     sign, low, high = ("+" if quantity == RATE else "-"), *entry.range_c

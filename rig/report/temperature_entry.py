@@ -13,34 +13,34 @@ ROWS = 17  # of the table: each fourth stands on a certificate
 
 
 def temperature_entry(
-    quantity: Quantity, found: OverTemperature, sensor: RecordedSensor | Item
+    quantity: Quantity, polynomials: OverTemperature, sensor: RecordedSensor | Item
 ) -> OverTemperatureEntry:
     """The polynomials of that sensor, in SI units; of a gyroscope b = −c, which g = K (m + b) adds."""
     sign = -1.0 if quantity == RATE else 1.0
     signs = np.repeat([1.0, sign], COEFFICIENTS // 2)
     at = powers_at(0.0)
     return entry(
-        OverTemperatureEntry, found,
+        OverTemperatureEntry, polynomials,
         part=sensor.part,
         serial_number=sensor.serial_number,
         full_scale=None if isinstance(sensor, Item) else sensor.channel(quantity).range,
         unit=quantity.unit,
-        bias=sign * found.bias,
-        covariance=np.outer(signs, signs) * found.covariance,
+        bias=sign * polynomials.bias,
+        covariance=np.outer(signs, signs) * polynomials.covariance,
         contributors=[
             entry(TemperatureLineEntry, line,
                   freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
                   std=np.sqrt(np.diag(at @ line.covariance @ at.T).clip(min=0.0)))
-            for line in found.lines
+            for line in polynomials.lines
         ],
-        table=[_row(found, temperature_c, sign) for temperature_c in np.linspace(*found.range_c, ROWS).tolist()],
-        hysteresis=None if found.hysteresis is None else found.hysteresis[0] * np.repeat([1.0, sign], 3),
-        hysteresis_std=None if found.hysteresis is None else found.hysteresis[1],
+        table=[_row(polynomials, warm_c, sign) for warm_c in np.linspace(*polynomials.range_c, ROWS).tolist()],
+        hysteresis=None if polynomials.hysteresis is None else polynomials.hysteresis[0] * np.repeat([1.0, sign], 3),
+        hysteresis_std=None if polynomials.hysteresis is None else polynomials.hysteresis[1],
     )  # fmt: skip
 
 
-def _row(found: OverTemperature, temperature_c: float, sign: float) -> AtTemperatureEntry:
-    held = found.at(temperature_c)
+def _row(polynomials: OverTemperature, temperature_c: float, sign: float) -> AtTemperatureEntry:
+    held = polynomials.at(temperature_c)
     return entry(
         AtTemperatureEntry,
         temperature_c=temperature_c,

@@ -24,19 +24,19 @@ def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder
         [
             Picture(
                 f"over_temperature_{sensor}",
-                f"{sensor}: change from {next(iter(found.values())).reference_c:g} °C",
-                (11.0, 4.2 * len(found)),
-                partial(_draw, found=found),
+                f"{sensor}: change from {next(iter(entries.values())).reference_c:g} °C",
+                (11.0, 4.2 * len(entries)),
+                partial(_draw, entries=entries),
             )
-            for sensor, found in document.over_temperature.items()
+            for sensor, entries in document.over_temperature.items()
         ],
         folder,
     )
 
 
-def _draw(figure: "Figure", found: Mapping[str, OverTemperatureEntry]) -> None:
-    panels = figure.subplots(len(found), 2, squeeze=False)
-    for (left, right), (name, entry) in zip(panels, found.items(), strict=True):
+def _draw(figure: "Figure", entries: Mapping[str, OverTemperatureEntry]) -> None:
+    panels = figure.subplots(len(entries), 2, squeeze=False)
+    for (left, right), (name, entry) in zip(panels, entries.items(), strict=True):
         unit = quantities()[name].drift
         warm = np.array([row.temperature_c for row in entry.table])
         scales = np.array([row.scale for row in entry.table]) / np.array(entry.scale[0]) - 1

@@ -71,7 +71,7 @@ class Run:
             runs: tuple[RunData, ...] = ()
             if outcome.passed:
                 self._store(outcome)
-                runs = self._recorded(phase, Resumption(), moved=True, found=outcome.results)
+                runs = self._recorded(phase, Resumption(), moved=True, results=outcome.results)
             else:
                 self.station.event(PhaseSkipped(phase.procedure.name))
             outcome = self._judged(phase, runs, outcome)
@@ -94,9 +94,9 @@ class Run:
             return resumption(earlier, self._settings(phase), self.script)
 
     def _recorded(
-        self, phase: Phase, resumed: Resumption, *, moved: bool, found: Mapping[str, SensorResult] | None = None
+        self, phase: Phase, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None = None
     ) -> tuple[RunData, ...]:
-        """Carry out the phase's script, with the calibrations `found` before; all recordings of the phase.
+        """Carry out the phase's script, with the `results` of the calibration before; all recordings of the phase.
 
         The item is mounted anew before each stage with nothing connected: what is in the way may be unplugged.
         """
@@ -109,7 +109,7 @@ class Run:
             if stages:
                 with self.reported(self._mended, moved=moved):
                     self._mounted(plan, number)
-            path = self._record(phase, number, resumed, moved=moved, found=found)
+            path = self._record(phase, number, resumed, moved=moved, results=results)
             if stages:
                 with self.reported(self._repeating, moved=True):
                     earlier = [read_run(file) for file in recordings(self.folder, readings)]
@@ -136,14 +136,14 @@ class Run:
         resumed: Resumption,
         *,
         moved: bool,
-        found: Mapping[str, SensorResult] | None,
+        results: Mapping[str, SensorResult] | None,
     ) -> Path:
         """Carry out the phase's script for one stage, which is the whole of it where there are none; the recording."""
         path = next_recording(self.folder, phase.procedure.readings)
         own = phase.procedure is self.script.procedure
         script = self.script if own else installed_script(phase.procedure.name)
         settings = replace(self._settings(phase), stage=stage)
-        told = self.station, resumed, found or {}, self.memory, self.connecting
+        told = self.station, resumed, results or {}, self.memory, self.connecting
         connector = Connector(phase, self.loaded, settings, script, path, *told)
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))

@@ -17,7 +17,7 @@ from rig.report.certificate.plots import (
     residuals,
 )
 from rig.report.document import document_of
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_ATTITUDES, OF_SAMPLES
 from rig.report.printed_budget import printed_budget
 from support.certified import accelerometer, certificate, everything, magnetometer, read, result
@@ -34,7 +34,7 @@ def bars(picture: Residuals) -> np.ndarray:
 def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
     sensor = result().sensors["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.vector_model.residuals_std_rad_s is not None
-    picture = residuals(Found("gyro", RATE, sensor))
+    picture = residuals(Finding("gyro", RATE, sensor))
     assert picture is not None and picture.of == EXPECTED
     factor = {"mrad/s": 1e3, "µrad/s": 1e6}[picture.unit]
     expected = 2 * factor * np.array(sensor.vector_model.residuals_std_rad_s)
@@ -44,7 +44,7 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
 
 def test_bars_of_results_of_before_are_called_what_they_are() -> None:
     sensor = read_result(RECORDINGS / "rig.settings-6" / "imu").sensors["gyro"]
-    picture = residuals(Found("gyro", RATE, sensor))
+    picture = residuals(Finding("gyro", RATE, sensor))
     assert picture is not None and picture.of == OF_SAMPLES
     assert "which holds vibration" in picture.of
 
@@ -55,13 +55,13 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
     one = found.dwells[0].model_copy(
         update={"mean_m_s2": (9.81 + 0.3, -0.2, 0.1), "mean_std_m_s2": (noise, noise, noise)}
     )
-    picture = attitude_residuals(Found("imu", ACCELERATION, found.model_copy(update={"dwells": (one,)})))
+    picture = attitude_residuals(Finding("imu", ACCELERATION, found.model_copy(update={"dwells": (one,)})))
     assert picture.of == OF_ATTITUDES and picture.unit == "mm/s²"
     assert off is not None
     across = 2e3 * np.hypot(noise, 9.81 * off)
     np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
     field = magnetometer()
-    assert attitude_residuals(Found("imu", FIELD, field)).of == OF_ATTITUDES
+    assert attitude_residuals(Finding("imu", FIELD, field)).of == OF_ATTITUDES
 
 
 @pytest.mark.slow
@@ -71,10 +71,10 @@ def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so()
     assert isinstance(field, MagnetometerEntry)
     pictures = (
         (
-            attitude_residuals(Found("imu", ACCELERATION, acceleration)),
+            attitude_residuals(Finding("imu", ACCELERATION, acceleration)),
             [each.residual_std_m_s2 for each in acceleration.dwells],
         ),
-        (attitude_residuals(Found("imu", FIELD, field)), [each.residual_std_t for each in field.dwells]),
+        (attitude_residuals(Finding("imu", FIELD, field)), [each.residual_std_t for each in field.dwells]),
     )
     for picture, expected in pictures:
         assert picture.of in (EXPECTED_IN_ATTITUDES[ACCELERATION], EXPECTED_IN_ATTITUDES[FIELD])
@@ -89,7 +89,7 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
     for name, kind in (("imu", "accelerometers"), ("magnetometer", "magnetometers")):
         document = read_result(RECORDINGS / "rig.settings-6" / name)
         for found in getattr(document, kind).values():
-            picture = attitude_residuals(Found("imu", ACCELERATION if kind == "accelerometers" else FIELD, found))
+            picture = attitude_residuals(Finding("imu", ACCELERATION if kind == "accelerometers" else FIELD, found))
             assert picture.within >= 0.85 * len(picture.points)
 
 

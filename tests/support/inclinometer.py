@@ -27,8 +27,8 @@ from rig.estimation.arrays import Array
 from rig.observation.placements import Placements
 from rig.report.certificate.xml_parts import dcc, real_list, text
 from rig.report.expanded import expanded
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import Followed, known, scale_and_bias
-from rig.report.kinds.found import Found
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Without
 from rig.report.kinds.triad import shown_of, tables
 from rig.report.kinds.unexplained import Unexplained
@@ -117,38 +117,38 @@ def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     return made
 
 
-def _found(document: ResultDocument) -> Iterator[Found[InclinometerEntry]]:
+def _found(document: ResultDocument) -> Iterator[Finding[InclinometerEntry]]:
     for name, entry in document.others.get(KEY, {}).items():
-        yield Found(name, INCLINATION, InclinometerEntry.model_validate(entry))
+        yield Finding(name, INCLINATION, InclinometerEntry.model_validate(entry))
 
 
-def _printed(found: Found[InclinometerEntry]) -> Iterator[Table | str]:
+def _printed(found: Finding[InclinometerEntry]) -> Iterator[Table | str]:
     yield from tables(f"{found.sensor}: inclinometer, m = φ / k + b", INCLINATION, found.entry)
 
 
-def _shown(found: Found[InclinometerEntry]) -> Shown:
+def _shown(found: Finding[InclinometerEntry]) -> Shown:
     return replace(shown_of(found), combined=found.entry.covariance_combined is not None)
 
 
-def _followed(found: Found[InclinometerEntry], document: ResultDocument) -> Followed:
+def _followed(found: Finding[InclinometerEntry], document: ResultDocument) -> Followed:
     entry = found.entry
     rows = list(scale_and_bias(found.sensor, INCLINATION, entry, entry.bias_rad, document))
     of = entry.part, entry.serial_number, 0.0, entry.estimator, None
     return Followed(found.sensor, INCLINATION.name, *of, known(rows))
 
 
-def _unexplained(found: Found[InclinometerEntry]) -> Unexplained:
+def _unexplained(found: Finding[InclinometerEntry]) -> Unexplained:
     left = np.array(found.entry.residuals_rad)
     labels = [f"attitude {number}" for number in range(1, len(left) + 1)]
     return Unexplained(INCLINATION, labels, left, np.full(left.shape, TABLE_STD_RAD), "the table's attitudes")
 
 
-def _header(found: Found[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+def _header(found: Finding[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
     x, y = found.entry.scale
     yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
 
 
-def _measured(found: Found[InclinometerEntry], _: Any) -> Measured:
+def _measured(found: Finding[InclinometerEntry], _: Any) -> Measured:
     entry, spread = found.entry, [found.entry.covariance[i][i] ** 0.5 for i in range(2)]
     listed = real_list("xy", entry.scale, [r"\one"], expanded=expanded(spread, None))
     result: Element = dcc("result", text("name", "scale factor"), dcc("data", listed))

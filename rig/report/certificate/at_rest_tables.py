@@ -40,56 +40,56 @@ class DriftRow:
     slope: Pair | None
 
 
-def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
+def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
     """An accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
-    spread = expanded_uncertainties(found.budget, found.covariance)
-    return rows_of(found.scale, found.bias_m_s2, spread, too=1000 / found.gravity_m_s2)
+    spread = expanded_uncertainties(entry.budget, entry.covariance)
+    return rows_of(entry.scale, entry.bias_m_s2, spread, too=1000 / entry.gravity_m_s2)
 
 
-def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
+def second_order_rows(entry: AccelerometerEntry) -> list[tuple[str, Pair]]:
     """φ of each axis in s²/m with U; none where it was not looked for."""
-    if found.second_order_s2_m is None or found.second_order_std_s2_m is None:
+    if entry.second_order_s2_m is None or entry.second_order_std_s2_m is None:
         return []
-    widths = expanded(found.second_order_std_s2_m, found.second_order_freedom).widths
-    each = zip(AXES, found.second_order_s2_m, widths, strict=True)
+    widths = expanded(entry.second_order_std_s2_m, entry.second_order_freedom).widths
+    each = zip(AXES, entry.second_order_s2_m, widths, strict=True)
     return [(axis, pair(value, width)) for axis, value, width in each]
 
 
-def field_rows(found: MagnetometerEntry) -> list[AxisRow]:
+def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
     """A magnetometer's axes with U; the bias in µT."""
-    return rows_of(found.scale, found.bias_t, expanded_uncertainties(found.budget, found.covariance), size=MICRO)
+    return rows_of(entry.scale, entry.bias_t, expanded_uncertainties(entry.budget, entry.covariance), size=MICRO)
 
 
-def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:
+def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
     """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT, with U."""
-    scale = expanded(found.scale_std, found.scale_freedom).widths
-    bias = expanded(found.bias_std_t, found.bias_freedom).widths
-    field = expanded(found.arm_field_std_t, found.arm_field_freedom).widths
+    scale = expanded(entry.scale_std, entry.scale_freedom).widths
+    bias = expanded(entry.bias_std_t, entry.bias_freedom).widths
+    field = expanded(entry.arm_field_std_t, entry.arm_field_freedom).widths
     return [
         ReversalRow(
             axis,
-            pair(found.scale[i], scale[i]),
-            pair(MICRO * found.bias_t[i], MICRO * bias[i]),
-            None if mixed else pair(MICRO * found.arm_field_t[i], MICRO * field[i]),
+            pair(entry.scale[i], scale[i]),
+            pair(MICRO * entry.bias_t[i], MICRO * bias[i]),
+            None if mixed else pair(MICRO * entry.arm_field_t[i], MICRO * field[i]),
             mixed,
         )
-        for i, (axis, mixed) in enumerate(zip(AXES, found.arm_field_in_bias, strict=True))
+        for i, (axis, mixed) in enumerate(zip(AXES, entry.arm_field_in_bias, strict=True))
     ]
 
 
-def drift_rows(found: DriftEntry) -> list[DriftRow]:
+def drift_rows(entry: DriftEntry) -> list[DriftRow]:
     """The rows of a drift, in its own unit, with U."""
-    bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
-    whole = np.hypot(std, found.common_std)  # what all repeats share is no part of a change
-    changed, slope = largest_change_std(bias, std), found.over_temperature
-    first, last, change = (expanded(each.tolist(), found.freedom).widths for each in (whole[0], whole[-1], changed))
+    bias, std = (np.array([getattr(each.held, name) for each in entry.repeats]) for name in ("bias", "std"))
+    whole = np.hypot(std, entry.common_std)  # what all repeats share is no part of a change
+    changed, slope = largest_change_std(bias, std), entry.over_temperature
+    first, last, change = (expanded(each.tolist(), entry.freedom).widths for each in (whole[0], whole[-1], changed))
     per_c = () if isinstance(slope, ErrorEntry) else expanded(slope.std, slope.freedom).widths
     return [
         DriftRow(
             axis,
             pair(float(bias[0, i]), first[i]),
             pair(float(bias[-1, i]), last[i]),
-            pair(found.largest_change[i], change[i]),
+            pair(entry.largest_change[i], change[i]),
             None if isinstance(slope, ErrorEntry) else pair(slope.slope[i], per_c[i]),
         )
         for i, axis in enumerate(AXES)

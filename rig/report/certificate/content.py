@@ -17,7 +17,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.stated import Stated
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard, Without
 from rig.report.kinds.registry import kinds, shown
 from rig.report.mounts import mount_lines
@@ -59,7 +59,7 @@ class Block:
     """What of a result a macro of a template prints, which `place` names: `template:macro`."""
 
     place: str
-    found: Found[Any]
+    found: Finding[Any]
 
     @property
     def template(self) -> str:

@@ -110,10 +110,10 @@ def _measured(c: Certificate) -> Iterator[Measured]:
             yield from filter(None, (each.measured(found, c.reversals) for found in each.found(c.result)))
 
 
-def _keys(found: Iterable[Measured]) -> dict[tuple[str, str], str]:
+def _keys(items: Iterable[Measured]) -> dict[tuple[str, str], str]:
     """The key of every item, by what it is and its name: items of a kind are numbered."""
     keys: dict[tuple[str, str], str] = {}
-    for each in found:
+    for each in items:
         of = each.item, each.sensor
         keys.setdefault(of, f"{each.item}-{sum(item == each.item for item, _ in keys)}")
     return keys
@@ -174,9 +174,9 @@ def _claimed(traceable: bool) -> str:
     return "Its uncertainty was stated too." if traceable else "No metrological traceability is claimed."
 
 
-def _chain(of: str, said: str, traceable: bool) -> Element:
+def _chain(of: str, statement: str, traceable: bool) -> Element:
     flag = words("traceable", str(traceable).lower())
-    return dcc("statement", text("name", f"traceability of {of}"), flag, text("declaration", said))
+    return dcc("statement", text("name", f"traceability of {of}"), flag, text("declaration", statement))
 
 
 def _conformity(check: CheckEntry, rule: str) -> Element:
@@ -195,26 +195,26 @@ def _results(c: Certificate, measured: Sequence[Measured]) -> Iterator[Element]:
     return (_result(c, keys[each.item, each.sensor], each) for each in measured)
 
 
-def _result(c: Certificate, item: str, found: Measured) -> Element:
+def _result(c: Certificate, item: str, measured: Measured) -> Element:
     site = c.stated.where
     conditions = [
         *(
             _condition(f"temperature of the item{of}, by its own thermometer", each, r"\degreecelsius")
-            for of, each in found.temperatures_c.items()
+            for of, each in measured.temperatures_c.items()
         ),
         _condition("ambient temperature", site.ambient_temperature_c, r"\degreecelsius"),
         _condition("ambient relative humidity", site.ambient_humidity_percent, r"\percent"),
     ]
     return dcc(
         "measurementResult",
-        text("name", found.name),
+        text("name", measured.name),
         dcc("usedMethods", dcc("usedMethod", text("name", _method(c)),
                                text("description", "; ".join([DESCRIBED, c.procedure, *c.mounted])),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),
         dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else UNKNOWN_AIR,
-        dcc("results", *found.results),
+        dcc("results", *measured.results),
         refId=item,
     )  # fmt: skip
 
@@ -240,10 +240,10 @@ def _arm(c: Certificate) -> Element:
     )
 
 
-def _identity(found: ProvenanceEntry) -> Element:
-    if found.motion_file is not None:
-        return _identified("other", found.motion_file.sha256, "SHA-256 of the file")
-    return _identified("manufacturer", found.arm_serial_number, "serial number")
+def _identity(entry: ProvenanceEntry) -> Element:
+    if entry.motion_file is not None:
+        return _identified("other", entry.motion_file.sha256, "SHA-256 of the file")
+    return _identified("manufacturer", entry.arm_serial_number, "serial number")
 
 
 def _condition(name: str, value: float | None, unit: str) -> Part:

@@ -43,118 +43,118 @@ def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
     yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE.d_si)
 
 
-def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
+def accelerometer(entry: AccelerometerEntry) -> Iterator[Element]:
     """Relative to the stated gravity, with U of the budget and the combined covariance."""
-    said = f"{found.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {found.gravity_m_s2!r} m/s²."
-    yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION.d_si, said)
+    said = f"{entry.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {entry.gravity_m_s2!r} m/s²."
+    yield from _relative(entry, [*entry.scale, *entry.bias_m_s2], ACCELERATION.d_si, said)
 
 
-def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
+def magnetometer(entry: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
     """Relative to the stated field, as mounted, with U of the budget and the combined covariance.
 
     First, of a sensor that was turned over, its own bias.
     """
     if turned is not None:
         yield from _reversed(turned)
-    said = f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {found.field_t!r} T."
-    if found.arm_field_in_bias:
+    said = f"{entry.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {entry.field_t!r} T."
+    if entry.arm_field_in_bias:
         said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
-    yield from _relative(found, [*found.scale, *found.bias_t], FIELD.d_si, said, ", as mounted")
+    yield from _relative(entry, [*entry.scale, *entry.bias_t], FIELD.d_si, said, ", as mounted")
 
 
-def beside(found: Iterable[Further]) -> Iterator[Element]:
+def beside(further: Iterable[Further]) -> Iterator[Element]:
     """What was found of a sensor beside scale and bias, with U by its standard deviations."""
-    for each in found:
+    for each in further:
         said = f"{each.said} {SOLUTION}" if each.said else SOLUTION
         yield _spread(each.name, said, each.labels, (each.values, each.stds, each.freedom), each.unit)
 
 
-def _reversed(found: ReversalEntry) -> Iterator[Element]:
+def _reversed(entry: ReversalEntry) -> Iterator[Element]:
     """A turned magnetometer's own bias and the arm's field, with the covariance of both."""
-    mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
-    began = ", ".join(run.started_utc for run in found.runs)
+    mixed = [axis for axis, held in zip(AXES, entry.arm_field_in_bias, strict=True) if held]
+    began = ", ".join(run.started_utc for run in entry.runs)
     said = f"From runs of {began}, between which it was turned over. ± U"
     if mixed:
         said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
-    yield _spread("scale factor", said, AXES, (found.scale, found.scale_std, found.scale_freedom), ONE)
-    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t, found.bias_freedom), FIELD.d_si)
+    yield _spread("scale factor", said, AXES, (entry.scale, entry.scale_std, entry.scale_freedom), ONE)
+    yield _spread("own bias", said, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_freedom), FIELD.d_si)
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
-    values = [*found.bias_t, *found.arm_field_t]
+    values = [*entry.bias_t, *entry.arm_field_t]
     yield _result(
         "own bias and the arm's field in the axes of the first run with their covariance",
         f"{said} The ellipsoid holds all six values at once with a probability of 95 %.",
         real_list(
-            [name.replace(" ", "_") for name in names], values, [FIELD.d_si], region=(found.covariance, JOINT_FACTOR)
+            [name.replace(" ", "_") for name in names], values, [FIELD.d_si], region=(entry.covariance, JOINT_FACTOR)
         ),
     )
 
 
-def bias_drift(found: DriftEntry, of: Quantity) -> Iterator[Element]:
+def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
     """The bias of each repeat, and over temperature where it could be told."""
-    labels = [str(number) for number in range(1, len(found.repeats) + 1)]
+    labels = [str(number) for number in range(1, len(entry.repeats) + 1)]
     for i, axis in enumerate(AXES):
-        values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in found.repeats), strict=True)
+        values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in entry.repeats), strict=True)
         said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
-deviation of {found.common_std[i]!r} {found.unit}. ± U of what differs"
-        freedom = None if found.freedom is None else [found.freedom[i]] * len(labels)
+deviation of {entry.common_std[i]!r} {entry.unit}. ± U of what differs"
+        freedom = None if entry.freedom is None else [entry.freedom[i]] * len(labels)
         yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
-    slope = found.over_temperature
+    slope = entry.over_temperature
     if not isinstance(slope, ErrorEntry):
         low, high = slope.range_c
         said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
         yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), of.d_si + KELVIN)
 
 
-def over_temperature(found: OverTemperatureEntry, of: Quantity) -> Iterator[Element]:
+def over_temperature(entry: OverTemperatureEntry, of: Quantity) -> Iterator[Element]:
     """Scale and bias of each axis at the temperatures of the table, with U."""
-    low, high = found.range_c
-    labels = [f"{row.temperature_c:.6g}_degC" for row in found.table]
+    low, high = entry.range_c
+    labels = [f"{row.temperature_c:.6g}_degC" for row in entry.table]
     held = f"At temperatures of the item's own thermometer; holds from {low!r} to {high!r} °C only"
     for i, axis in enumerate(AXES):
         for name, which, units in (("scale factor", "scale", ONE), ("bias", "bias", of.d_si)):
-            values = [getattr(row, which)[i] for row in found.table]
-            widths = [getattr(row, f"expanded_{which}")[i] for row in found.table]
+            values = [getattr(row, which)[i] for row in entry.table]
+            widths = [getattr(row, f"expanded_{which}")[i] for row in entry.table]
             stated = Expanded(widths, *([each] * len(labels) for each in (COVERAGE_FACTOR, PROBABILITY)))
             yield _result(f"{name} along {axis} over temperature", f"{held}. ± U, about 95 %.",
                           real_list(labels, values, [units], expanded=stated))  # fmt: skip
 
 
-def verification(found: VerificationEntry) -> Iterator[Element]:
+def verification(entry: VerificationEntry) -> Iterator[Element]:
     """RMS against a reference, as found and as left."""
-    said = f"RMS of reading less reference {found.reference}; holds the noise of both, no uncertainty was evaluated."
-    if found.before is not None:
-        yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE.d_si]))
-    yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE.d_si]))
+    said = f"RMS of reading less reference {entry.reference}; holds the noise of both, no uncertainty was evaluated."
+    if entry.before is not None:
+        yield _result("as found", said, real_list(AXES, entry.before.movement.rms_rad_s, [RATE.d_si]))
+    yield _result("as left", said, real_list(AXES, entry.after.movement.rms_rad_s, [RATE.d_si]))
 
 
-def earth_rate(found: EarthRateEntry) -> Iterator[Element]:
+def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
     """The rate with its covariance, and the place by that rate."""
     said = "As found in the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
-    rate = real_list(AXES, found.rate_rad_s, [RATE.d_si], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
+    rate = real_list(AXES, entry.rate_rad_s, [RATE.d_si], region=(entry.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", said, rate)
     yield _spread(
         "latitude by that rate",
         SOLUTION,
         ["latitude"],
-        ([found.latitude_rad], [found.latitude_std_rad], found.freedoms(1)),
+        ([entry.latitude_rad], [entry.latitude_std_rad], entry.freedoms(1)),
         ANGLE,
     )
-    if found.heading_rad is not None and found.heading_std_rad is not None:
+    if entry.heading_rad is not None and entry.heading_std_rad is not None:
         said = f"Where the x axis of the arm's base points, from north over east. {SOLUTION}"
-        heading = [found.heading_rad], [found.heading_std_rad], found.freedoms(1)
+        heading = [entry.heading_rad], [entry.heading_std_rad], entry.freedoms(1)
         yield _spread("heading by that rate", said, ["heading"], heading, ANGLE)
 
 
 def _relative(
-    found: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, said: str, how: str = ""
+    entry: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, statement: str, how: str = ""
 ) -> Iterator[Element]:
-    budget = found.budget
-    assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
-    said = f"{said} {_at(found.found_at)}{_told(found.told_from)}{coverage_sentence(budget)}"
+    budget = entry.budget
+    assert budget is not None and entry.covariance_combined is not None  # or there is no digital certificate
+    statement = f"{statement} {_at(entry.found_at)}{_told(entry.told_from)}{coverage_sentence(budget)}"
     scale, bias = _expanded(budget)
-    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=scale))
-    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=bias))
-    yield _joint(numbers, found.covariance_combined, unit, how)
+    yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
+    yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
+    yield _joint(numbers, entry.covariance_combined, unit, how)
 
 
 def _at(when: WhenEntry | None) -> str:
@@ -163,9 +163,9 @@ def _at(when: WhenEntry | None) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _told(found: Sequence[ToldFromEntry]) -> str:
+def _told(damages: Sequence[ToldFromEntry]) -> str:
     """What would have contradicted itself."""
-    return f"Told in 95 of 100 measurements: {told_words(found)}. " if found else ""
+    return f"Told in 95 of 100 measurements: {told_words(damages)}. " if damages else ""
 
 
 def _speed(sensor: SensorEntry) -> str:
@@ -189,12 +189,12 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
     )
 
 
-def _spread(name: str, said: str, labels: Sequence[str], found: Known, unit: str) -> Element:
+def _spread(name: str, statement: str, labels: Sequence[str], known: Known, unit: str) -> Element:
     """Values with U, from these, their standard deviations and the degrees of freedom."""
-    numbers, stds, freedom = found
-    words = f"{said}, {factor_words(freedom)}."
+    numbers, stds, freedom = known
+    words = f"{statement}, {factor_words(freedom)}."
     return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, freedom)))
 
 
-def _result(name: str, said: str, quantity: Element) -> Element:
-    return dcc("result", text("name", name), text("description", said), dcc("data", dcc("quantity", quantity)))
+def _result(name: str, statement: str, quantity: Element) -> Element:
+    return dcc("result", text("name", name), text("description", statement), dcc("data", dcc("quantity", quantity)))

@@ -11,7 +11,7 @@ from rig.data.drift_entries import DriftEntry
 from rig.data.quantity import Unit
 from rig.data.result_file import SensorEntry
 from rig.report.certificate.tables import AXES
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.unexplained import Unexplained, of_attitudes, of_repeats, of_sweeps_and_rests
 from rig.report.printed_budget import shown_places
 
@@ -61,26 +61,26 @@ class Contributions:
     end: float
 
 
-def residuals(found: Found[SensorEntry]) -> Residuals | None:
+def residuals(finding: Finding[SensorEntry]) -> Residuals | None:
     """What is left of a gyroscope's sweeps and rests; None where nothing is."""
-    left = of_sweeps_and_rests(found)
+    left = of_sweeps_and_rests(finding)
     return None if left is None else _drawn(left)
 
 
-def attitude_residuals(found: Found[Any]) -> Residuals:
+def attitude_residuals(finding: Finding[Any]) -> Residuals:
     """What is left of each attitude."""
-    return _drawn(of_attitudes(found))
+    return _drawn(of_attitudes(finding))
 
 
-def biases_by_repeat(found: Found[DriftEntry]) -> Residuals:
+def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
     """The biases by repeat, less their mean over the repeats."""
-    return _drawn(of_repeats(found))
+    return _drawn(of_repeats(finding))
 
 
-def _drawn(found: Unexplained) -> Residuals:
+def _drawn(unexplained: Unexplained) -> Residuals:
     """Values (n, 3) side by side, their bars two standard deviations, in a unit that suits the largest."""
-    left, bars, split = found.values, 2 * found.stds, found.split
-    reach, unit = reach_in(float((np.abs(left) + bars).max()), found.quantity.residuals)
+    left, bars, split = unexplained.values, 2 * unexplained.stds, unexplained.split
+    reach, unit = reach_in(float((np.abs(left) + bars).max()), unexplained.quantity.residuals)
     across = (WIDTH - LEFT - RIGHT) / len(left)
 
     def height(value: float) -> float:
@@ -95,7 +95,7 @@ def _drawn(found: Unexplained) -> Residuals:
     ticks = tuple((height(at * unit.size), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1))
     begins = None if split is None else round(LEFT + across * split, 1)
     within = int((np.abs(left) <= bars).sum())
-    return Residuals(points, ticks, height(0.0), begins, unit.name, within, found.shown, found.of)
+    return Residuals(points, ticks, height(0.0), begins, unit.name, within, unexplained.shown, unexplained.of)
 
 
 def reach_in(largest: float, units: Sequence[Unit]) -> tuple[float, Unit]:

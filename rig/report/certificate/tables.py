@@ -111,15 +111,15 @@ def check_row(check: CheckEntry) -> CheckRow:
     return CheckRow(check.name, value, uncertainty, limit, risk, check.passed, check.unit)
 
 
-def verification_rows(found: VerificationEntry) -> Iterator[tuple[str, ...]]:
+def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
     """A verification's axes: RMS as found and as left; largest mean over a revolution as found and as left; rad/s."""
     for i, axis in enumerate(AXES):
         yield (
             axis,
-            "–" if found.before is None else f"{found.before.movement.rms_rad_s[i]:.5f}",
-            f"{found.after.movement.rms_rad_s[i]:.5f}",
-            "–" if found.before is None else _largest_turn([t.error_rad_s for t in found.before.revolutions], i),
-            _largest_turn([turn.error_rad_s for turn in found.after.revolutions], i),
+            "–" if entry.before is None else f"{entry.before.movement.rms_rad_s[i]:.5f}",
+            f"{entry.after.movement.rms_rad_s[i]:.5f}",
+            "–" if entry.before is None else _largest_turn([t.error_rad_s for t in entry.before.revolutions], i),
+            _largest_turn([turn.error_rad_s for turn in entry.after.revolutions], i),
         )
 
 
@@ -146,13 +146,13 @@ def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
     ]
 
 
-def earth_rate_rows(found: EarthRateEntry) -> list[tuple[str, str, Pair]]:
+def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:
     """Name, unit, and value with U."""
-    (k,) = expanded([1.0], found.freedoms(1)).factors
-    std = np.sqrt(np.diag(found.covariance_rad2_s2))
-    rows = [("size", "rad/s", pair(found.norm_rad_s, k * found.norm_std_rad_s))]
-    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]
-    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, k * DEG * found.latitude_std_rad)))
-    if found.heading_rad is not None and found.heading_std_rad is not None:
-        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, k * DEG * found.heading_std_rad)))
+    (k,) = expanded([1.0], entry.freedoms(1)).factors
+    std = np.sqrt(np.diag(entry.covariance_rad2_s2))
+    rows = [("size", "rad/s", pair(entry.norm_rad_s, k * entry.norm_std_rad_s))]
+    rows += [(axis, "rad/s", pair(entry.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]
+    rows.append(("latitude", "°", pair(DEG * entry.latitude_rad, k * DEG * entry.latitude_std_rad)))
+    if entry.heading_rad is not None and entry.heading_std_rad is not None:
+        rows.append(("heading", "°", pair(DEG * entry.heading_rad % 360, k * DEG * entry.heading_std_rad)))
     return rows

@@ -33,7 +33,7 @@ class TemperatureRow:
     values: tuple[Pair, ...]
 
 
-def temperature_rows(found: OverTemperatureEntry, unit: Unit) -> list[TemperatureRow]:
+def temperature_rows(entry: OverTemperatureEntry, unit: Unit) -> list[TemperatureRow]:
     """The rows with U, biases in that unit."""
     return [
         TemperatureRow(
@@ -43,33 +43,33 @@ def temperature_rows(found: OverTemperatureEntry, unit: Unit) -> list[Temperatur
                 *(pair(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True)),
             ),
         )
-        for row in shown_rows(found)
+        for row in shown_rows(entry)
     ]
 
 
-def scale_curves(found: OverTemperatureEntry) -> Curves:
+def scale_curves(entry: OverTemperatureEntry) -> Curves:
     """How the scale factors change from the reference."""
-    first = np.array(found.scale[0])
-    values = np.array([row.scale for row in found.table]) / first - 1
-    return _curves(found, values, np.array([row.expanded_scale for row in found.table]) / first, SHARES)
+    first = np.array(entry.scale[0])
+    values = np.array([row.scale for row in entry.table]) / first - 1
+    return _curves(entry, values, np.array([row.expanded_scale for row in entry.table]) / first, SHARES)
 
 
-def bias_curves(found: OverTemperatureEntry, quantity: Quantity) -> Curves:
+def bias_curves(entry: OverTemperatureEntry, quantity: Quantity) -> Curves:
     """How the biases change from the reference."""
-    values = np.array([row.bias for row in found.table]) - np.array(found.bias[0])
-    return _curves(found, values, np.array([row.expanded_bias for row in found.table]), quantity.residuals)
+    values = np.array([row.bias for row in entry.table]) - np.array(entry.bias[0])
+    return _curves(entry, values, np.array([row.expanded_bias for row in entry.table]), quantity.residuals)
 
 
-def _curves(found: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[Unit]) -> Curves:
+def _curves(entry: OverTemperatureEntry, values: Array, widths: Array, units: Sequence[Unit]) -> Curves:
     reach, unit = reach_in(float((np.abs(values) + widths).max()), units)
-    low, high = found.range_c
+    low, high = entry.range_c
 
     def points(temperatures: Sequence[float], heights: Array) -> str:
         return " ".join(
             f"{_across(at, low, high)},{_height(y, unit, reach)}" for at, y in zip(temperatures, heights, strict=True)
         )
 
-    warm = [row.temperature_c for row in found.table]
+    warm = [row.temperature_c for row in entry.table]
     axes = tuple(
         (
             points([*warm, *reversed(warm)], np.r_[values[:, i] + widths[:, i], (values[:, i] - widths[:, i])[::-1]]),
@@ -80,7 +80,7 @@ def _curves(found: OverTemperatureEntry, values: Array, widths: Array, units: Se
     ticks = tuple(
         (_height(at * unit.size, unit, reach), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1)
     )
-    marks = tuple((_across(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(found))
+    marks = tuple((_across(row.temperature_c, low, high), f"{row.temperature_c:.1f} °C") for row in shown_rows(entry))
     return Curves(axes, ticks, marks, unit.name)
 
 

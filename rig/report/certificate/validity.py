@@ -28,10 +28,10 @@ def left_out_of_rates(sensor: SensorEntry, *, elsewhere: bool = False) -> str:
     return ", ".join(("what gravity adds to it", *OF_THE_FILE, *bent) if elsewhere else bent)
 
 
-def left_out_of_accelerations(found: AccelerometerEntry) -> str:
+def left_out_of_accelerations(entry: AccelerometerEntry) -> str:
     """What an accelerometer's U leaves out."""
-    bent = "nonlinearity" if found.second_order_s2_m is None else "nonlinearity beyond the second order"
-    bent = "nonlinearity beyond gravity's size" if in_budget(found.budget, "nonlinearity") else bent
+    bent = "nonlinearity" if entry.second_order_s2_m is None else "nonlinearity beyond the second order"
+    bent = "nonlinearity beyond gravity's size" if in_budget(entry.budget, "nonlinearity") else bent
     return ", ".join((bent, *ALWAYS))
 
 

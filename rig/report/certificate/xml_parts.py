@@ -40,16 +40,16 @@ def words(name: str, text: str | date | None) -> Element:
     return element
 
 
-def text(name: str, said: str | None) -> Element:
+def text(name: str, statement: str | None) -> Element:
     """An element with a text, where the schema wants it in a language."""
     content = dcc("content", lang="en")
-    content.text = _plain(said)
+    content.text = _plain(statement)
     return dcc(name, content)
 
 
-def _plain(said: str | date | None) -> str:
+def _plain(statement: str | date | None) -> str:
     """Printable, since XML knows no control characters; with one blank for any, those that do not break among them."""
-    return UNSAID if said is None else printable(" ".join(str(said).split())) or UNSAID
+    return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:

@@ -42,59 +42,59 @@ Parameters = Iterator[tuple[str, float]]
 Autopilot = Mapping[Quantity, Callable[[int, Corrected], Parameters]]
 
 
-def px4_files(found: Calibrations) -> Mapping[str, str]:
+def px4_files(calibrations: Calibrations) -> Mapping[str, str]:
     """`px4.params`, as QGroundControl loads it: vehicle, component, name, value, type, between tabs."""
     lines = [
         *HEADING,
         "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle knows; PX4 heeds what has its",
         "# sensor's ID. Magnetic fields are in gauss.",
-        *_lines(found, PX4, lambda name, value: f"1\t1\t{name}\t{value!r}\t{PX4_FLOAT}"),
+        *_lines(calibrations, PX4, lambda name, value: f"1\t1\t{name}\t{value!r}\t{PX4_FLOAT}"),
     ]
-    if found.over_temperature:
+    if calibrations.over_temperature:
         lines += [
             "# Over temperature: reading - (X1 d + X2 d^2 + X3 d^3) - offset, d = T - TREF, T within TMIN and TMAX.",
             "# Lost: scale factors over temperature; TC_Gn_ID, TC_An_ID, which only the vehicle knows.",
         ]
-    for name, value in px4_parameters(found.over_temperature, _places(found)):
+    for name, value in px4_parameters(calibrations.over_temperature, _places(calibrations)):
         lines.append(f"1\t1\t{name}\t{value!r}\t{PX4_INT if isinstance(value, int) else PX4_FLOAT}")
     return {"px4.params": "\n".join(lines) + "\n"}
 
 
-def ardupilot_files(found: Calibrations) -> Mapping[str, str]:
+def ardupilot_files(calibrations: Calibrations) -> Mapping[str, str]:
     """`ardupilot.param`: name, value."""
-    lines = [*HEADING, *OF_ARDUPILOT, *_lines(found, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
-    if found.over_temperature:
+    lines = [*HEADING, *OF_ARDUPILOT, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
+    if polynomials := calibrations.over_temperature:
         lines += [
             "# Over temperature: reading - P(T - 35) + P(CALTEMP - 35) - offset, P(u) = 1e-6 (c1 u + c2 u^2 + c3 u^3),",
             "# temperatures within TMIN and TMAX. Lost: scale factors over temperature.",
-            *(f"{name},{value!r}" for name, value in ardupilot_parameters(found.over_temperature, _places(found))),
+            *(f"{name},{value!r}" for name, value in ardupilot_parameters(polynomials, _places(calibrations))),
         ]
     if any(line.startswith("INS_GYR") for line in lines):
         lines += ["# Without this ArduPilot finds offsets of gyroscopes of its own at each boot.", "INS_GYR_CAL,0"]
     return {"ardupilot.param": "\n".join(lines) + "\n"}
 
 
-def _lines(found: Calibrations, autopilot: Autopilot, form: Callable[[str, float], str]) -> Iterator[str]:
+def _lines(calibrations: Calibrations, autopilot: Autopilot, form: Callable[[str, float], str]) -> Iterator[str]:
     """A line for each parameter, and comments whose it is. Raises Refused `nothing_to_export`.
 
     Sensors keep the number that their place in the configuration gives them, and an accelerometer its gyroscope's.
     """
-    places, fields = _places(found), list(found.result.magnetometers)
-    if not any(each.quantity in autopilot for each in found.sensors):
+    places, fields = _places(calibrations), list(calibrations.result.magnetometers)
+    if not any(each.quantity in autopilot for each in calibrations.sensors):
         raise Refused("nothing_to_export", "the run calibrated no sensor", "Give a run that calibrates one")
-    for each in found.sensors:
+    for each in calibrations.sensors:
         if (named := autopilot.get(each.quantity)) is None:
             yield f"# Lost: {printable(each.name)}: there is no parameter for it"
             continue
-        yield from (f"# {line}" for line in found.origin(each))
+        yield from (f"# {line}" for line in calibrations.origin(each))
         number = fields.index(each.sensor) if each.quantity == FIELD else places[each.sensor]
         yield from (form(name, value) for name, value in named(number, each))
-    yield from (f"# {printable(line)}" for kind in kinds() for line in kind.unsolved(found.result))
+    yield from (f"# {printable(line)}" for kind in kinds() for line in kind.unsolved(calibrations.result))
 
 
-def _places(found: Calibrations) -> dict[str, int]:
+def _places(calibrations: Calibrations) -> dict[str, int]:
     """The number of each IMU: the first is 0."""
-    names = dict.fromkeys(each.sensor for each in found.sensors if each.quantity in IMU)
+    names = dict.fromkeys(each.sensor for each in calibrations.sensors if each.quantity in IMU)
     return {name: i for i, name in enumerate(names)}
 
 

@@ -13,12 +13,13 @@ from rig.report.exports.calibrations import Calibrations, Imu
 FORMAT_VERSION = "2.0.0"
 
 
-def imucal_files(found: Calibrations) -> Mapping[str, str]:
+def imucal_files(calibrations: Calibrations) -> Mapping[str, str]:
     """One file for each IMU. Raises Refused `nothing_to_export`."""
-    return {f"{each.name}_imucal.json": json.dumps(_document(found, each), indent=2) + "\n" for each in found.imus}
+    documents = {each.name: _document(calibrations, each) for each in calibrations.imus}
+    return {f"{name}_imucal.json": json.dumps(document, indent=2) + "\n" for name, document in documents.items()}
 
 
-def _document(found: Calibrations, imu: Imu) -> dict[str, object]:
+def _document(calibrations: Calibrations, imu: Imu) -> dict[str, object]:
     acceleration, rates = imu.accelerometer, imu.gyroscope
     return {
         "cal_type": "Turntable",
@@ -27,7 +28,7 @@ def _document(found: Calibrations, imu: Imu) -> dict[str, object]:
         "gyr_unit": "rad/s",
         "from_acc_unit": "m/s^2",
         "from_gyr_unit": "rad/s",
-        "comment": ". ".join([*found.origin(rates), *_convention(found, imu)]),
+        "comment": ". ".join([*calibrations.origin(rates), *_convention(calibrations, imu)]),
         "K_a": (np.eye(3) if acceleration is None else acceleration.gains).tolist(),
         "R_a": (np.eye(3) if acceleration is None else acceleration.axes).tolist(),
         "b_a": (np.zeros(3) if acceleration is None else acceleration.offset).tolist(),
@@ -38,7 +39,7 @@ def _document(found: Calibrations, imu: Imu) -> dict[str, object]:
     }
 
 
-def _convention(found: Calibrations, imu: Imu) -> list[str]:
+def _convention(calibrations: Calibrations, imu: Imu) -> list[str]:
     said = ["w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"]
     if imu.accelerometer is None:
         said.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
@@ -46,5 +47,5 @@ def _convention(found: Calibrations, imu: Imu) -> list[str]:
         said.append("The g-sensitivity was not found: K_ga is zero")
     if imu.accelerometer is not None and imu.accelerometer.second_order:
         said.append("Left out: the accelerometer's second order")
-    said += [f"Left out: {name}, for which there is no place" for name in found.elsewhere]
+    said += [f"Left out: {name}, for which there is no place" for name in calibrations.elsewhere]
     return [*said, "Left out: uncertainties, temperature, nonlinearity; they are in result.json"]

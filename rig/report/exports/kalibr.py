@@ -14,14 +14,14 @@ from rig.report.exports.calibrations import Calibrations, Imu
 from rig.report.exports.names import plain_names
 
 
-def kalibr_files(found: Calibrations) -> Mapping[str, str]:
+def kalibr_files(calibrations: Calibrations) -> Mapping[str, str]:
     """Kalibr's files: for each IMU `…_imu.yaml` (noise) and `…_intrinsics.yaml`. Raises Refused `nothing_to_export`."""
     files = {}
-    names = plain_names(each.name for each in found.imus)
-    for each in found.imus:
+    names = plain_names(each.name for each in calibrations.imus)
+    for each in calibrations.imus:
         topic = f"/{names[each.name]}/imu"  # as in the bag of `--format ros2`
-        files[f"{each.name}_imu.yaml"] = _noise(found, each, topic)
-        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(found, each, topic)
+        files[f"{each.name}_imu.yaml"] = _noise(calibrations, each, topic)
+        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(calibrations, each, topic)
     return files
 
 
@@ -32,7 +32,7 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
 
 
-def _noise(found: Calibrations, imu: Imu, topic: str) -> str:
+def _noise(calibrations: Calibrations, imu: Imu, topic: str) -> str:
     rates, forces = imu.gyroscope, imu.accelerometer
     known = {
         "rostopic": topic,
@@ -42,7 +42,7 @@ def _noise(found: Calibrations, imu: Imu, topic: str) -> str:
     }
     unknown = [name for name, value in known.items() if value is None]
     said = [
-        *found.origin(rates),
+        *calibrations.origin(rates),
         "Noise densities in rad/s/sqrt(Hz), m/s^2/sqrt(Hz): of a sample at rest over the rate's root, worst axis.",
         "Lost: gyroscope_random_walk, accelerometer_random_walk, which take hours at rest; add your own.",
         *(f"Lost: {name}, which this run does not tell" for name in unknown),
@@ -50,7 +50,7 @@ def _noise(found: Calibrations, imu: Imu, topic: str) -> str:
     return _yaml(said, {name: value for name, value in known.items() if value is not None})
 
 
-def _intrinsics(found: Calibrations, imu: Imu, topic: str) -> str:
+def _intrinsics(calibrations: Calibrations, imu: Imu, topic: str) -> str:
     rates, forces = imu.gyroscope, imu.accelerometer
     intrinsics: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)
@@ -61,7 +61,7 @@ def _intrinsics(found: Calibrations, imu: Imu, topic: str) -> str:
     in_body = imu.g_sensitivity @ to_body.T
     intrinsics["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
     said = [
-        *found.origin(rates),
+        *calibrations.origin(rates),
         "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr keeps no bias here:",
         f"b = -b of result.json = {rates.offset.tolist()} rad/s",
     ]
@@ -70,7 +70,7 @@ def _intrinsics(found: Calibrations, imu: Imu, topic: str) -> str:
     if rates.g_sensitivity is None:
         said.append("A is zero: the g-sensitivity was not found.")
     said.append("Lost: uncertainties, temperature, the accelerometer's second order and place.")
-    said += [f"Lost: {name}, for which there is no place" for name in found.elsewhere]
+    said += [f"Lost: {name}, for which there is no place" for name in calibrations.elsewhere]
     return _yaml(said, {"imu0": intrinsics})
 
 

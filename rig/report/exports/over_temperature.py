@@ -21,10 +21,10 @@ Parameters = Iterator[tuple[str, float | int]]
 Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and quantity
 
 
-def offset_of(quantity: str, found: OverTemperatureEntry, order: int) -> tuple[float, ...]:
+def offset_of(quantity: str, entry: OverTemperatureEntry, order: int) -> tuple[float, ...]:
     """(3,) what an autopilot subtracts for each Kⁿ of that order."""
     sign = -1.0 if quantity == "rate" else 1.0
-    return tuple(sign * each for each in found.bias[order])
+    return tuple(sign * each for each in entry.bias[order])
 
 
 def px4_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
@@ -62,10 +62,10 @@ def ardupilot_parameters(polynomials: Polynomials, places: Mapping[str, int]) ->
             yield f"INS_ACC{number + 1}_CALTEMP", accelerometer.reference_c
 
 
-def _about_35(quantity: str, found: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
+def _about_35(quantity: str, entry: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
     """Coefficients of orders 1 to 3 about ArduPilot's own reference, in its size."""
-    away = ARDUPILOT_REFERENCE_C - found.reference_c
-    orders = [offset_of(quantity, found, order) for order in range(4)]
+    away = ARDUPILOT_REFERENCE_C - entry.reference_c
+    orders = [offset_of(quantity, entry, order) for order in range(4)]
     return tuple(
         tuple(
             ARDUPILOT_SIZE * sum(comb(m, n) * away ** (m - n) * orders[m][axis] for m in range(n, 4))

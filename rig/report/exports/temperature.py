@@ -19,20 +19,21 @@ from rig.report.kinds.corrected import Corrected
 WATCHED = (RATE, ACCELERATION)  # whose biases a run of `bias_drift` follows
 
 
-def at_temperature(found: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
+def at_temperature(calibrations: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
     """The calibrations with biases as they are at that temperature, by the slopes in `drift`.
 
     Raises Refused `another_sensor`, `temperature_slope_unknown`,
     `temperature_outside`.
     """
-    _check_same(found.result, drift)
+    _check_same(calibrations.result, drift)
     sensors = tuple(
         replace(each, offset=each.offset + _change(drift, each, temperature_c), temperature_c=temperature_c)
         if each.quantity in WATCHED
         else each
-        for each in found.sensors
+        for each in calibrations.sensors
     )
-    return replace(found, sensors=sensors, over_temperature={})  # polynomials are about the calibration's temperature
+    # Polynomials are about the temperature of the calibration.
+    return replace(calibrations, sensors=sensors, over_temperature={})
 
 
 def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:

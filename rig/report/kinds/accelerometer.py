@@ -96,54 +96,54 @@ def _held_out(held: HeldOut) -> HeldOutEntry:
     return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
 
 
-def _lines(found: AccelerometerEntry) -> Iterator[str]:
+def _lines(entry: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
-    swept = "" if found.laid_down is not None else f", {found.sweeps} sweeps"
-    yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes{swept}"
-    if found.found_at is not None:
-        yield f"scale and bias: {when_words(found.found_at)}"
-    if found.budget is not None and any(line.name == NONLINEARITY for line in found.budget.contributors):
+    swept = "" if entry.laid_down is not None else f", {entry.sweeps} sweeps"
+    yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{swept}"
+    if entry.found_at is not None:
+        yield f"scale and bias: {when_words(entry.found_at)}"
+    if entry.budget is not None and any(line.name == NONLINEARITY for line in entry.budget.contributors):
         yield "k by the readings at 1 g up and down, b at 0 g"
-    yield from assumed_lines(found.budget)
-    yield from told_lines(found.told_from)
-    yield from attitude_lines(found, ACCELERATION)
-    if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
-        terms = triple(found.second_order_s2_m, "+.2e")
-        widths = expanded(found.second_order_std_s2_m, found.second_order_freedom).widths
-        words = factor_words(found.second_order_freedom)
+    yield from assumed_lines(entry.budget)
+    yield from told_lines(entry.told_from)
+    yield from attitude_lines(entry, ACCELERATION)
+    if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
+        terms = triple(entry.second_order_s2_m, "+.2e")
+        widths = expanded(entry.second_order_std_s2_m, entry.second_order_freedom).widths
+        words = factor_words(entry.second_order_freedom)
         yield f"second order: {terms} s²/m (± {max(widths):.1e}, {words})"
-    if found.lever_arm_m is not None and found.lever_arm_std_m is not None:
-        lever = triple(np.multiply(1e3, found.lever_arm_m), "+.1f")
-        yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(found.lever_arm_std_m):.1f})"
-    if found.delay_s is not None and found.delay_std_s is not None:
-        yield f"lags its gyroscope by {1e3 * found.delay_s:+.2f} ms (± {2e3 * found.delay_std_s:.2f})"
-    if found.alignment is not None:
-        turned = triple(np.degrees(found.alignment.rotation_rad), "+.4f")
-        std_deg = 2 * np.degrees(max(found.alignment.std_rad))
+    if entry.lever_arm_m is not None and entry.lever_arm_std_m is not None:
+        lever = triple(np.multiply(1e3, entry.lever_arm_m), "+.1f")
+        yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(entry.lever_arm_std_m):.1f})"
+    if entry.delay_s is not None and entry.delay_std_s is not None:
+        yield f"lags its gyroscope by {1e3 * entry.delay_s:+.2f} ms (± {2e3 * entry.delay_std_s:.2f})"
+    if entry.alignment is not None:
+        turned = triple(np.degrees(entry.alignment.rotation_rad), "+.4f")
+        std_deg = 2 * np.degrees(max(entry.alignment.std_rad))
         yield f"turned against its gyroscope by: {turned} ° (± {std_deg:.4f})"
-    yield from method_lines(found, ACCELERATION, ", attitudes alone")
-    if found.held_out is not None:
-        held = found.held_out
+    yield from method_lines(entry, ACCELERATION, ", attitudes alone")
+    if entry.held_out is not None:
+        held = entry.held_out
         yield (
             f"gravity's size in {held.dwells} attitudes held out: RMS {held.rms_m_s2:.5f} m/s², "
             f"at most {held.max_m_s2:.5f} off"
         )
-    yield from (f"warning: {warning}" for warning in found.warnings)
+    yield from (f"warning: {warning}" for warning in entry.warnings)
 
 
-def _model(found: AccelerometerEntry) -> str:
-    return "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
+def _model(entry: AccelerometerEntry) -> str:
+    return "a = F s + b" if entry.second_order_s2_m is None else "a = F (s + φ s²) + b"
 
 
-def _temperatures_c(found: AccelerometerEntry) -> dict[str, float | None]:
-    return {"": found.temperature_c if found.found_at is None else found.found_at.temperature_c}
+def _temperatures_c(entry: AccelerometerEntry) -> dict[str, float | None]:
+    return {"": entry.temperature_c if entry.found_at is None else entry.found_at.temperature_c}
 
 
-def _further(found: AccelerometerEntry) -> Iterator[Further]:
-    yield angles(found)
-    if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
-        known = found.second_order_std_s2_m, found.second_order_freedom
-        yield Further("second order", AXES, found.second_order_s2_m, *known, dcc_results.PER_FORCE)
+def _further(entry: AccelerometerEntry) -> Iterator[Further]:
+    yield angles(entry)
+    if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
+        known = entry.second_order_std_s2_m, entry.second_order_freedom
+        yield Further("second order", AXES, entry.second_order_s2_m, *known, dcc_results.PER_FORCE)
 
 
 def _method(swept: bool) -> str:

@@ -20,8 +20,8 @@ from rig.report.budget_table import heading_of
 from rig.report.certificate import dcc_results
 from rig.report.entry import counted
 from rig.report.expanded import expanded, factor_words
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import CHANGES, SLOPES, Followed, known, parameters
-from rig.report.kinds.found import Found
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
 from rig.report.kinds.unexplained import of_repeats
 from rig.station.plain_text import plain
@@ -87,37 +87,37 @@ def _vector(values: Array) -> Vector3:
     return x, y, z
 
 
-def _found(document: ResultDocument) -> Iterator[Found[DriftEntry]]:
+def _found(document: ResultDocument) -> Iterator[Finding[DriftEntry]]:
     for name, drifts in document.bias_drift.items():
-        yield from (Found(name, quantities()[quantity], entry) for quantity, entry in drifts.items())
+        yield from (Finding(name, quantities()[quantity], entry) for quantity, entry in drifts.items())
 
 
-def _printed(found: Found[DriftEntry]) -> Iterator[Table | str]:
-    yield drift_table(found.sensor, found.quantity, found.entry)
-    yield from _lines(found.quantity, found.entry)
+def _printed(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
+    yield drift_table(finding.sensor, finding.quantity, finding.entry)
+    yield from _lines(finding.quantity, finding.entry)
 
 
-def _shown(found: Found[DriftEntry]) -> Shown:
+def _shown(finding: Finding[DriftEntry]) -> Shown:
     """The largest change that there was."""
-    entry, unit = found.entry, found.quantity.drift
+    entry, unit = finding.entry, finding.quantity.drift
     widths = expanded(_change_std(entry), entry.freedom).widths
     change, known_to = ([each / unit.size for each in values] for values in (entry.largest_change, widths))
     noun, three = "largest change of the bias", Three(change, known_to)
-    name = f"{found.quantity.beside(found.sensor)}: {noun}"
-    return Shown(found.sensor, found.quantity, name, unit, three, combined=True, noun=noun)
+    name = f"{finding.quantity.beside(finding.sensor)}: {noun}"
+    return Shown(finding.sensor, finding.quantity, name, unit, three, combined=True, noun=noun)
 
 
-def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | None:
+def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed | None:
     """What is followed of a drift, in results that say whose bias it is."""
-    entry, slope = found.entry, found.entry.over_temperature
+    entry, slope = finding.entry, finding.entry.over_temperature
     if entry.part is None or entry.serial_number is None or entry.full_scale is None:
         return None
     followed = [*parameters(CHANGES, entry.largest_change, _change_std(entry), entry.freedom, entry.unit)]
     if not isinstance(slope, ErrorEntry):
         followed += parameters(SLOPES, slope.slope, slope.std, slope.freedom, f"{entry.unit}/K")
     return Followed(
-        found.sensor,
-        f"{found.quantity} bias drift",
+        finding.sensor,
+        f"{finding.quantity} bias drift",
         entry.part,
         entry.serial_number,
         entry.full_scale,
@@ -127,28 +127,28 @@ def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | 
     )
 
 
-def _measured(found: Found[DriftEntry], _: object) -> Measured:
-    entry, of = found.entry, found.quantity
-    name, results = f"bias by repeat of {found.sensor}, {of}", dcc_results.bias_drift(entry, of)
-    return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
+def _measured(finding: Finding[DriftEntry], _: object) -> Measured:
+    entry, of = finding.entry, finding.quantity
+    name, results = f"bias by repeat of {finding.sensor}, {of}", dcc_results.bias_drift(entry, of)
+    return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
 
 
-def _change_std(found: DriftEntry) -> list[float]:
-    bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
+def _change_std(entry: DriftEntry) -> list[float]:
+    bias, std = (np.array([getattr(each.held, name) for each in entry.repeats]) for name in ("bias", "std"))
     stds: list[float] = largest_change_std(bias, std).tolist()
     return stds
 
 
-def drift_table(name: str, of: Quantity, found: DriftEntry) -> Table:
+def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
     """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
     unit, size = of.drift.name, of.drift.size
-    known = expanded((1.0, 1.0, 1.0), found.freedom)
+    known = expanded((1.0, 1.0, 1.0), entry.freedom)
     table = Table(title=plain(f"{name}, {of.sensor}: bias by repeat, scale and axes held", "table.title"))
     table.title_justify = "left"
-    moved = {move.repeat: move.axis for move in found.moves}
+    moved = {move.repeat: move.axis for move in entry.moves}
     for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
         table.add_column(heading, justify="right")
-    for number, repeat in enumerate(found.repeats, 1):
+    for number, repeat in enumerate(entry.repeats, 1):
         table.add_row(
             str(number),
             f"{repeat.time_s / 3600:.2f}",
@@ -160,32 +160,32 @@ def drift_table(name: str, of: Quantity, found: DriftEntry) -> Table:
     return table
 
 
-def _lines(quantity: Quantity, found: DriftEntry) -> Iterator[str]:
+def _lines(quantity: Quantity, entry: DriftEntry) -> Iterator[str]:
     """What stands below the table."""
     shown = quantity.drift
     unit, size = shown.name, shown.size
-    if found.moves:
-        for move in found.moves:
+    if entry.moves:
+        for move in entry.moves:
             change = " ".join(f"{each / size:+.3g}" for each in move.change)
             yield f"moved before repeat {move.repeat}, most along {move.axis}: {change} {unit}"
     else:
         yield "the bias did not move beyond its noise"
-    yield f"a steady one is said to have moved in {100 * found.false_alarm:g} % of runs"
-    if max(found.excess) > 1.5:
-        yield f"repeats scatter {max(found.excess):.1f} times as much as noise would have it; U allows for that"
-    anew = [repeat.anew for repeat in found.repeats]
+    yield f"a steady one is said to have moved in {100 * entry.false_alarm:g} % of runs"
+    if max(entry.excess) > 1.5:
+        yield f"repeats scatter {max(entry.excess):.1f} times as much as noise would have it; U allows for that"
+    anew = [repeat.anew for repeat in entry.repeats]
     refused = [each for each in anew if isinstance(each, ErrorEntry)]
     if refused:
         yield f"everything found anew: not in {len(refused)} of {len(anew)} repeats; {refused[0].error}"
     else:
         apart = [
             np.subtract(each.bias, repeat.held.bias)
-            for each, repeat in zip(anew, found.repeats, strict=True)
+            for each, repeat in zip(anew, entry.repeats, strict=True)
             if not isinstance(each, ErrorEntry)
         ]
         rms = float(np.sqrt(np.mean(np.square(apart)))) / size
         yield f"everything found anew in each repeat: {rms:.3g} {unit} RMS from these"
-    slope = found.over_temperature
+    slope = entry.over_temperature
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
     else:
@@ -194,7 +194,7 @@ def _lines(quantity: Quantity, found: DriftEntry) -> Iterator[str]:
         low, high = slope.range_c
         words = factor_words(slope.freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
-    if quantity == RATE and not found.earth_rate_known:
+    if quantity == RATE and not entry.earth_rate_known:
         yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"
 
 

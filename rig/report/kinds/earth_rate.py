@@ -9,42 +9,42 @@ from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, SensorEntry
 from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import EARTH, Followed, known, parameters
-from rig.report.kinds.found import Found
 from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
 
 
-def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
+def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
     """Every sensor that has found it."""
     for name, sensor in document.sensors.items():
         if isinstance(sensor.earth_rate, EarthRateEntry):
-            yield Found(name, RATE, sensor)
+            yield Finding(name, RATE, sensor)
 
 
-def _of(found: Found[SensorEntry]) -> EarthRateEntry:
-    rate = found.entry.earth_rate
+def _of(finding: Finding[SensorEntry]) -> EarthRateEntry:
+    rate = finding.entry.earth_rate
     if not isinstance(rate, EarthRateEntry):
-        raise TypeError(f"{found.sensor} has not found the Earth's rate")
+        raise TypeError(f"{finding.sensor} has not found the Earth's rate")
     return rate
 
 
-def _shown(found: Found[SensorEntry]) -> Shown:
+def _shown(finding: Finding[SensorEntry]) -> Shown:
     """The Earth's rate in the axes of the arm's base."""
-    entry, unit = _of(found), RATE.drift
+    entry, unit = _of(finding), RATE.drift
     widths = expanded(_stds(entry), entry.freedoms(3)).widths
     noun = "the Earth's rate in the arm's base"
-    name = f"{found.sensor}: {noun}"
+    name = f"{finding.sensor}: {noun}"
     rates, known_to = ([each / unit.size for each in values] for values in (entry.rate_rad_s, widths))
     three = Three(rates, known_to)
-    return Shown(found.sensor, RATE, name, unit, three, combined=True, noun=noun)
+    return Shown(finding.sensor, RATE, name, unit, three, combined=True, noun=noun)
 
 
-def _followed(found: Found[SensorEntry], _: object) -> Followed:
-    entry, sensor = _of(found), found.entry
+def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
+    entry, sensor = _of(finding), finding.entry
     values, stds = (entry.norm_rad_s, *entry.rate_rad_s), (entry.norm_std_rad_s, *_stds(entry))
     return Followed(
-        found.sensor,
+        finding.sensor,
         "Earth's rate",
         sensor.part,
         sensor.serial_number,
@@ -55,18 +55,18 @@ def _followed(found: Found[SensorEntry], _: object) -> Followed:
     )
 
 
-def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
+def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     """The item is its gyroscope, as warm as that was; a reference is none."""
-    sensor = found.entry
+    sensor = finding.entry
     if sensor.role == "reference":
         return None
-    name, results = f"the Earth's rate found by gyroscope {found.sensor}", dcc_results.earth_rate(_of(found))
+    name, results = f"the Earth's rate found by gyroscope {finding.sensor}", dcc_results.earth_rate(_of(finding))
     warm = temperatures_c(sensor)
-    return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
+    return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
-def _stds(found: EarthRateEntry) -> list[float]:
-    stds: list[float] = np.sqrt(np.diag(found.covariance_rad2_s2)).tolist()
+def _stds(entry: EarthRateEntry) -> list[float]:
+    stds: list[float] = np.sqrt(np.diag(entry.covariance_rad2_s2)).tolist()
     return stds
 
 

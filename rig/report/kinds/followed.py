@@ -160,18 +160,18 @@ def parameters(
         yield Parameter(name, value, std, None, unit, coverage_factor=None if factor == COVERAGE_FACTOR else factor)
 
 
-def followed_beside(found: Iterable[Further]) -> Iterator[Parameter]:
+def followed_beside(further: Iterable[Further]) -> Iterator[Parameter]:
     """The parameters of what was found beside scale and bias, as far as a history follows it."""
-    for each in found:
+    for each in further:
         if each.prefix:
             values = [-value for value in each.values] if each.opposite else each.values
             names = [each.prefix + label for label in each.labels]
             yield from parameters(names, values, each.stds, each.freedom, each.followed_in)
 
 
-def known(found: Sequence[Parameter]) -> tuple[Parameter, ...]:
+def known(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """The parameters with an uncertainty: of another, nothing can be said over time."""
-    return tuple(each for each in found if each.std_statistical > 0)
+    return tuple(each for each in parameters if each.std_statistical > 0)
 
 
 def _std(row: Array, covariance: Sequence[Sequence[float]]) -> float:

@@ -25,8 +25,8 @@ from rig.report.elsewhere_entries import rates_in_attitudes, turned
 from rig.report.expanded import flat
 from rig.report.hand_entry import by_hand_lines
 from rig.report.kinds.corrected import Corrected, noise_of
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import Followed, Further
-from rig.report.kinds.found import Found
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Without
 from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, tables, unsolved_lines
 from rig.report.kinds.unexplained import of_sweeps_and_rests
@@ -61,25 +61,25 @@ def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
     return made
 
 
-def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
-    return (Found(name, RATE, entry) for name, entry in document.sensors.items())
+def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
+    return (Finding(name, RATE, entry) for name, entry in document.sensors.items())
 
 
-def _printed(found: Found[SensorEntry]) -> Iterator[Table | str]:
-    sensor, reference = found.entry, " (known)" if found.entry.role == "reference" else ""
-    title = f"{found.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
+def _printed(finding: Finding[SensorEntry]) -> Iterator[Table | str]:
+    sensor, reference = finding.entry, " (known)" if finding.entry.role == "reference" else ""
+    title = f"{finding.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
     yield from tables(title, RATE, sensor)
     yield from _beside(sensor)
 
 
-def _shown(found: Found[SensorEntry]) -> Shown:
-    speeds = speed_words(found.entry)
+def _shown(finding: Finding[SensorEntry]) -> Shown:
+    speeds = speed_words(finding.entry)
     held_at = f"at {speeds} °/s" if speeds else ""
-    return replace(shown_of(found), held_at=held_at, model=found.entry.model)
+    return replace(shown_of(finding), held_at=held_at, model=finding.entry.model)
 
 
-def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
-    return followed_of(found, document, _further(found.entry))
+def _followed(finding: Finding[SensorEntry], document: ResultDocument) -> Followed:
+    return followed_of(finding, document, _further(finding.entry))
 
 
 def _further(sensor: SensorEntry) -> Iterator[Further]:
@@ -108,20 +108,20 @@ def _further(sensor: SensorEntry) -> Iterator[Further]:
     )
 
 
-def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
+def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     """The item's results; nothing of a reference."""
-    sensor = found.entry
+    sensor = finding.entry
     if sensor.role == "reference":
         return None
-    name = f"calibration of gyroscope {found.sensor}"
+    name = f"calibration of gyroscope {finding.sensor}"
     results = chain(dcc_results.gyroscope(sensor), dcc_results.beside(_further(sensor)))
     warm = temperatures_c(sensor)
-    return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
+    return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
-def _corrected(found: Found[SensorEntry]) -> Corrected | None:
+def _corrected(finding: Finding[SensorEntry]) -> Corrected | None:
     """Readings to rates, in the frame nearest to its axes."""
-    sensor = found.entry
+    sensor = finding.entry
     if sensor.role == "reference":
         return None
     matrix, sensitivity = np.diag(1 / np.array(sensor.scale)), None
@@ -131,7 +131,7 @@ def _corrected(found: Found[SensorEntry]) -> Corrected | None:
         if vector.g_sensitivity_rad_s_per_m_s2 is not None:  # of gravity, which points down where force points up
             sensitivity = -np.array(vector.g_sensitivity_rad_s_per_m_s2) @ to_sensor.T
     return Corrected(
-        sensor=found.sensor,
+        sensor=finding.sensor,
         quantity=RATE,
         part=sensor.part,
         serial_number=sensor.serial_number,
@@ -215,21 +215,21 @@ def _turned(sensor: SensorEntry) -> Iterator[str]:
         yield f"the turns contradict each other by more, and count as {found.widened:.2g} times as uncertain"
 
 
-def _in_attitudes(found: InAttitudesRatesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
+def _in_attitudes(attitudes: InAttitudesRatesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
     """What attitudes of a file told beside scale and bias."""
-    if found is None:
+    if attitudes is None:
         return
     for clock in clocks:
         yield (
             f"the samples' clock on the table's: {clock.offset_s:+.4f} s (± {2e3 * clock.offset_std_s:.2g} ms), "
             f"{1e6 * clock.drift:+.1f} ppm (± {2e6 * clock.drift_std:.2g}) at {clock.reference_board_s:.1f} s of theirs"
         )
-    if found.earth_rate_rad_s is None or found.earth_rate_std_rad_s is None:
-        yield f"Earth's rate: {found.earth_rate_error}; its size, whichever way it points, is in the uncertainty"
+    if attitudes.earth_rate_rad_s is None or attitudes.earth_rate_std_rad_s is None:
+        yield f"Earth's rate: {attitudes.earth_rate_error}; its size, whichever way it points, is in the uncertainty"
     else:
-        rate, known = triple(found.earth_rate_rad_s, "+.3e"), 2 * max(found.earth_rate_std_rad_s)
+        rate, known = triple(attitudes.earth_rate_rad_s, "+.3e"), 2 * max(attitudes.earth_rate_std_rad_s)
         yield f"Earth's rate in table coordinates: {rate} rad/s (± {known:.1e}, k = 2)"
-    if (way := found.followed) is not None:
+    if (way := attitudes.followed) is not None:
         yield (
             f"increments: {way.increments} between attitudes, means over windows of {way.window_s:.3g} s; residuals "
             f"{1e3 * way.residual_rms_rad:.3g} mrad"
@@ -245,7 +245,7 @@ def _in_attitudes(found: InAttitudesRatesEntry | None, clocks: Iterable[TimeBase
             yield f"left out: {each.error}: {each.count} increments, the first at {each.first_s:.2f} s"
         if way.set_aside:
             yield f"left out: attitude_untrustworthy: {way.set_aside} increments that contradict all others"
-    for method, other in found.beside.items():
+    for method, other in attitudes.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"
         else:

@@ -15,8 +15,8 @@ from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.kinds.corrected import Corrected
+from rig.report.kinds.finding import EntryT, Finding
 from rig.report.kinds.followed import Followed
-from rig.report.kinds.found import EntryT, Found
 from rig.report.kinds.unexplained import Unexplained
 
 SaidT = TypeVar("SaidT")
@@ -114,20 +114,20 @@ class ResultKind(Generic[EntryT]):
     name: str
     key: str
     entries: Callable[[Outcome], Mapping[str, object]] | Without
-    found: Callable[[ResultDocument], Iterator[Found[EntryT]]]
-    printed: Callable[[Found[EntryT]], Iterator[Table | str]] | Without
-    shown: Callable[[Found[EntryT]], Shown] | Without
-    followed: Callable[[Found[EntryT], ResultDocument], Followed | None] | Without
-    header: Callable[[Found[EntryT], Mapping[str, Array]], Iterable[str]] | Without
+    found: Callable[[ResultDocument], Iterator[Finding[EntryT]]]
+    printed: Callable[[Finding[EntryT]], Iterator[Table | str]] | Without
+    shown: Callable[[Finding[EntryT]], Shown] | Without
+    followed: Callable[[Finding[EntryT], ResultDocument], Followed | None] | Without
+    header: Callable[[Finding[EntryT], Mapping[str, Array]], Iterable[str]] | Without
     figures: str | Without
     block: str | Without
-    measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
+    measured: Callable[[Finding[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
     standard: Standard | Without
-    corrected: Callable[[Found[EntryT]], Corrected | None] | Without
-    unexplained: Callable[[Found[EntryT]], Unexplained | None] | Without
+    corrected: Callable[[Finding[EntryT]], Corrected | None] | Without
+    unexplained: Callable[[Finding[EntryT]], Unexplained | None] | Without
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
-    in_short: Callable[[Found[EntryT]], Iterable[str]] = lambda _: ()
+    in_short: Callable[[Finding[EntryT]], Iterable[str]] = lambda _: ()
 
 
 def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:

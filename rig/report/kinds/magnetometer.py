@@ -84,43 +84,43 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
     )  # fmt: skip
 
 
-def _lines(found: MagnetometerEntry) -> Iterator[str]:
+def _lines(entry: MagnetometerEntry) -> Iterator[str]:
     """What stands below the table."""
-    field_ut = found.field_t / FIELD.bias.size
-    yield f"relative to a field of {field_ut:g} µT; {len(found.dwells)} attitudes; no limit judges it"
-    if found.found_at is not None:
-        yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
-    yield from assumed_lines(found.budget)
-    yield from told_lines(found.told_from)
+    field_ut = entry.field_t / FIELD.bias.size
+    yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; no limit judges it"
+    if entry.found_at is not None:
+        yield f"scale and bias: {when_words(entry.found_at)}; its temperature was not measured"
+    yield from assumed_lines(entry.budget)
+    yield from told_lines(entry.told_from)
     yield "iron and currents that turn with it are part of what is found"
     base = "table's axes"
-    if found.arm_field_in_bias:
+    if entry.arm_field_in_bias:
         base = "arm's base"
         yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
-        yield from _tests(found)
-    yield f"field in the {base}: {triple(np.divide(found.field_base_t, FIELD.bias.size), '+.3f')} µT"
-    yield from attitude_lines(found, FIELD)
-    yield from method_lines(found, FIELD)
-    yield from (f"warning: {warning}" for warning in found.warnings)
+        yield from _tests(entry)
+    yield f"field in the {base}: {triple(np.divide(entry.field_base_t, FIELD.bias.size), '+.3f')} µT"
+    yield from attitude_lines(entry, FIELD)
+    yield from method_lines(entry, FIELD)
+    yield from (f"warning: {warning}" for warning in entry.warnings)
 
 
-def _tests(found: MagnetometerEntry) -> Iterator[str]:
+def _tests(entry: MagnetometerEntry) -> Iterator[str]:
     """What shows, and what does not, that the field was the same everywhere and all the time."""
-    if (alike := found.uniformity) is not None:
+    if (alike := entry.uniformity) is not None:
         yield f"uniform field: χ² of the residuals {alike.chi_square:.1f}, at most {alike.limit:.1f}"
-    if (drift := found.drift) is not None:
+    if (drift := entry.drift) is not None:
         change, std = (np.linalg.norm(each) / FIELD.bias.size for each in (drift.change_t, drift.std_t))
         yield f"at home before and after: changed by {change:.3f} µT (± {2 * std:.3f})"
     else:
         yield "no field test at home before and after: a field that drifts is not noticed (procedure.field_test_s)"
-    away_m = float(np.linalg.norm(found.extension_m))
+    away_m = float(np.linalg.norm(entry.extension_m))
     if away_m < FAR_ENOUGH_M:
         advised = f"{1e3 * FAR_ENOUGH_M:.0f} mm are advised (arm.extension_mm)"
         yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
 
 
-def _further(found: MagnetometerEntry) -> Iterator[Further]:
-    yield angles(found)
+def _further(entry: MagnetometerEntry) -> Iterator[Further]:
+    yield angles(entry)
 
 
 MAGNETOMETER = triad_kind(

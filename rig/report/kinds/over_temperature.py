@@ -14,8 +14,8 @@ from rig.data.result_file import ResultDocument
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.certificate import dcc_results
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import SCALE_SLOPES, SLOPES, Followed, known, parameters
-from rig.report.kinds.found import Found
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
 from rig.report.rounding import plus_minus
 from rig.report.temperature_c_functions import temperature_lines
@@ -42,14 +42,14 @@ def _sensor(outcome: Outcome, name: str) -> RecordedSensor | Item:
     return outcome.recordings[0].run.sensors[name]
 
 
-def _found(document: ResultDocument) -> Iterator[Found[OverTemperatureEntry]]:
+def _found(document: ResultDocument) -> Iterator[Finding[OverTemperatureEntry]]:
     for name, each in document.over_temperature.items():
-        yield from (Found(name, quantities()[quantity], entry) for quantity, entry in each.items())
+        yield from (Finding(name, quantities()[quantity], entry) for quantity, entry in each.items())
 
 
-def _printed(found: Found[OverTemperatureEntry]) -> Iterator[Table | str]:
-    entry, unit = found.entry, found.quantity.bias
-    title = f"{found.quantity.beside(found.sensor)}: over temperature, ± U"
+def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
+    entry, unit = finding.entry, finding.quantity.bias
+    title = f"{finding.quantity.beside(finding.sensor)}: over temperature, ± U"
     table = Table(title=plain(title, "table.title"))
     table.title_justify = "left"
     for heading in ("°C", *(f"k{axis}" for axis in "xyz"), *(f"b{axis} {unit.name}" for axis in "xyz")):
@@ -59,17 +59,17 @@ def _printed(found: Found[OverTemperatureEntry]) -> Iterator[Table | str]:
         biases = (plus_minus(b / unit.size, u / unit.size) for b, u in zip(row.bias, row.expanded_bias, strict=True))
         table.add_row(f"{row.temperature_c:.1f}", *scales, *biases)
     yield table
-    yield from about_lines(entry, found.quantity)
+    yield from about_lines(entry, finding.quantity)
 
 
-def _shown(found: Found[OverTemperatureEntry]) -> Shown:
+def _shown(finding: Finding[OverTemperatureEntry]) -> Shown:
     """The slopes at the reference."""
-    entry, unit = found.entry, found.quantity.drift
+    entry, unit = finding.entry, finding.quantity.drift
     _, bias = _slopes(entry)
     noun = f"change per kelvin at {entry.reference_c:g} °C"
-    name = f"{found.quantity.beside(found.sensor)}: {noun}"
+    name = f"{finding.quantity.beside(finding.sensor)}: {noun}"
     three, per_kelvin = Three(*([each / unit.size for each in values] for values in bias)), f"{unit.name}/K"
-    return Shown(found.sensor, found.quantity, name, Unit(per_kelvin, unit.size), three, combined=True, noun=noun)
+    return Shown(finding.sensor, finding.quantity, name, Unit(per_kelvin, unit.size), three, combined=True, noun=noun)
 
 
 def _slopes(entry: OverTemperatureEntry) -> tuple[tuple[Sequence[float], Sequence[float]], ...]:
@@ -81,17 +81,17 @@ def _slopes(entry: OverTemperatureEntry) -> tuple[tuple[Sequence[float], Sequenc
     )
 
 
-def _followed(found: Found[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
+def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
     """The slopes at the reference; scale and bias there are those of the sensor's calibration."""
-    entry = found.entry
+    entry = finding.entry
     scale, bias = ((values, [each / COVERAGE_FACTOR for each in expanded]) for values, expanded in _slopes(entry))
     rows = [
         *parameters(SLOPES, *bias, None, f"{entry.unit}/K"),
         *parameters(SCALE_SLOPES, *scale, None, "1/K"),
     ]
     return Followed(
-        found.sensor,
-        f"{found.quantity} over temperature",
+        finding.sensor,
+        f"{finding.quantity} over temperature",
         entry.part,
         entry.serial_number,
         entry.full_scale or 0.0,
@@ -101,10 +101,10 @@ def _followed(found: Found[OverTemperatureEntry], _: ResultDocument) -> Followed
     )
 
 
-def _measured(found: Found[OverTemperatureEntry], _: object) -> Measured:
-    entry, of = found.entry, found.quantity
-    name, results = f"{of.beside(found.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
-    return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
+def _measured(finding: Finding[OverTemperatureEntry], _: object) -> Measured:
+    entry, of = finding.entry, finding.quantity
+    name, results = f"{of.beside(finding.sensor)}, over temperature", dcc_results.over_temperature(entry, of)
+    return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
 
 
 OVER_TEMPERATURE = ResultKind(

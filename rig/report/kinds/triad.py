@@ -22,8 +22,8 @@ from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.certificate import dcc_results
 from rig.report.certificate.tables import ANGLES
 from rig.report.kinds.corrected import Corrected, noise_of
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
-from rig.report.kinds.found import Found
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Three
 from rig.report.kinds.unexplained import of_attitudes
 
@@ -50,14 +50,14 @@ def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
     return found
 
 
-def shown_of(found: Found[Any]) -> Shown:
+def shown_of(finding: Finding[Any]) -> Shown:
     """The row of page and notebook."""
-    quantity, entry = found.quantity, found.entry
+    quantity, entry = finding.quantity, finding.entry
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
     axes = len(entry.scale)
     bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
     scale, combined = Three(entry.scale, expanded[:axes]), entry.budget is not None
-    return Shown(found.sensor, quantity, quantity.of(found.sensor), quantity.bias, bias, combined, scale)
+    return Shown(finding.sensor, quantity, quantity.of(finding.sensor), quantity.bias, bias, combined, scale)
 
 
 def angles(entry: Any) -> Further:
@@ -67,17 +67,17 @@ def angles(entry: Any) -> Further:
     return Further(name, ANGLES, *of, dcc_results.ANGLE, prefix="nonorth_", followed_in="rad")
 
 
-def followed_of(found: Found[Any], document: ResultDocument, further: Iterable[Further]) -> Followed:
+def followed_of(finding: Finding[Any], document: ResultDocument, further: Iterable[Further]) -> Followed:
     """Scale, bias and what was found beside as a history keeps them."""
-    quantity, entry = found.quantity, found.entry
+    quantity, entry = finding.quantity, finding.entry
     followed = [
-        *scale_and_bias(found.sensor, quantity, entry, bias_of(quantity, entry), document),
+        *scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document),
         *followed_beside(further),
     ]
     full_scale: float = getattr(entry, quantity.named("range")) or 0.0
     temperature_c: float | None = getattr(entry, "temperature_c", None)
     of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
-    return Followed(found.sensor, quantity.name, *of, known(followed))
+    return Followed(finding.sensor, quantity.name, *of, known(followed))
 
 
 def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]:
@@ -96,17 +96,17 @@ def item_words(entry: Any) -> str:
     return " ".join(told) or "part and serial number not stated"
 
 
-def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
+def attitude_lines(entry: Any, quantity: Quantity) -> Iterator[str]:
     """How far the axes are from right angles, and the attitudes from what they were taken to be.
 
     And, where a file told the attitudes, what laying down did and what was left out.
     """
-    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
-    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
-    if found.attitude_error_rad is not None:
-        known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
-        yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
-    laid, unit = found.laid_down, quantity.unit
+    skew = triple(np.degrees(entry.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(entry)})"
+    if entry.attitude_error_rad is not None:
+        known = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
+        yield f"attitude error found: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{known}"
+    laid, unit = entry.laid_down, quantity.unit
     if laid is None:
         return
     if laid.placement_std is not None:
@@ -119,9 +119,9 @@ def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
         yield f"left out: not_at_rest: {laid.rows_left_out} rows in which the body moves"
 
 
-def method_lines(found: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
+def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
     """What each of the other methods finds, or why it finds nothing."""
-    for method, other in found.beside.items():
+    for method, other in entry.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"
         else:
@@ -136,12 +136,12 @@ def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"
 
 
-def _corrected(found: Found[Any]) -> Corrected:
+def _corrected(finding: Finding[Any]) -> Corrected:
     """Readings to what they are of, in the right-angled frame that the entry's matrix leads to."""
-    quantity, entry = found.quantity, found.entry
+    quantity, entry = finding.quantity, finding.entry
     noise = [(getattr(dwell, quantity.named("noise")), dwell.samples) for dwell in entry.dwells]
     return Corrected(
-        sensor=found.sensor,
+        sensor=finding.sensor,
         quantity=quantity,
         part=entry.part,
         serial_number=entry.serial_number,
@@ -161,15 +161,15 @@ def triad_kind(
     entries: Callable[[Outcome], Mapping[str, object]],
     words: Words,
     *,
-    header: Callable[[Found[Any], Mapping[str, Array]], Iterable[str]],
+    header: Callable[[Finding[Any], Mapping[str, Array]], Iterable[str]],
     block: str,
     standard: Standard,
 ) -> ResultKind[Any]:
     """The kind of a sensor that attitudes calibrate, whose entries stand at `key`; its `words` are its own."""
 
-    def found(document: ResultDocument) -> Iterator[Found[Any]]:
+    def found(document: ResultDocument) -> Iterator[Finding[Any]]:
         of_all: Mapping[str, Any] = getattr(document, key)
-        return (Found(name, quantity, each) for name, each in of_all.items() if not isinstance(each, ErrorEntry))
+        return (Finding(name, quantity, each) for name, each in of_all.items() if not isinstance(each, ErrorEntry))
 
     def unsolved(document: ResultDocument) -> Iterator[str]:
         of_all: Mapping[str, Any] = getattr(document, key)
@@ -178,20 +178,20 @@ def triad_kind(
                 yield f"{quantity.of(name)}, not calibrated: {each.error}"
         yield from unsolved_lines(document, quantity)
 
-    def printed(each: Found[Any]) -> Iterator[Table | str]:
-        entry = each.entry
-        title = f"{quantity.of(each.sensor)}{words.title}: {item_words(entry)}"
+    def printed(finding: Finding[Any]) -> Iterator[Table | str]:
+        entry = finding.entry
+        title = f"{quantity.of(finding.sensor)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
         yield from words.lines(entry)
 
-    def followed(each: Found[Any], document: ResultDocument) -> Followed:
-        return followed_of(each, document, words.further(each.entry))
+    def followed(finding: Finding[Any], document: ResultDocument) -> Followed:
+        return followed_of(finding, document, words.further(finding.entry))
 
-    def measured(each: Found[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
-        entry, name = each.entry, f"calibration of {quantity.sensor} {each.sensor}"
-        results = chain(words.digital(entry, turned.get(each.sensor)), dcc_results.beside(words.further(entry)))
+    def measured(finding: Finding[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
+        entry, name = finding.entry, f"calibration of {quantity.sensor} {finding.sensor}"
+        results = chain(words.digital(entry, turned.get(finding.sensor)), dcc_results.beside(words.further(entry)))
         warm = words.temperatures_c(entry)
-        return Measured(quantity.sensor, each.sensor, entry.part, entry.serial_number, name, results, warm)
+        return Measured(quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results, warm)
 
     return ResultKind(
         name=quantity.sensor,

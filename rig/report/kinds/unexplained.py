@@ -11,7 +11,7 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 
 EXPECTED = "what noise, a wandering bias and the ends of turns are expected to leave"
 EXPECTED_IN_ATTITUDES = {
@@ -41,9 +41,9 @@ class Unexplained:
     split: int | None = None
 
 
-def of_sweeps_and_rests(found: Found[SensorEntry]) -> Unexplained | None:
+def of_sweeps_and_rests(finding: Finding[SensorEntry]) -> Unexplained | None:
     """A gyroscope's sweeps and rests; None where the vector model left nothing, or that of other sweeps and rests."""
-    sensor, vector = found.entry, found.entry.vector_model
+    sensor, vector = finding.entry, finding.entry.vector_model
     averages: list[ObservationEntry | AverageEntry] = [*sensor.observations, *sensor.rests]
     if isinstance(vector, ErrorEntry) or len(vector.residuals_rad_s) != len(averages) or not averages:
         return None
@@ -57,9 +57,9 @@ def of_sweeps_and_rests(found: Found[SensorEntry]) -> Unexplained | None:
     return Unexplained(RATE, labels, left, std, OF_SAMPLES, split=split)
 
 
-def of_attitudes(found: Found[Any]) -> Unexplained:
+def of_attitudes(finding: Finding[Any]) -> Unexplained:
     """The attitudes of an accelerometer or a magnetometer."""
-    entry, quantity, dwells = found.entry, found.quantity, found.entry.dwells
+    entry, quantity, dwells = finding.entry, finding.quantity, finding.entry.dwells
 
     def of(dwell: object, what: str) -> Any:
         return getattr(dwell, quantity.named(what))
@@ -74,13 +74,13 @@ def of_attitudes(found: Found[Any]) -> Unexplained:
     return Unexplained(quantity, labels, left, np.hypot(std, turned), OF_ATTITUDES)
 
 
-def of_repeats(found: Found[DriftEntry]) -> Unexplained:
+def of_repeats(finding: Finding[DriftEntry]) -> Unexplained:
     """The biases by repeat, less their mean over the repeats."""
-    repeats = found.entry.repeats
+    repeats = finding.entry.repeats
     bias = np.array([each.held.bias for each in repeats])
     std = np.array([each.held.std for each in repeats])
     labels = [f"repeat {number}" for number in range(1, len(repeats) + 1)]
-    return Unexplained(found.quantity, labels, bias - bias.mean(axis=0), std, OF_REPEATS, shown=FROM_MEAN)
+    return Unexplained(finding.quantity, labels, bias - bias.mean(axis=0), std, OF_REPEATS, shown=FROM_MEAN)
 
 
 def _turned(matrix: Array, readings: Array, attitude_error_rad: float | None) -> Array:

@@ -19,7 +19,7 @@ from rig.data.result_file import (
 )
 from rig.report.certificate import dcc_results
 from rig.report.entry import entry
-from rig.report.kinds.found import Found
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Measured, ResultKind, Without
 from rig.station.plain_text import plain
 
@@ -51,23 +51,23 @@ def _comparison(comparison: Comparison) -> ComparisonEntry:
     )  # fmt: skip
 
 
-def _found(document: ResultDocument) -> Iterator[Found[VerificationEntry]]:
-    return (Found(name, RATE, each) for name, each in document.verification.items())
+def _found(document: ResultDocument) -> Iterator[Finding[VerificationEntry]]:
+    return (Finding(name, RATE, each) for name, each in document.verification.items())
 
 
-def _printed(found: Found[VerificationEntry]) -> Iterator[Table | str]:
-    yield verification_table(found.sensor, found.entry)
-    yield from verification_lines(found.entry)
+def _printed(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
+    yield verification_table(finding.sensor, finding.entry)
+    yield from verification_lines(finding.entry)
 
 
-def verification_table(name: str, found: VerificationEntry) -> Table:
+def verification_table(name: str, entry: VerificationEntry) -> Table:
     """Error of each axis before and after, from a sensor's entry; a dash where there was no before."""
     table = Table(
-        title=plain(f"{name} against {found.reference}, sweeps and rests", "table.title"), title_justify="left"
+        title=plain(f"{name} against {entry.reference}, sweeps and rests", "table.title"), title_justify="left"
     )
     for heading in ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    before, after = found.before, found.after
+    before, after = entry.before, entry.after
     for i, axis in enumerate("xyz"):
         table.add_row(
             axis,
@@ -80,32 +80,32 @@ def verification_table(name: str, found: VerificationEntry) -> Table:
     return table
 
 
-def verification_lines(found: VerificationEntry) -> Iterator[str]:
+def verification_lines(entry: VerificationEntry) -> Iterator[str]:
     """What stands below the table: how the two sensors sit to each other, the reference, whole turns, the delay."""
-    rotation = found.rotation
+    rotation = entry.rotation
     turned = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
     yield f"mounted off nominal to the reference by: {turned} ° (± {np.degrees(max(rotation.std_rad)):.3f})"
-    errors = [turn.error_rad_s for turn in found.after.revolutions]
-    stds = [turn.std_rad_s for turn in found.after.revolutions]
-    yield f"the reference itself, against the arm: at most {found.reference_error_rad_s:.5f} rad/s off"
+    errors = [turn.error_rad_s for turn in entry.after.revolutions]
+    stds = [turn.std_rad_s for turn in entry.after.revolutions]
+    yield f"the reference itself, against the arm: at most {entry.reference_error_rad_s:.5f} rad/s off"
     yield f"mean over a revolution after: at most {np.abs(errors).max():.5f} rad/s off (± {np.max(stds):.5f})"
-    held = [turn.gravity_rad_s for turn in found.after.revolutions]
+    held = [turn.gravity_rad_s for turn in entry.after.revolutions]
     if None not in held:
         without = np.abs(np.array(errors) - np.array(held)).max()
         yield f"    of which gravity, which the board cannot see: without it at most {without:.5f}"
-    for delay, std in zip(found.after.delay_s, found.after.delay_std_s, strict=True):
+    for delay, std in zip(entry.after.delay_s, entry.after.delay_std_s, strict=True):
         yield f"lags the reference by {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), taken out"
 
 
-def _in_short(found: Found[VerificationEntry]) -> Iterator[str]:
-    before, after = found.entry.before, max(found.entry.after.movement.rms_rad_s)
+def _in_short(finding: Finding[VerificationEntry]) -> Iterator[str]:
+    before, after = finding.entry.before, max(finding.entry.after.movement.rms_rad_s)
     until = "" if before is None else f"{max(before.movement.rms_rad_s):.4f} rad/s before, "
-    yield f"{found.sensor} against {found.entry.reference}: RMS at most {until}{after:.4f} rad/s after"
+    yield f"{finding.sensor} against {finding.entry.reference}: RMS at most {until}{after:.4f} rad/s after"
 
 
-def _measured(found: Found[VerificationEntry], _: object) -> Measured:
-    name, results = f"verification of gyroscope {found.sensor}", dcc_results.verification(found.entry)
-    return Measured("gyroscope", found.sensor, None, None, name, results)
+def _measured(finding: Finding[VerificationEntry], _: object) -> Measured:
+    name, results = f"verification of gyroscope {finding.sensor}", dcc_results.verification(finding.entry)
+    return Measured("gyroscope", finding.sensor, None, None, name, results)
 
 
 NO_PARAMETER = Without("an error of readings is no parameter, and has no uncertainty of its own")

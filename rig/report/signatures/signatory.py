@@ -142,12 +142,12 @@ def _of_token(where: str) -> Iterator[Signatory]:
         raise _unfit(label, str(error) or type(error).__name__) from error
 
 
-def _check(found: Signatory, where: str) -> None:
+def _check(signatory: Signatory, where: str) -> None:
     """Raises Refused `signing_key` where a certificate is not valid now, or the key is neither RSA nor EC."""
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
 
-    own = found.certificates[0]
+    own = signatory.certificates[0]
     if not isinstance(own.public_key(), RSAPublicKey | EllipticCurvePublicKey):
         raise _unfit(where, "its key is neither RSA nor EC")
     if not own.not_valid_before_utc <= datetime.now(UTC) <= own.not_valid_after_utc:

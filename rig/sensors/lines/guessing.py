@@ -90,12 +90,12 @@ def _named(names: tuple[str, ...]) -> dict[int, str]:
     return {place: name for place, name in found.items() if columns.count(name) == 1}
 
 
-def _find_time(shape: Shape, found: Guess) -> None:
+def _find_time(shape: Shape, guess: Guess) -> None:
     """The columns that go on: one that counts by ones, and one that tells time; and by which unit it does."""
     lasted_s = float(shape.arrived_s[-1] - shape.arrived_s[0])
-    found.rate_hz = (len(shape.values) - 1) / lasted_s
+    guess.rate_hz = (len(shape.values) - 1) / lasted_s
     for place in range(shape.values.shape[1]):
-        column, name = shape.values[:, place], found.columns[place]
+        column, name = shape.values[:, place], guess.columns[place]
         if name not in ("-", "time", "sequence") or not _goes_on(column):
             continue
         steps = np.diff(column)
@@ -104,34 +104,34 @@ def _find_time(shape: Shape, found: Guess) -> None:
         unit = _unit_of_time(forward, lasted_s / (len(column) - 1))
         ambiguous = by_ones and unit is not None
         if name == "-" and ambiguous:
-            found.columns[place], found.time = "time", {"unit": "?", "wrap": 2**32}
-            found.untold.append(f"whether column {place + 1} counts samples or {unit}: both go on by one")
+            guess.columns[place], guess.time = "time", {"unit": "?", "wrap": 2**32}
+            guess.untold.append(f"whether column {place + 1} counts samples or {unit}: both go on by one")
         elif name == "sequence" or (name == "-" and by_ones):
-            found.columns[place] = "sequence"
-            found.sequence_wrap = _wrap(column) or 0
+            guess.columns[place] = "sequence"
+            guess.sequence_wrap = _wrap(column) or 0
         elif unit is not None:
-            found.columns[place] = "time"
-            _tell_time(found, place, column, unit)
+            guess.columns[place] = "time"
+            _tell_time(guess, place, column, unit)
         elif name == "time":
-            found.time = {"unit": "?", "wrap": 2**32}
-            found.untold.append(f"the unit of the time in column {place + 1}")
-    if "time" not in found.columns:
-        found.clock = "counted" if "sequence" in found.columns else "arrival"
-        word = "it samples by a timer, and counts" if found.clock == "counted" else "when its lines arrive"
-        found.untold.append(f"when it took a sample: no column is a time. Taken: {word}")
+            guess.time = {"unit": "?", "wrap": 2**32}
+            guess.untold.append(f"the unit of the time in column {place + 1}")
+    if "time" not in guess.columns:
+        guess.clock = "counted" if "sequence" in guess.columns else "arrival"
+        word = "it samples by a timer, and counts" if guess.clock == "counted" else "when its lines arrive"
+        guess.untold.append(f"when it took a sample: no column is a time. Taken: {word}")
 
 
-def _tell_time(found: Guess, place: int, column: Array, unit: str) -> None:
+def _tell_time(guess: Guess, place: int, column: Array, unit: str) -> None:
     seen = _wrap(column)
     if seen is None and (unit in {"s", "ns"} or column.max() >= 2**32):
         seen = 0
     if seen is None:
-        found.told.append("the time did not wrap while it was looked at: 2^32 is taken, as of an Arduino")
-    found.time = {"unit": unit, "wrap": 2**32 if seen is None else seen}
+        guess.told.append("the time did not wrap while it was looked at: 2^32 is taken, as of an Arduino")
+    guess.time = {"unit": unit, "wrap": 2**32 if seen is None else seen}
     steps = np.diff(column)
     rate_hz = TIMES[unit] / float(np.mean(steps[steps > 0]))
-    found.rate_hz = rate_hz
-    found.told.append(f"column {place + 1} is the time in {unit}: it goes on as the computer's clock does")
+    guess.rate_hz = rate_hz
+    guess.told.append(f"column {place + 1} is the time in {unit}: it goes on as the computer's clock does")
 
 
 def _goes_on(column: Array) -> bool:
@@ -154,24 +154,24 @@ def _unit_of_time(steps: Array, apart_s: float) -> str | None:
     return None
 
 
-def _find_triads(shape: Shape, found: Guess, still: Flags) -> None:
+def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
     """Three columns after one another that nobody named: by their sizes at rest and while it is turned."""
     for start in range(shape.values.shape[1] - 2):
         places = slice(start, start + 3)
-        if found.columns[places] != ["-"] * 3:
+        if guess.columns[places] != ["-"] * 3:
             continue
         kind = _kind(shape.values[:, places], still)
-        if kind is not None and kind + "x" not in found.columns:
-            found.columns[places] = [kind + axis for axis in "xyz"]
+        if kind is not None and kind + "x" not in guess.columns:
+            guess.columns[places] = [kind + axis for axis in "xyz"]
     for kind in "gam":
         axes = [kind + axis for axis in "xyz"]
-        if not all(axis in found.columns for axis in axes):
-            found.columns[:] = ["-" if name in axes else name for name in found.columns]
+        if not all(axis in guess.columns for axis in axes):
+            guess.columns[:] = ["-" if name in axes else name for name in guess.columns]
     for kind in "amg":  # the gyroscope's unit is told by gravity
-        if kind + "x" in found.columns:
-            found.units[kind] = _unit(shape, found, kind, still)
-    if "g" not in found.units:
-        found.untold.append("which columns are the gyroscope: none reads nothing at rest, and much when it is turned")
+        if kind + "x" in guess.columns:
+            guess.units[kind] = _unit(shape, guess, kind, still)
+    if "g" not in guess.units:
+        guess.untold.append("which columns are the gyroscope: none reads nothing at rest, and much when it is turned")
 
 
 def _kind(values: Array, still: Flags) -> str | None:
@@ -209,9 +209,9 @@ def _field(level: float) -> tuple[str, float] | None:
     return None
 
 
-def _unit(shape: Shape, found: Guess, kind: str, still: Flags) -> dict[str, object]:
+def _unit(shape: Shape, guess: Guess, kind: str, still: Flags) -> dict[str, object]:
     """Unit and scale of a triad: as its names say, else as the readings do."""
-    places = [found.columns.index(kind + axis) for axis in "xyz"]
+    places = [guess.columns.index(kind + axis) for axis in "xyz"]
     name = shape.names[places[0]].lower() if shape.names else ""
     for pattern, unit in _UNITS[kind].items():
         if re.search(pattern, name):
@@ -219,39 +219,39 @@ def _unit(shape: Shape, found: Guess, kind: str, still: Flags) -> dict[str, obje
     values = shape.values[:, places]
     told = None
     if kind == "g":
-        told = _rate_unit(shape, found, values, still)
+        told = _rate_unit(shape, guess, values, still)
     else:
         level = float(np.median(np.linalg.norm(values[still], axis=1)))
         told = _gravity(level) if kind == "a" else _field(level)
     if told is None:
-        found.untold.append(f"the unit of the columns {kind}x {kind}y {kind}z: lines.{_SECTIONS[kind]}.unit")
+        guess.untold.append(f"the unit of the columns {kind}x {kind}y {kind}z: lines.{_SECTIONS[kind]}.unit")
         return {"unit": "?"}
     unit, scale = told
-    found.told.append(f"{kind}x {kind}y {kind}z are in {unit}" + ("" if scale == 1 else f", {scale:.6g} a count"))
+    guess.told.append(f"{kind}x {kind}y {kind}z are in {unit}" + ("" if scale == 1 else f", {scale:.6g} a count"))
     return {"unit": unit} if scale == 1 else {"unit": unit, "scale": float(f"{scale:.9g}")}
 
 
-def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Flags) -> tuple[str, float] | None:
+def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[str, float] | None:
     """Unit and scale of the gyroscope, by how far gravity went round while it read so much."""
-    if "ax" not in found.columns or not found.rate_hz:
+    if "ax" not in guess.columns or not guess.rate_hz:
         return None
-    forces = shape.values[:, [found.columns.index("a" + axis) for axis in "xyz"]]
+    forces = shape.values[:, [guess.columns.index("a" + axis) for axis in "xyz"]]
     rates = rates - rates[still].mean(axis=0)
-    flat = max(int(FLAT_S * found.rate_hz), 1)
+    flat = max(int(FLAT_S * guess.rate_hz), 1)
     blocks = len(rates) // flat
     if blocks < 8:
         return None
     forces = forces[: blocks * flat].reshape(blocks, flat, 3).mean(axis=1)
     rates = rates[: blocks * flat].reshape(blocks, flat, 3).mean(axis=1)
     forces /= np.linalg.norm(forces, axis=1, keepdims=True)
-    apart_s = 2 * flat / found.rate_hz
+    apart_s = 2 * flat / guess.rate_hz
     change = (forces[2:] - forces[:-2]) / apart_s
     by_rate = -np.cross(rates[1:-1], forces[1:-1])
     size = float(np.sum(by_rate**2))
     rad_s = float(np.sum(by_rate * change)) / size if size > 0 else 0.0
     left = float(np.sum((change - rad_s * by_rate) ** 2) / max(np.sum(change**2), 1e-12))
     if left > 0.3 or rad_s <= 0:
-        found.untold.append("how the gyroscope's axes lie to the accelerometer's: gravity did not go round as it read")
+        guess.untold.append("how the gyroscope's axes lie to the accelerometer's: gravity did not go round as it read")
         return None
     for unit, one in (("rad/s", 1.0), ("deg/s", np.pi / 180), ("mdeg/s", np.pi / 180e3), ("mrad/s", 1e-3)):
         if abs(rad_s / one - 1) < ON_HAND:
@@ -260,16 +260,16 @@ def _rate_unit(shape: Shape, found: Guess, rates: Array, still: Flags) -> tuple[
     near = sorted(COUNTS, key=lambda each: abs(each / per_count - 1))
     if abs(near[0] / per_count - 1) < SAME_SCALE and abs(near[1] / per_count - 1) > 2 * SAME_SCALE:
         return "deg/s", near[0]
-    found.untold.append(f"the gyroscope's scale: a printed 1 is about {per_count:.3g} deg/s")
+    guess.untold.append(f"the gyroscope's scale: a printed 1 is about {per_count:.3g} deg/s")
     return None
 
 
-def _find_temperature(shape: Shape, found: Guess, still: Flags) -> None:
-    if "temperature" in found.columns:
+def _find_temperature(shape: Shape, guess: Guess, still: Flags) -> None:
+    if "temperature" in guess.columns:
         return
-    for place, name in enumerate(found.columns):
+    for place, name in enumerate(guess.columns):
         column = shape.values[:, place]
         if name == "-" and 10 < column.mean() < 60 and 0 < np.ptp(column) < 2:
-            found.columns[place] = "temperature"
-            found.told.append(f"column {place + 1} is the temperature in °C, by its size: see that it is")
+            guess.columns[place] = "temperature"
+            guess.told.append(f"column {place + 1} is the temperature in °C, by its size: see that it is")
             return

@@ -93,11 +93,11 @@ def names_of(firmware: int, section: MavlinkSection) -> Names:
     )
 
 
-def refusals(sensor: str, names: Names, found: Mapping[str, float]) -> Iterator[SensorError]:
+def refusals(sensor: str, names: Names, parameters: Mapping[str, float]) -> Iterator[SensorError]:
     """What cannot be undone: `autopilot_corrects`, `autopilot_orientation`, `autopilot_filter_slow`,
     `autopilot_not_calibrated`, `autopilot_parameter_missing`.
     """
-    missing = [name for name in names.needed if name not in found]
+    missing = [name for name in names.needed if name not in parameters]
     if missing:
         yield SensorError(
             "autopilot_parameter_missing",
@@ -106,27 +106,27 @@ def refusals(sensor: str, names: Names, found: Mapping[str, float]) -> Iterator[
         )
         return
     for name in names.off:
-        if found.get(name, 0.0) != 0.0:
+        if parameters.get(name, 0.0) != 0.0:
             yield SensorError(
                 "autopilot_corrects",
-                f"{sensor}: {name} is {found[name]:g}, so the autopilot changes its readings in a way that cannot be "
-                "undone",
+                f"{sensor}: {name} is {parameters[name]:g}, so the autopilot changes its readings in a way that cannot "
+                "be undone",
                 f"Set {name} to 0 for the calibration, restart the autopilot, and set it back afterwards",
             )
-    if signed_axes(found[names.orientation]) is None:
+    if signed_axes(parameters[names.orientation]) is None:
         yield SensorError(
             "autopilot_orientation",
-            f"{sensor}: {names.orientation} is {found[names.orientation]:g}, which is not made of right angles",
+            f"{sensor}: {names.orientation} is {parameters[names.orientation]:g}, which is not made of right angles",
             f"Set {names.orientation} to 0 for the calibration, and set it back afterwards",
         )
     for name in names.filters:
-        if 0.0 < found[name] < LEAST_CUTOFF_HZ:
+        if 0.0 < parameters[name] < LEAST_CUTOFF_HZ:
             yield SensorError(
                 "autopilot_filter_slow",
-                f"{sensor}: {name} is {found[name]:g} Hz, too slow to have settled when a turn is measured",
+                f"{sensor}: {name} is {parameters[name]:g} Hz, too slow to have settled when a turn is measured",
                 f"Set {name} to {LEAST_CUTOFF_HZ:g} or more; 20 is what ArduPilot comes with",
             )
-    if names.identity is not None and found[names.identity] == 0.0:
+    if names.identity is not None and parameters[names.identity] == 0.0:
         yield SensorError(
             "autopilot_not_calibrated",
             f"{sensor}: {names.identity} is 0, so the autopilot does not say which sensor its offsets belong to",
@@ -134,25 +134,25 @@ def refusals(sensor: str, names: Names, found: Mapping[str, float]) -> Iterator[
         )
 
 
-def correction_of(names: Names, found: Mapping[str, float]) -> Correction:
+def correction_of(names: Names, parameters: Mapping[str, float]) -> Correction:
     """What is undone, by parameters that `refusals` has nothing against."""
-    orientation = signed_axes(found[names.orientation])
+    orientation = signed_axes(parameters[names.orientation])
     if orientation is None:
         raise ValueError(f"{names.orientation} is refused before")
-    scale = _vector(names.force_scale, found)
+    scale = _vector(names.force_scale, parameters)
     return Correction(
-        _vector(names.gyro_offset, found),
-        _vector(names.force_offset, found),
+        _vector(names.gyro_offset, parameters),
+        _vector(names.force_offset, parameters),
         np.where(scale == 0.0, 1.0, scale),
         orientation,
     )
 
 
-def delay_s(names: Names, found: Mapping[str, float]) -> float:
+def delay_s(names: Names, parameters: Mapping[str, float]) -> float:
     """The delay of rates by a low-pass of second order (Butterworth): √2 / (2π f); 0 without one."""
-    cutoff_hz = found.get(names.filters[0], 0.0) if names.filters else 0.0
+    cutoff_hz = parameters.get(names.filters[0], 0.0) if names.filters else 0.0
     return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
 
 
-def _vector(names: Sequence[str], found: Mapping[str, float]) -> Array:
-    return np.array([found[name] for name in names])
+def _vector(names: Sequence[str], parameters: Mapping[str, float]) -> Array:
+    return np.array([parameters[name] for name in names])

@@ -33,9 +33,9 @@ class Change:
     new: Mapping[str, Parameter]
     kept: Path
 
-    def state(self, found: Mapping[str, Parameter]) -> str:
-        """Which of them `found` is, bit by bit: "old", "new" or, where it is neither, "mixture"."""
-        fields = {name: each.field for name, each in found.items()}
+    def state(self, parameters: Mapping[str, Parameter]) -> str:
+        """Which of them `parameters` are, bit by bit: "old", "new" or, where it is neither, "mixture"."""
+        fields = {name: each.field for name, each in parameters.items()}
         for name, meant in (("new", self.new), ("old", self.old)):
             if fields == {each: parameter.field for each, parameter in meant.items()}:
                 return name

@@ -10,7 +10,7 @@ EntryT = TypeVar("EntryT", bound=Entry)
 
 
 @dataclass(frozen=True, slots=True)
-class Found(Generic[EntryT]):
+class Finding(Generic[EntryT]):
     """One entry of a result, the sensor it is of, and the quantity that sensor measures."""
 
     sensor: str
