@@ -20,8 +20,8 @@ from urllib.parse import urlsplit
 
 from rig.page.control import Control
 from rig.page.feed import Feed
+from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
-from rig.page.shown import Shown
 from rig.station.events import RunEvent
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

@@ -10,8 +10,8 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
-from rig.batch.now import Now, Present, last
 from rig.batch.operators import Question
+from rig.batch.status import Now, Present, last
 from rig.page.application import acting, body_of
 from rig.page.control import Control
 from rig.page.guard import Door

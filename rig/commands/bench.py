@@ -15,7 +15,7 @@ from pathlib import Path
 
 from rig.analysis.outcome import Outcome
 from rig.batch.batch import Chip, Part, PartEnded
-from rig.batch.work import Desk, now_utc
+from rig.batch.parts_in_turn import Desk, now_utc
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured, changed
 from rig.commands.laboratory import hands_of, part_fitter, simulated_laboratory
@@ -28,7 +28,7 @@ from rig.data.result_file import read_result
 from rig.data.run_folder import ARM_LOG, CONFIG, LOG, RESULT, WORLD_LATE, discard, new_folder
 from rig.errors import Fault, Refused
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.stated import of_configuration
+from rig.report.certificate.statements import of_configuration
 from rig.runner.ahead import Ahead
 from rig.runner.phases import Run
 from rig.station.events import Advice, BoardConnected, RunEvent, RunFolderWritten, SamplingStarted

@@ -11,7 +11,7 @@ from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.own_texts import is_own
 from rig.data.run_folder import CONFIG, resuming
 from rig.errors import Refused
-from rig.history.place import ENVIRONMENT
+from rig.history.address import ENVIRONMENT
 
 CONFIG_MAX_BYTES = 10_000_000
 

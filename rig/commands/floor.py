@@ -22,7 +22,7 @@ def run(options: Namespace) -> int:
     Raises Refused `page_address`, `no_history`, and as `open_history`.
     """
     from rig.floor.feed import looking
-    from rig.history.place import own_place
+    from rig.history.address import own_place
     from rig.history.store import open_history
     from rig.page.control import Control
     from rig.page.serving import Page, serving

@@ -14,9 +14,9 @@ from rig.config.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
+from rig.history.address import own_place, place
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import PAGE, Finished, finished_run
-from rig.history.place import own_place, place
 from rig.history.series import changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.tables import (

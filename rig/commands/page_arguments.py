@@ -130,11 +130,11 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
     if wanted is None:
         yield OperatorsPage()
         return
+    from rig.page.analysis_process import looking_out
     from rig.page.control import Control
     from rig.page.feed import Feed
-    from rig.page.lookout import looking_out
+    from rig.page.page_state import Shown
     from rig.page.serving import serving
-    from rig.page.shown import Shown
 
     feed, control = Feed(Shown(about())), Control(may_answer=wanted.may_answer)
     with ExitStack() as stack:

@@ -10,7 +10,7 @@ from rig.data.absent import NO_BOARD
 from rig.runner.mounted import CalibratedBefore, Memory
 
 if TYPE_CHECKING:
-    from rig.history.place import Place
+    from rig.history.address import Place
     from rig.history.store import Past, Selection
 
 
@@ -19,7 +19,7 @@ def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
 
     `moved` are serial numbers of sensors that are stated to be on another board than before.
     """
-    from rig.history.place import chosen_place
+    from rig.history.address import chosen_place
 
     try:
         where = chosen_place(config.history)
@@ -39,7 +39,7 @@ def known_board(
 
     The newest calibration decides. A history that does not answer knows none.
     """
-    from rig.history.place import chosen_place
+    from rig.history.address import chosen_place
 
     try:
         where = chosen_place(config.history)

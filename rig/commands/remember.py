@@ -14,9 +14,9 @@ from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import HistorySection
+    from rig.history.address import Place
     from rig.history.finished import Finished
     from rig.history.issued import Issued
-    from rig.history.place import Place
     from rig.history.series import Change
     from rig.history.store import History, Past
 
@@ -35,14 +35,14 @@ class Beside:
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[Beside, ...]]:
     """Enter the run in `folder`; what to tell of it, and its calibrations beside the ones before."""
-    from rig.history.place import chosen_place
+    from rig.history.address import chosen_place
 
     return _remembered(folder, lambda: chosen_place(section))
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[Beside, ...]]:
     """Enter the run in `folder` in the user's own history, or in the one that is `named`; returns as `remember`."""
-    from rig.history.place import own_place
+    from rig.history.address import own_place
 
     return _remembered(folder, lambda: own_place(named))
 
@@ -65,7 +65,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
 
 def _is_usual(where: "Place") -> bool:
     """Whether it is the one that a command means which names none."""
-    from rig.history.place import own_place
+    from rig.history.address import own_place
 
     try:
         return where == own_place(None)
@@ -80,8 +80,8 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     the folder may have come from anywhere.
     """
     try:
+        from rig.history.address import own_place
         from rig.history.finished import configured_in, content_sha256
-        from rig.history.place import own_place
 
         loaded = configured_in(folder)
         where = own_place(history)
@@ -103,8 +103,8 @@ def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | N
     None where there is no history, or none that answers, or an empty one.
     """
     try:
+        from rig.history.address import own_place
         from rig.history.finished import configured_in
-        from rig.history.place import own_place
 
         loaded = configured_in(folder)
         where = own_place(history)

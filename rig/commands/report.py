@@ -92,7 +92,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     from rig.report.certificate.content import certificate_of
     from rig.report.certificate.page import certificate_page
     from rig.report.certificate.pdf import PDF
-    from rig.report.certificate.stated import stated_in
+    from rig.report.certificate.statements import stated_in
     from rig.report.certificate.writer import PAGE
     from rig.report.signatures.reason import reason_of
 

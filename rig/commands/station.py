@@ -16,8 +16,8 @@ from rig.errors import Fault
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.batch.now import Present
     from rig.batch.operators import Asked, Voice
+    from rig.batch.status import Present
     from rig.commands.configured import Configured
     from rig.commands.page_arguments import PageWish
     from rig.config.models import RigConfig
@@ -51,9 +51,9 @@ def run(options: Namespace) -> int:
     Raises Refused as `configured`, `claimed`, `numbers_in` and `opened`; `missing_extra`, `not_confirmed`.
     """
     from rig.batch.label import refuse_without_library
-    from rig.batch.now import Now, Present
     from rig.batch.operators import Asked, Terminal, refuse_without_terminal
     from rig.batch.series import numbers_in
+    from rig.batch.status import Now, Present
     from rig.commands.configured import configured_here
     from rig.commands.one_arena import keep_to_one_arena
 
@@ -76,8 +76,8 @@ def run(options: Namespace) -> int:
 def _carried_out(options: Namespace, configured: "Configured", operator: "Asked", present: "Present") -> int:
     from rig.batch.batch import Begun
     from rig.batch.journal import opened
+    from rig.batch.parts_in_turn import Work, now_utc
     from rig.batch.table import CSV, summary
-    from rig.batch.work import Work, now_utc
     from rig.commands.bench import Station, bench
     from rig.station.events import Interrupted
 
@@ -114,7 +114,7 @@ def _carried_out(options: Namespace, configured: "Configured", operator: "Asked"
 def _beating(config: "RigConfig", present: "Present") -> Iterator[None]:
     """The station's heartbeat in the history that its runs are entered in; none where they are entered in none."""
     from rig.floor.heartbeat import heartbeat
-    from rig.history.place import chosen_place
+    from rig.history.address import chosen_place
 
     place = chosen_place(config.history)
     if place is None:

@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
-    from rig.report.signatures.looked import Looked, Seen
+    from rig.report.signatures.findings import Looked, Seen
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
@@ -57,7 +57,7 @@ def run(options: Namespace) -> int:
 
     Raises Refused `verify_file`, and as `trusted_in`, `looked_at` and `open_history`.
     """
-    from rig.report.signatures.seen import looked_at, trusted_in
+    from rig.report.signatures.inspection import looked_at, trusted_in
 
     trust = trusted_in(options.trust)
     contents = {file: _content(file) for file in options.files}
@@ -86,8 +86,8 @@ def _content(file: Path) -> bytes:
 def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Looked]") -> dict[Path, Any]:
     """What the history says of each file."""
     from rig.commands.waiting import answer_of
-    from rig.history.known import known
-    from rig.history.place import place
+    from rig.history.address import place
+    from rig.history.entered_file import known
     from rig.history.store import open_history
 
     where = place(named)
@@ -107,7 +107,7 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
 
 def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: Any) -> _Found:
     """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
-    from rig.report.signatures.looked import not_as_signed
+    from rig.report.signatures.findings import not_as_signed
 
     look, attached_to = looks[file], None
     problems = list(look.problems)

@@ -51,9 +51,9 @@ def run(options: Namespace) -> int:
     from rig.observation.arm_motion import check_arms_times, refuse_elsewhere
     from rig.page.control import Control
     from rig.page.feed import Feed
+    from rig.page.page_state import Shown
     from rig.page.replay import moments
     from rig.page.serving import serving
-    from rig.page.shown import Shown
 
     folder: Path = options.run_folder
     wanted = PageWish(options.page_address, token_said(options))

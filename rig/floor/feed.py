@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from rig.errors import Refused
 from rig.floor import shown
 from rig.history import schema, stations
-from rig.history.place import Place
+from rig.history.address import Place
 from rig.history.store import History, open_history
 from rig.page.sections import Sections
 

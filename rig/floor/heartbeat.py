@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rig.batch.now import Now, last
+from rig.batch.status import Now, last
 from rig.history import stations
-from rig.history.place import Place
+from rig.history.address import Place
 from rig.history.store import open_history
 
 if TYPE_CHECKING:

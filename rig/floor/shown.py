@@ -6,7 +6,7 @@ from dataclasses import asdict
 from datetime import date, datetime, timedelta
 from typing import Any
 
-from rig.batch.now import Now
+from rig.batch.status import Now
 from rig.data.checked import checked
 from rig.history.series import rig_states, subjects, trends
 from rig.history.stations import Told

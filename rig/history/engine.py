@@ -6,9 +6,9 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 
 from rig.errors.extras import missing_extra
+from rig.history.address import Place
 from rig.history.libpq import connect_arguments
 from rig.history.migrations import bring_up_to_date, version_of
-from rig.history.place import Place
 from rig.history.schema import VERSION
 from rig.history.sqlite_file import history_is_there, made_whole
 

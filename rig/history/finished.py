@@ -16,7 +16,7 @@ from rig.history.issued import Issued, issued_certificate
 if TYPE_CHECKING:
     from rig.config.load import Loaded
     from rig.data.result_file import ResultDocument
-    from rig.report.certificate.stated import Stated
+    from rig.report.certificate.statements import Stated
 
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
@@ -70,7 +70,7 @@ def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Fini
     from rig.config.judging_sections import HistorySection
     from rig.data.provenance import calls_itself_simulated
     from rig.data.result_file import SIZE_MAX_BYTES, read_result
-    from rig.report.certificate.stated import Stated, of_configuration
+    from rig.report.certificate.statements import Stated, of_configuration
 
     if document is None:
         document = read_result(folder)

@@ -17,11 +17,11 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 from rig.history import certificates, journal, schema
+from rig.history.address import Place, place
 from rig.history.engine import WRITES, engine_of
 from rig.history.entering import enter_run, note_place, now_utc
 from rig.history.finished import Finished, Recording
 from rig.history.issued import Issued
-from rig.history.place import Place, place
 from rig.report.kinds.followed import ORDER, Parameter
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import Refused
+from rig.history.address import own_place, place
 from rig.history.documents import COLUMNS, change_entry
-from rig.history.place import own_place, place
 from rig.history.series import Change, changed, time_of
 from rig.history.store import Past, Selection, open_history
 from rig.history.tables import title_of, value_text

@@ -12,8 +12,8 @@ import time
 from collections.abc import AsyncGenerator
 from typing import Any, Protocol
 
+from rig.page.page_state import Shown
 from rig.page.rows import Look
-from rig.page.shown import Shown
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent
 
 FRAME_S = 0.1

@@ -13,7 +13,7 @@ import rig
 from rig.cli import main
 from rig.data.result_file import read_result
 from rig.report.certificate.content import certificate_of
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from support.certified import read
 from support.dcc_rules import rule_faults, schema_faults
 from support.paths import DOCS

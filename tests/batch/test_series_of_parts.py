@@ -19,9 +19,9 @@ from rig.batch.batch import Batch, BatchEnded, Begun, Chip, Entry, Part, PartBeg
 from rig.batch.journal import JOURNAL, opened, resumed
 from rig.batch.label import Label, files_of, zpl
 from rig.batch.operators import Asked, Question, Terminal
+from rig.batch.parts_in_turn import Bench, Desk, Work
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
-from rig.batch.work import Bench, Desk, Work
 from rig.commands import station
 from rig.config.load import Loaded
 from rig.config.station_section import StationSection

@@ -12,9 +12,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
 from rig.batch.batch import Part
-from rig.batch.now import Now, Present
 from rig.batch.on_page import on_page
 from rig.batch.operators import Asked
+from rig.batch.status import Now, Present
 from rig.page.control import STOPPED
 from rig.page.serving import Address
 from rig.station.events import Interrupted

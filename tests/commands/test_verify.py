@@ -19,7 +19,7 @@ from rig.cli import main
 from rig.data.result_file import write_result
 from rig.history.finished import finished_run
 from rig.history.store import open_history
-from rig.report.signatures.looked import untrusted
+from rig.report.signatures.findings import untrusted
 from support.certified import result
 from support.dcc_rules import schema_faults
 from support.kept_rows import forge

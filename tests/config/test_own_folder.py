@@ -8,7 +8,7 @@ import pytest
 from rig.config.own_folder import own_folder
 from rig.data.own_texts import is_own, note_own
 from rig.errors import Refused
-from rig.history.place import place
+from rig.history.address import place
 
 NOBODY = 987_654
 

@@ -20,7 +20,7 @@ from rig.motion.steps import Rest
 from rig.observation.mean import even_mean
 from rig.observation.observed_run import observe_run
 from rig.page.about import About
-from rig.page.shown import Shown
+from rig.page.page_state import Shown
 from rig.report.exports.formats import writer_of_readings
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from rig.batch.batch import Begun, PartBegun, PartEnded, state_of
-from rig.batch.now import Now, Present, after, last, of_batch
+from rig.batch.status import Now, Present, after, last, of_batch
 from rig.errors import Fault, Refused
 from rig.floor import shown
 from rig.floor.feed import looking
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
-from rig.history.place import place
+from rig.history.address import place
 from rig.history.stations import Told
 from rig.history.store import open_history
 from rig.motion.state import Report

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from selenium.webdriver import Chrome
 
-from rig.batch.now import Now
+from rig.batch.status import Now
 from rig.floor.feed import looking
 from rig.history import stations
-from rig.history.place import place
+from rig.history.address import place
 from rig.history.store import open_history
 from rig.page.control import Control
 from rig.page.sections import Sections

@@ -20,7 +20,7 @@ from rig.history.journal import Head
 from rig.history.store import History, open_history
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import stated_in
+from rig.report.certificate.statements import stated_in
 from support.kept_rows import drop_triggers, forge
 from support.past_runs import finished
 from support.paths import CONFIGS, FIXTURES

@@ -17,10 +17,10 @@ from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.history import schema
+from rig.history.address import chosen_place, place
 from rig.history.engine import engine_of
 from rig.history.finished import Finished, compact, content_sha256, finished_run
 from rig.history.issued import Issued
-from rig.history.place import chosen_place, place
 from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Selection, open_history
 from rig.report.budget_entry import budget_entry

@@ -129,7 +129,7 @@ def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
 def test_a_run_whose_pages_helper_is_killed_ends_with_its_verdict(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
     wait_for_log(running.out, "sweep")
-    helper: Any = wait_for(lambda: running.child(b"rig.page.looking"), "the helper")
+    helper: Any = wait_for(lambda: running.child(b"rig.page.live_analysis"), "the helper")
     os.kill(helper, signal.SIGKILL)
     stdout, _ = running.process.communicate(timeout=120)
     assert running.process.returncode == 0, running.told()

@@ -14,8 +14,8 @@ from rig.page.about import About
 from rig.page.connections import KNOWN, STRANGERS, Connections
 from rig.page.control import Control
 from rig.page.feed import Feed
+from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
-from rig.page.shown import Shown
 from support.flood import alive, half_a_request, opened
 from support.waiting import wait_for
 

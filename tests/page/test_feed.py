@@ -8,7 +8,7 @@ from typing import Any
 
 from rig.page.feed import Broadcast, Feed, Mailbox
 from rig.page.history import POINTS, STEP_S
-from rig.page.shown import Shown
+from rig.page.page_state import Shown
 from rig.station.events import ArmSeen, SamplesTaken, SensorSamples
 from support.told_runs import ABOUT, before_it_moves, judged, look, moving, planned, state
 

@@ -21,8 +21,8 @@ from rig.page.about import About
 from rig.page.control import STOPPED, Control
 from rig.page.feed import Feed
 from rig.page.guard import Door
+from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
-from rig.page.shown import Shown
 from rig.station.events import Prompt
 
 TOKEN = "a-token-of-two-and-twenty"

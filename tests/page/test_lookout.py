@@ -8,9 +8,9 @@ import pytest
 
 from rig.motion.steps import Sweep
 from rig.page.about import About
+from rig.page.analysis_process import looking_out
 from rig.page.feed import Feed
-from rig.page.lookout import looking_out
-from rig.page.shown import Shown
+from rig.page.page_state import Shown
 from rig.station.events import StepFinished
 from support.told_runs import moving, planned
 from support.waiting import wait_for
@@ -21,7 +21,7 @@ def helper() -> int:
     for path in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
-            if parent == os.getpid() and b"rig.page.looking" in (path / "cmdline").read_bytes():
+            if parent == os.getpid() and b"rig.page.live_analysis" in (path / "cmdline").read_bytes():
                 return int(path.name)
         except OSError:
             continue

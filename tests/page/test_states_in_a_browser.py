@@ -14,8 +14,8 @@ from selenium.webdriver.common.by import By
 from rig.errors import Fault, Refused
 from rig.page.control import Control
 from rig.page.feed import Feed
+from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
-from rig.page.shown import Shown
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support import told_runs
 from support.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text, until

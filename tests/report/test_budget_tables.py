@@ -26,7 +26,7 @@ from rig.plans.recorded import judged, open_run
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.document import document_of
 from rig.report.printed_budget import freedom_text
 from rig.report.rounding import figures

@@ -21,7 +21,7 @@ from rig.report.budget_entry import budget_entry
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import Stated, of_configuration, stated_in
+from rig.report.certificate.statements import Stated, of_configuration, stated_in
 from rig.report.certificate.validity import left_out_of_rates
 from rig.report.rounding import rounded
 from support.certified import (

@@ -14,7 +14,7 @@ from rig.errors import Refused
 from rig.estimation.coverage import coverage_factors
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.dcc_results import JOINT_FACTOR_3
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.certificate.tables import JOINT_FACTOR
 from rig.report.certificate.xml_parts import product
 from support.certified import (

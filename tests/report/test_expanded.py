@@ -12,7 +12,7 @@ from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.coverage import PROBABILITY, coverage_factors, covered
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.certificate.tables import DEG, pair
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.bias_drift import drift_table

@@ -19,10 +19,10 @@ from pyhanko.sign.validation.dss import DocumentSecurityStore
 from pyhanko_certvalidator import ValidationContext
 
 from rig.errors import Refused
+from rig.report.signatures.findings import Looked
+from rig.report.signatures.inspection import looked_at
 from rig.report.signatures.long_term import authorities_in
-from rig.report.signatures.looked import Looked
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.seen import looked_at
 from rig.report.signatures.signatory import signatory
 from rig.report.signatures.signing import signed_pdf
 from support.signing import PASSPHRASE, Holder, holder, issued, revocation_list, time_server

@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from rig.data.result_file import MountEntry, ResultDocument, write_result
-from rig.page.shown import Shown
+from rig.page.page_state import Shown
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.ending import ending
 from rig.report.mounts import farthest_off, mount_lines

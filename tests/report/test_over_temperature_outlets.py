@@ -13,7 +13,7 @@ from rig.data.result_file import ResultDocument, read_result
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.certificate.dcc import digital_certificate
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.calibrations import calibrations
 from rig.report.header import calibration_header

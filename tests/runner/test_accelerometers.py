@@ -20,8 +20,8 @@ from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
 from rig.page.about import About
+from rig.page.page_state import Shown
 from rig.page.rows import look_of
-from rig.page.shown import Shown
 from rig.runner.phases import observations_of
 from support.commands import configuration, rig, rig_here, wait_for_log
 from support.stated import solved_otherwise

@@ -26,7 +26,7 @@ from rig.motion.geometry import NOMINAL
 from rig.report.budget_entry import budget_entry
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.document import document_of
 from support.synthetic_run import Setup, synthetic_run
 

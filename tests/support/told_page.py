@@ -17,9 +17,9 @@ from rig.motion.state import ArmState, RuntimeState
 from rig.page.about import About
 from rig.page.control import Control
 from rig.page.feed import Feed
+from rig.page.page_state import Shown
 from rig.page.rows import Look
 from rig.page.serving import Address, serving
-from rig.page.shown import Shown
 from rig.station.events import ArmSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
 from support.browser import text, until
 from support.told_runs import ABOUT, before_it_moves, look, moving, planned

@@ -16,7 +16,7 @@ from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
-from rig.report.certificate.stated import Stated
+from rig.report.certificate.statements import Stated
 from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard, Without
 from rig.report.kinds.registry import kinds, shown

@@ -7,7 +7,7 @@ from rig.config.written_file import write_new
 from rig.data.result_file import ResultDocument
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import stated_in
+from rig.report.certificate.statements import stated_in
 from rig.station.events import DocumentWritten, RunEvent
 
 PAGE = "certificate.html"

@@ -19,7 +19,7 @@ from rig.config.written_file import opened_to_append
 from rig.data.silence import Silence
 from rig.errors import Problem
 from rig.motion.state import ArmState
-from rig.turners.ur.asking import no_states
+from rig.turners.ur.controller_answers import no_states
 from rig.turners.ur.identity import series_problem, version_text
 from rig.turners.ur.messages import (
     Connected,

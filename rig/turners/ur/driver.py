@@ -12,9 +12,9 @@ from rig.motion.carried import Carried
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
-from rig.turners.ur.asking import ANSWER_S, reported, stop_problem
 from rig.turners.ur.child_link import ChildLink
 from rig.turners.ur.condition import program_interruption, readiness
+from rig.turners.ur.controller_answers import ANSWER_S, reported, stop_problem
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.turners.ur.report import ArmReport

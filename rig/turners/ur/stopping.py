@@ -11,7 +11,7 @@ from rig.turners.ur.dashboard import Dashboard
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import Stop as Brake
 from rig.turners.ur.primary_stop import PrimaryStop
-from rig.turners.ur.spare import SpareDescriptors
+from rig.turners.ur.spare_descriptors import SpareDescriptors
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
 WAY_S = 0.8  # a port of the controller has so long to answer

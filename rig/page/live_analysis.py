@@ -1,4 +1,4 @@
-"""Looks at the recordings of a run that goes on, as a process of its own: `python -m rig.page.looking FOLDER`.
+"""Looks at the recordings of a run that goes on, as a process of its own: `python -m rig.page.live_analysis FOLDER`.
 
 For each line on its standard input it answers with one of JSON: the rows of observations and parameters so far. The
 arithmetic of an estimator would hold up the threads that take samples, and this process can be as slow as it likes.

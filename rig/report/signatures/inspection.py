@@ -6,7 +6,7 @@ from pathlib import Path
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.report.signatures.looked import Looked, not_as_signed, not_signed
+from rig.report.signatures.findings import Looked, not_as_signed, not_signed
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
 
 
@@ -16,8 +16,8 @@ def looked_at(name: str, content: bytes, trust: Sequence[bytes]) -> Looked:
     Raises Refused `missing_extra`.
     """
     try:
-        from rig.report.signatures.seen_pdf import seen_pdf
-        from rig.report.signatures.seen_xml import seen_xml
+        from rig.report.signatures.pdf_signatures import seen_pdf
+        from rig.report.signatures.xml_signature import seen_xml
     except ImportError as error:
         raise missing_extra(error, EXTRA) from error
     if content.startswith(b"%PDF-"):

@@ -1,4 +1,4 @@
-"""Has the recording looked at after each step that measures, by a process of its own (`rig.page.looking`)."""
+"""Has the recording looked at after each step that measures, by a process of its own (`rig.page.live_analysis`)."""
 
 import json
 import subprocess
@@ -45,7 +45,7 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
     A process that fails says so on stderr: the page goes without what it would see, and the run goes on.
     """
     lookout = Lookout()
-    command = [sys.executable, "-P", "-m", "rig.page.looking", str(folder)]
+    command = [sys.executable, "-P", "-m", "rig.page.live_analysis", str(folder)]
     try:  # In a session of its own: Ctrl-C is the run's.
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True

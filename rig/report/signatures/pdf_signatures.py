@@ -18,7 +18,7 @@ from pyhanko.sign.validation.status import SignatureCoverageLevel
 from pyhanko_certvalidator import ValidationContext
 
 from rig.errors import Refused
-from rig.report.signatures.looked import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
+from rig.report.signatures.findings import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
 from rig.report.signatures.reason import Reason
 
 

@@ -12,7 +12,7 @@ from signxml.exceptions import SignXMLException
 from signxml.util import add_pem_header, namespaces
 from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 
-from rig.report.signatures.looked import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
+from rig.report.signatures.findings import Looked, Seen, not_as_signed, not_signed, signer_not_trusted, untrusted
 from rig.report.signatures.reason import Reason
 
 NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
