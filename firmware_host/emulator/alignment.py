@@ -32,11 +32,11 @@ class AlignmentWatch:
 
     def between_runs(self) -> None:
         """Look at what is new, and no longer at what was right often enough."""
-        for address, base in self._new.items():
+        while self._new:
+            address, base = self._new.popitem()
             forget = self._engine.on_instruction(address, self._check)
             self._watched[address] = _Watched(self._engine.register(_CORE_REGISTERS[base]), forget)
-        self._met.update(self._new)
-        self._new = {}
+            self._met.add(address)
         for address in self._trusted:
             self._watched.pop(address).forget()
         self._trusted.clear()
