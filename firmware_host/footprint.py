@@ -34,8 +34,10 @@ SENSORS = range(len(GYROSCOPES))  # the board's first
 ALL = (1 << len(GYROSCOPES)) - 1  # a mask of them
 DIRECTIONS = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
 STILL = (0, 0, 0)
-SPEED_RAD_S = 1.0472
+REST_S = 1.4  # the board takes a second of it for a rest
+SPEED_RAD_S = 1.5  # within that range for every scale of a part
 STEP_S = 0.01
+ANSWER_STEPS = 10  # at most, until the board has answered
 
 
 class Session:
@@ -78,12 +80,16 @@ class Session:
         return frames
 
     def ask(self, name: str, **values: Any) -> dict[str, Any]:
-        """The fields of the answer. Raises RuntimeError when the board refuses."""
+        """The fields of the answer. Raises RuntimeError when the board refuses, or says nothing."""
         self._board.receive(encode(name, 9, values))
-        (answer,) = [frame for frame in self.run(0.1) if frame.values.get("reply_to") == 9]
-        if answer.name == "error":
-            raise RuntimeError(f"the board refuses {name}: {answer.values}")
-        return answer.values
+        for _ in range(ANSWER_STEPS):
+            for frame in self.run(STEP_S):
+                if frame.values.get("reply_to") != 9:
+                    continue
+                if frame.name == "error":
+                    raise RuntimeError(f"the board refuses {name}: {frame.values}")
+                return frame.values
+        raise RuntimeError(f"the board does not answer {name}")
 
     def sweep(self, index: int) -> None:
         """One direction: keep, turn, and let the board observe every sensor."""
@@ -91,7 +97,7 @@ class Session:
         self.run(0.1)
         self.ask("keep", sensors=ALL, duration_s=1.0)
         start_us = self.ask("status")["uptime_us"]
-        self.run(0.4)
+        self.run(0.2)
         end_us = self.ask("status")["uptime_us"]
         self.run(0.1)
         span = {"start_us": start_us, "end_us": end_us, "speed_rad_s": SPEED_RAD_S}
@@ -101,7 +107,7 @@ class Session:
     def turn_by_hand(self) -> None:
         """A whole turn from rest to rest, which the board has to take."""
         self.ask("by_hand", sensor=0, moves=1, scale_std=1.0)
-        for direction, lasts_s in ((STILL, 1.6), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, 1.6)):
+        for direction, lasts_s in ((STILL, REST_S), (DIRECTIONS[0], 2 * math.pi / SPEED_RAD_S), (STILL, REST_S)):
             self.direction = direction
             self.run(lasts_s)
         if (found := self.ask("hand_solve"))["taken"] != 1:

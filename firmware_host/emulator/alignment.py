@@ -6,7 +6,6 @@ from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_R0, UC_ARM_REG_SP
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.engine import Engine
-from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import word_accesses
 
 _CORE_REGISTERS = [*range(UC_ARM_REG_R0, UC_ARM_REG_R0 + 13), UC_ARM_REG_SP, UC_ARM_REG_LR]
@@ -14,18 +13,30 @@ _ENOUGH = 1_000  # an instruction that was right so often is not looked at any m
 
 
 class AlignmentWatch:
-    """Looks at the base register of every such instruction of the program before it runs."""
+    """Looks at the base register of every such instruction before it runs, from the block's first run on.
 
-    def __init__(self, engine: Engine, symbols: Symbols) -> None:
+    Not of all that the program has: at each of them Unicorn goes through the whole list of those that are looked at.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._met: set[int] = set()  # addresses of those of all blocks that were to run
+        self._new: dict[int, int] = {}  # the base registers of those that are not looked at yet
         self._watched: dict[int, _Watched] = {}
         self._trusted: list[int] = []
-        for start, end in symbols.code():
-            for address, base in word_accesses(engine.read(start, end - start), start):
-                read_base = engine.register(_CORE_REGISTERS[base])
-                self._watched[address] = _Watched(read_base, engine.on_instruction(address, self._check))
+
+    def meet(self, address: int, code: bytes) -> bool:
+        """A block is about to run for the first time: whether it must wait until `between_runs` has seen to it."""
+        self._new = {at: base for at, base in word_accesses(code, address) if at not in self._met}
+        return bool(self._new)
 
     def between_runs(self) -> None:
-        """Stop looking at what was right often enough."""
+        """Look at what is new, and no longer at what was right often enough."""
+        while self._new:
+            address, base = self._new.popitem()
+            forget = self._engine.on_instruction(address, self._check)
+            self._watched[address] = _Watched(self._engine.register(_CORE_REGISTERS[base]), forget)
+            self._met.add(address)
         for address in self._trusted:
             self._watched.pop(address).forget()
         self._trusted.clear()

@@ -54,7 +54,11 @@ class Drift:
     def _reach(self, knot: int) -> None:
         """Go on until there are knots on both sides."""
         while len(self._knots) < knot + 2:
-            for fresh in self._random.standard_normal((_BLOCK, len(self._flicker) + 1, 3)):
-                self._flicker = self._keep * self._flicker + self._fresh * fresh[1:]
-                self._walk = self._walk + self._step * fresh[0]
-                self._knots.append((self._flicker.sum(axis=0) + self._walk).tolist())
+            fresh = self._random.standard_normal((_BLOCK, len(self._flicker) + 1, 3))
+            flickers, steps = self._fresh * fresh[:, 1:], self._step * fresh[:, 0]
+            for flicker in flickers:  # in place: each goes on from the one before
+                flicker += self._keep * self._flicker
+                self._flicker = flicker
+            walks = np.add.accumulate([self._walk, *steps])[1:]
+            self._walk = walks[-1]
+            self._knots += (flickers.sum(axis=1) + walks).tolist()

@@ -16,6 +16,7 @@ from typing import Any
 from unicorn import (
     UC_ARCH_ARM,
     UC_CTL_CPU_MODEL,
+    UC_CTL_TB_REMOVE_CACHE,
     UC_ERR_OK,
     UC_HOOK_BLOCK,
     UC_HOOK_CODE,
@@ -39,6 +40,7 @@ from firmware_host.emulator.hooks import BlockTicks, Bus, Counter, Meter, Shortc
 from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
+_TRANSLATE_ANEW = (1 << 30) | (2 << 26) | UC_CTL_TB_REMOVE_CACHE  # write, two arguments
 # The calls that the pace hangs on, without what the binding's own do beside: while the core runs nobody else may, so
 # that the interpreter need not be given up and taken back at each call and callback; and few arguments are converted
 _quick = ctypes.PyDLL(uclib._name, handle=uclib._handle)
@@ -121,7 +123,7 @@ class Engine:
         self._raised: BaseException | None = None
         self._fault_place: list[int] | None = None
         self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
-        self.paused = False  # the last run ended at the deadline
+        self.paused = False  # the last run ended before a block: at the deadline, or as that was to be measured
 
     def map_ram(self, address: int, size: int) -> None:
         self._map(address, size, UC_PROT_ALL)
@@ -176,19 +178,21 @@ class Engine:
             user = ctypes.byref(shortcuts)
         _check(uclib.uc_mmio_map(self._handle, address, size, reader, user, writer, user))
 
-    def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int]) -> None:
+    def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int | None]) -> None:
         """Let time pass with the instructions: before each block add `ticks[address]`, or stop if it must.
 
-        A block not yet in `ticks` is given to `measure(address, size_bytes)`, which returns its ticks.
+        A block not yet in `ticks` is given to `measure(address, size_bytes)`, which returns its ticks, or None to stop.
         """
 
         def on_block(_handle: int, address: int, size: int) -> None:
             try:
-                if timeline.now >= timeline.deadline and not timeline.go_on():
+                may_run = timeline.now < timeline.deadline or timeline.go_on()
+                taken = (ticks[address] or measure(address, size)) if may_run else None
+                if taken is None:
                     self.paused = True
                     self.stop()
-                    return
-                timeline.now += ticks[address] or measure(address, size)
+                else:
+                    timeline.now += taken
             except BaseException as error:
                 self._fail(error)
 
@@ -198,7 +202,7 @@ class Engine:
         self._add(UC_HOOK_BLOCK, ctypes.c_void_p(address_of("block")), ctypes.byref(meter))
 
     def on_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
-        """Call `hook(address)` before the instruction at `address`; what this returns ends that, between two runs."""
+        """Call `hook(address)` before the instruction at `address`; what this returns ends that. Between two runs."""
 
         def on_instruction(_handle: int, address: int, _size: int) -> None:
             try:
@@ -207,6 +211,8 @@ class Engine:
                 self._fail(error)
 
         hook_handle = self._hook(UC_HOOK_CODE, _BLOCK(on_instruction), address, address)
+        place = ctypes.c_uint64(address), ctypes.c_uint64(address + 2)
+        _check(uclib.uc_ctl(self._handle, _TRANSLATE_ANEW, *place))  # the block may have been met without the hook
         return lambda: _check(uclib.uc_hook_del(self._handle, hook_handle))
 
     def on_interrupt(self, hook: Callable[[int], None]) -> None:

@@ -28,7 +28,7 @@ class Port:
         self._speed = Stored(f"{prefix} OSPEEDR", 0xFFFF_FFFF, _SPEED_AFTER_RESET[letter])
         self._pulls = Stored(f"{prefix} PUPDR", 0xFFFF_FFFF, _PULLS_AFTER_RESET[letter])
         self._output = 0
-        self._output_pins = 0
+        self._output_pins = self._input_pins = 0
         self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF, after=self._functions_changed) for half in "LH"]
         self._levels = 0  # that devices drive
         self._watched: dict[int, Callable[[bool], None]] = {}  # by pin
@@ -69,11 +69,11 @@ class Port:
 
     def is_input(self, pin: int) -> bool:
         """A pin left analog, as after a reset, does not see its level."""
-        return self._mode.value >> 2 * pin & 3 == _INPUT
+        return bool(self._input_pins >> pin & 1)
 
     def _read_levels(self) -> int:
         """The levels of the pins that devices drive; the others' levels have no model and read 0."""
-        return sum(1 << pin for pin in range(16) if self._levels >> pin & 1 and self.is_input(pin))
+        return self._levels & self._input_pins
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF
@@ -81,8 +81,12 @@ class Port:
 
     def _functions_changed(self) -> None:
         self.setup_count += 1
-        self._output_pins = sum(1 << pin for pin in range(16) if self._mode.value >> 2 * pin & 3 == _OUTPUT)
+        self._input_pins, self._output_pins = self._pins(_INPUT), self._pins(_OUTPUT)
         self._outputs_changed()
+
+    def _pins(self, mode: int) -> int:
+        """The mask of the pins in this mode."""
+        return sum(1 << pin for pin in range(16) if self._mode.value >> 2 * pin & 3 == mode)
 
     def _outputs_changed(self) -> None:
         low = ~self._output & self._output_pins & self._watched_pins

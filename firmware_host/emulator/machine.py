@@ -49,7 +49,7 @@ class EmulatedBoard:
         boot_time_s: float,
         has_crystal: bool = True,
     ) -> None:
-        self._symbols = Symbols(elf)
+        self._elf = elf
         self._clock = BoardClock(boot_time_s, crystal_ppm)
         self._timeline = Timeline()
         self._engine = Engine()
@@ -70,7 +70,7 @@ class EmulatedBoard:
         self._engine.meter(self._timeline, self._costs, self._measure)
         self._engine.on_interrupt(self._core_exception)
         self._engine.on_invalid(self._invalid_access)
-        self._alignment = AlignmentWatch(self._engine, self._symbols)
+        self._alignment = AlignmentWatch(self._engine)
         self.powered = True  # until the supply fails, as the flash may be told to let it
         self._sent = bytearray()
         self._failure: BoardError | None = None
@@ -183,7 +183,7 @@ class EmulatedBoard:
                 self._execute()
 
     def _execute(self) -> None:
-        """Run the core until the deadline, WFI or a fault."""
+        """Run the core until the deadline, WFI, a fault or a block that has to be looked at before it runs."""
         engine, cortex = self._engine, self._cortex
         engine.paused = False
         engine.run(cortex.pc)
@@ -197,9 +197,15 @@ class EmulatedBoard:
             self._after_wfi.add(cortex.pc)
         self._asleep = True
 
-    def _measure(self, address: int, size: int) -> int:
-        """Ticks that a block takes that has not been met before; refuses floating point before it is enabled."""
-        code = instructions(self._engine.read(address, size))
+    def _measure(self, address: int, size: int) -> int | None:
+        """Ticks that a block takes that has not been met before; None: it has to wait until the engine has paused.
+
+        Refuses floating point before it is enabled.
+        """
+        block = self._engine.read(address, size)
+        if self._alignment.meet(address, block):
+            return None
+        code = instructions(block)
         if not self._chip.control.float_enabled and any(is_floating_point(instruction) for instruction in code):
             raise Violation("firmware_fault", "floating point before CPACR enables it", _CORRECT)
         cycles = len(code) + self._chip.flash.wait_states * _doublewords(address, size)
@@ -221,9 +227,10 @@ class EmulatedBoard:
 
     def _located(self, violation: Violation) -> BoardError:
         address, link = self._engine.fault_place()
-        where = self._symbols.where(address)
-        if not self._symbols.function(address):
-            where += f", called at {self._symbols.where(link)}"
+        symbols = Symbols(self._elf)
+        where = symbols.where(address)
+        if not symbols.function(address):
+            where += f", called at {symbols.where(link)}"
         return BoardError.of(violation.problem._replace(what=f"{violation.what}, at {where}"))
 
     # --- reset

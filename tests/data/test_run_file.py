@@ -1,7 +1,6 @@
 """The run file: what goes in comes out, whatever happens to the process that writes it."""
 
 import json
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -38,6 +37,7 @@ from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from rig.motion.state import ARM_STATE_DTYPE, ArmState
 from rig.motion.steps import Sweep
+from support.forked import forked
 from support.paths import ROOT
 from support.results import VERIFIED
 from support.synthetic_run import PROVENANCE as SYNTHETIC
@@ -230,8 +230,7 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 @pytest.mark.slow
 @pytest.mark.proof
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, thorough: bool) -> None:
-    processes = multiprocessing.get_context("forkserver")
-    processes.set_forkserver_preload(["h5py", "rig.data.run_file"])
+    processes = forked()
     lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 6)
     for batch, batch_lives in enumerate(np.array_split(lives, len(lives) // 6)):
         writers = []

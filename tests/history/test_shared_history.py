@@ -1,6 +1,5 @@
 """Many processes enter runs into one history at the same time, on SQLite and on PostgreSQL."""
 
-import multiprocessing
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from rig.history import schema
 from rig.history.engine import WRITES
 from rig.history.issued import Issued
 from rig.history.store import open_history
+from support.forked import forked
 from support.kept_rows import drop_triggers
 from support.past_runs import enter_many, finished
 from support.postgres import postgresql
@@ -33,9 +33,7 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
 def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
     """The tables are made by whoever comes first."""
     entries = ENTRIES if thorough else FEW
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["support.past_runs"])
-    with context.Pool(PROCESSES) as pool:
+    with forked().Pool(PROCESSES) as pool:
         new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(PROCESSES)])
         assert new == [entries] * PROCESSES
         again = pool.starmap(enter_many, [(url, worker % 2, 20) for worker in range(PROCESSES)])

@@ -1,6 +1,8 @@
 """Configurations without a laboratory's imperfections: tests of one thing at a time begin with these."""
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,11 @@ OF_A_SENSOR = {
 
 def ideal_document(path: Path) -> dict[str, Any]:
     """What a file and its bases say, but for the imperfections in its `world:` section."""
+    return deepcopy(_ideal_document(path))
+
+
+@cache  # most laboratories of the tests begin with the same file
+def _ideal_document(path: Path) -> dict[str, Any]:
     document: dict[str, Any] = yaml.safe_load(load(path).text)
     world = document["world"]
     world.pop("site", None)

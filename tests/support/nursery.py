@@ -203,6 +203,8 @@ def _serve() -> None:
         os.environ.update(json.loads(sys.argv[1]))
     for module in READS if reads else IMPORTED:
         import_module(module)
+    if not reads:
+        import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
     gc.collect()
     gc.freeze()  # what is never looked through is shared, not copied
     if order := ordered(reading if reads else everything):

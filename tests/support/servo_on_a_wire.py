@@ -1,6 +1,5 @@
 """Simulated servos on a pseudo-terminal, in a process of their own: what the driver has before it, and its faults."""
 
-import multiprocessing
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -12,6 +11,7 @@ from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import REBOOT, WRITE, Packet
 from support.bus_on_a_pty import BusOnAPty
+from support.forked import forked
 
 # As a servo is that is set up for the rig: 1 Mbit/s, no return delay, extended position mode, time-based profile.
 SET_UP: dict[str, int] = {"Baud Rate": 3, "Return Delay Time": 0, "Operating Mode": 4, "Drive Mode": 4}
@@ -99,7 +99,7 @@ class _Process:
     """The process of all far ends of this one: to begin a process for each would take most of a test's time."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("forkserver")
+        context = forked()
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=_serve, args=(far,), daemon=True)
         self.process.start()

@@ -32,18 +32,24 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
     for link, angle in zip(links, q_rad, strict=True):
         c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         ca, sa = link.cos_alpha, link.sin_alpha
-        step = (link.a_m * c, link.a_m * s, link.d_m)
-        position = tuple(  # type: ignore[assignment]
-            p + sum(r * t for r, t in zip(row, step, strict=True)) for p, row in zip(position, rotation, strict=True)
-        )
+        x, y, z = position
+        along = _turned(rotation, (link.a_m * c, link.a_m * s, link.d_m))
+        position = x + along[0], y + along[1], z + along[2]
         turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
         rotation = _product(rotation, turn)
         yield rotation, position
 
 
+def _turned(rotation: Rotation, vector: Vector) -> Vector:
+    x, y, z = vector
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+
 def _product(left: Rotation, right: Rotation) -> Rotation:
-    rows = (tuple(sum(row[k] * right[k][j] for k in range(3)) for j in range(3)) for row in left)
-    return tuple(rows)  # type: ignore[return-value]
+    first, second, third = (_turned(left, column) for column in zip(*right, strict=True))
+    (a, b, c), (d, e, f), (g, h, i) = first, second, third
+    return (a, d, g), (b, e, h), (c, f, i)
 
 
 def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import felt
-from rig.world.ur10e.forward_kinematics import Vector, flange_frame, flange_pose, flange_rate
+from rig.world.ur10e.forward_kinematics import Vector, flange_frame, flange_rate
 from rig.world.ur10e.links import Links
 from rig.world.ur10e.trajectory import ZERO, Joints
 
@@ -44,6 +44,7 @@ def tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: Links
     return TcpMotion(speed, (*linear, *in_base(change)), force)
 
 
+@lru_cache(maxsize=4)
 def elbow(q_rad: Joints, qd_rad_s: Joints, links: Links) -> tuple[Vector, Vector]:
     """Position (m) and velocity (m/s) of the elbow, where the upper arm ends, in the base's axes."""
     _, position = flange_frame(q_rad[:2], links[:2])
@@ -54,7 +55,7 @@ def elbow(q_rad: Joints, qd_rad_s: Joints, links: Links) -> tuple[Vector, Vector
 def _velocity(q_rad: Joints, qd_rad_s: Joints, links: Links) -> Vector:
     """The velocity of the origin behind the last link, from the places a moment before and after."""
     before, after = (
-        flange_pose([a + sign * v * STEP_S for a, v in zip(q_rad, qd_rad_s, strict=True)], links)[:3]
+        flange_frame([a + sign * v * STEP_S for a, v in zip(q_rad, qd_rad_s, strict=True)], links)[1]
         for sign in (-1, 1)
     )
     x, y, z = ((b - a) / (2.0 * STEP_S) for a, b in zip(before, after, strict=True))

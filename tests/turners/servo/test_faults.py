@@ -1,7 +1,6 @@
 """What goes wrong with a servo while it turns: named, and the shaft at rest."""
 
 import math
-import multiprocessing
 import os
 import signal
 import time
@@ -14,6 +13,7 @@ from rig.errors import Fault
 from rig.turners.servo.state import ServoState
 from rig.world.servo.truth import ServoTruth
 from support.driven_servo import STANDS_RAD_S, at_speed, held, turn, turn_on_and_on
+from support.forked import forked
 from support.servo_on_a_wire import SET_UP, ServoOnAWire, servo_on_a_wire
 from support.waiting import wait_for
 
@@ -122,8 +122,7 @@ def test_a_program_that_hangs_in_a_move_is_stopped_by_its_own_driver() -> None:
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_program_that_is_killed_or_frozen_leaves_a_shaft_that_stands_within_a_second(how: signal.Signals) -> None:
     with servo_on_a_wire() as wire:
-        context = multiprocessing.get_context("forkserver")
-        program = context.Process(target=turn_on_and_on, args=(wire.port, WATCHDOG_S), daemon=True)
+        program = forked().Process(target=turn_on_and_on, args=(wire.port, WATCHDOG_S), daemon=True)
         program.start()
         try:
             wait_for(lambda: abs(wire.rate_rad_s) > 1.0, "the shaft turns")
