@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import quantities
-from rig.data.meaning import Meaning
+from rig.data.meaning import HELD, limit_held
 from rig.data.quantity import RATE, Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
@@ -26,19 +26,17 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
 
     `parts` are the sensors' parts and serial numbers.
     """
-    limits = {check.means: check.limit for check in result.checks}
     quantity_of = {_name(sensor, each): (sensor, each) for sensor in parts for each in quantities().values()}
     rows = []
     for found in shown(result):
         sensor, quantity = quantity_of.get(found.name, ("", RATE))
-        allowed = {of: limits.get(Meaning("conformity", sensor, quantity.name, of)) for of in ("scale", "bias")}
-        bias = allowed["bias"]
+        scale, bias = (limit_held(result.checks, sensor, quantity.name, of) for of in HELD)
         rows.append(
             {
                 "name": found.name,
                 "part": parts.get(sensor, ""),
                 "unit": found.unit.name,
-                "scale": None if found.scale is None else _numbers(found.scale, 1.0, allowed["scale"]),
+                "scale": None if found.scale is None else _numbers(found.scale, 1.0, scale),
                 "bias": _numbers(found.numbers, 0.0, None if bias is None else bias / found.unit.size),
             }
         )
