@@ -23,7 +23,7 @@ from rig.data.settings import RunSettings, Uncertainty, settings_of
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
-from rig.estimation.budget import Budget, budget
+from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING, Budget, budget
 from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
@@ -40,7 +40,7 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
-ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
+ANEW = (NOISE, WANDERING, FLICKER, STATES)  # repeats lessen these
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
@@ -66,8 +66,7 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
         parts = [_part(config, each, sensor, made) for each in _stages(plan, settings)]
         seen = put_together(parts, surroundings)
         whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
-        kept = tuple(each for each in whole.contributors if not (endless and each.name in ANEW))
-        found[name] = replace(whole, contributors=kept)
+        found[name] = whole.without(ANEW) if endless else whole
     return found
 
 
