@@ -67,7 +67,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
     sweeps = timed_of(plan, Sweep)
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), of.site.gravity_m_s2 * np.array(of.site.up)
-    repeatability_rad = float(np.radians(of.known.repeatability_deg) / np.sqrt(3))
+    repeatability_rad = of.known.repeatability_std_rad
     movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise, arm), repeatability_rad)
     # At a temperature that stays.
     pieces = [Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.q_rad))) for each in dwells]

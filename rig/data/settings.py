@@ -108,6 +108,11 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
 
+    @property
+    def repeatability_std_rad(self) -> float:
+        """Standard deviation of an angle of the arm's, each time that it comes back."""
+        return float(np.radians(self.repeatability_deg) / np.sqrt(3))
+
     def knows(self, name: str, part: str) -> bool:
         """Whether `of` has an answer for a sensor."""
         return part in PARTS or all(name in getattr(self, what) for what in OF_SENSORS)
@@ -298,6 +303,11 @@ class RunSettings:
     @property
     def expects_few_disturbed(self) -> bool:
         """Whether one run in twenty is taken to have a disturbed dwell before its readings are seen, not one in two."""
+        return self.reckoning >= 3
+
+    @property
+    def spreads_returns(self) -> bool:
+        """Whether tests of the field differ by a standard deviation of where an arm comes back to, not by its bound."""
         return self.reckoning >= 3
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
