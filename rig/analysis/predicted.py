@@ -19,7 +19,7 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import rotation_by
-from rig.data.settings import RunSettings, Uncertainty, settings_of
+from rig.data.settings import RunSettings, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
@@ -58,8 +58,7 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
     Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
     """
     settings = settings_of(config, plan)
-    site, known = settings.site, settings.uncertainty
-    assert site is not None and known is not None, "as new settings have them"
+    site, known = site_of(config.site), uncertainty_of(config)
     found = {}
     for name, sensor in config.to_calibrate.items():
         surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))

@@ -45,6 +45,7 @@ def test_biases_move_along_the_slope_and_the_readings_corrected_by_them_do_not()
     assert warmer + new == pytest.approx(old)
     old, new = (np.array(each.accelerometers["gyro"].bias_m_s2) for each in (before, after))
     assert warmer - new == pytest.approx(-old)
+    assert ResultDocument.model_validate_json(after.text()) == after  # a value like one that was read
 
 
 @pytest.mark.parametrize(("range_c", "wanted_c"), [((18.0, 31.0), 31.5), ((18.0, 31.0), -5.0), ((24.0, 31.0), 30.0)])

@@ -4,15 +4,17 @@ A slope holds in the range it was seen in, and nowhere else: neither the calibra
 asked for may lie outside.
 """
 
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
 from rig.data.drift_entries import SlopeEntry
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import Vector3
+from rig.data.result_types import Entry, Vector3
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+
+EntryT = TypeVar("EntryT", bound=Entry)
 
 
 def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c: float) -> ResultDocument:
@@ -26,14 +28,18 @@ def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c:
         if sensor.role == "calibrate":
             change = _change(drift, name, "rate", sensor.temperature_c, temperature_c)
             moved = _vector(np.array(sensor.bias_rad_s) - change)  # b is added to a reading, which the slope is of
-            sensors[name] = sensor.model_copy(update={"bias_rad_s": moved, "temperature_c": temperature_c})
+            sensors[name] = _with(sensor, bias_rad_s=moved, temperature_c=temperature_c)
     for name, each in result.accelerometers.items():
         change = _change(drift, name, "acceleration", each.temperature_c, temperature_c)
         moved = _vector(np.array(each.bias_m_s2) + change)
-        accelerometers[name] = each.model_copy(update={"bias_m_s2": moved, "temperature_c": temperature_c})
+        accelerometers[name] = _with(each, bias_m_s2=moved, temperature_c=temperature_c)
     polynomials: dict[str, object] = {}  # those that there are stand about the other temperature
-    changed = {"sensors": sensors, "accelerometers": accelerometers, "over_temperature": polynomials}
-    return result.model_copy(update=changed)
+    return _with(result, sensors=sensors, accelerometers=accelerometers, over_temperature=polynomials)
+
+
+def _with(entry: EntryT, **changed: object) -> EntryT:
+    """An entry with other values, which hold as those of a file do."""
+    return type(entry).model_validate(entry.model_dump(by_alias=True, exclude_unset=True) | changed)
 
 
 def _change(
