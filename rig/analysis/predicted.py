@@ -32,7 +32,8 @@ from rig.motion.steps import TURN_RAD, Dwell, Plan, Rest, Sweep, closes
 from rig.observation.arm_motion import ATTITUDES
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
-from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, nearest_axis
+from rig.observation.observe import REST_SETTLING_S, Observation, nearest_axis
+from rig.observation.windows import MIN_SAMPLES_AT_REST
 
 ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
 STEP_K = 1 / 16  # of a thermometer, assumed
@@ -141,7 +142,7 @@ def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: Sen
         elif isinstance(each.step, (Rest, Dwell)):
             here = each.step.q_rad if isinstance(each.step, Dwell) else here
             window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
-            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_REST_SAMPLES:
+            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_SAMPLES_AT_REST:
                 rests.append(_average(window_s, sensor, mount @ _attitude(made.kinematics, here)))
             continue
         here = getattr(each.step, "target_q_rad", here)

@@ -23,11 +23,10 @@ from rig.motion.geometry import (
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
 from rig.observation.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
-from rig.observation.known_motion import check_span, closely_followed, not_finite
+from rig.observation.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.windows import Window
 
-MIN_RATE_RAD_S = 0.01
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
 PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out

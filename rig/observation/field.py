@@ -13,10 +13,10 @@ from rig.data.quantity import FIELD
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import MIN_DWELL_SAMPLES, DwellReading, check_complete
+from rig.observation.acceleration import DwellReading, check_complete
 from rig.observation.mean import Mean, even_mean
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import Window, rested
+from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
 SETTLING_S = 0.2  # kept away from either end of a rest
@@ -91,7 +91,7 @@ def field_tests(
         for window in windows
         if window.end_s > window.start_s
         and _at_home(recording, window, home_q_rad)
-        and len(inside(window)) >= MIN_DWELL_SAMPLES
+        and len(inside(window)) >= MIN_SAMPLES_AT_REST
     )
 
 
