@@ -152,11 +152,12 @@ def _calibrated(
         down=-np.array(site.up),
         second_order=settings.second_order,
     )
-    movement, sheet = Movement(seen, sweeps, _repeatability_rad(settings)), None
+    known, sheet = settings.uncertainty, None
+    movement = Movement(seen, sweeps, 0.0 if known is None else known.repeatability_std_rad)
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
     end_of_scale = sensor.channel(ACCELERATION).range
-    if settings.knows_accelerometers and settings.uncertainty is not None and end_of_scale is not None:
-        sheet = sheet_of(settings.uncertainty, name, sensor.part, end_of_scale)
+    if settings.knows_accelerometers and known is not None and end_of_scale is not None:
+        sheet = sheet_of(known, name, sensor.part, end_of_scale)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
@@ -189,12 +190,12 @@ def _calibrated(
         scale=axes.scale,
         covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
         budget=None
-        if settings.uncertainty is None
+        if known is None
         else accelerometer_budget(
             solution,
             movement,
             site,
-            1e-3 * settings.uncertainty.acceleration_lag_ms,
+            1e-3 * known.acceleration_lag_ms,
             sheet=sheet,
             noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
         ),
@@ -268,13 +269,6 @@ def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAccelera
     """(3 N + 9 M,) degrees of freedom of the readings of dwells, then of the harmonics of sweeps."""
     still = [np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells]
     return np.concatenate([*still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
-
-
-def _repeatability_rad(settings: RunSettings) -> float:
-    """A standard deviation."""
-    if settings.uncertainty is None:
-        return 0.0
-    return float(np.radians(settings.uncertainty.repeatability_deg) / np.sqrt(3))
 
 
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:

@@ -15,7 +15,7 @@ from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Contributor
+from rig.estimation.budget import FLICKER, WANDERING, Contributor
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.own_errors import (
     BIAS_OVER_TEMPERATURE,
@@ -31,7 +31,6 @@ from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 
-INSTABILITY, FLICKER = "bias instability", "flicker of the bias"
 KNOWN = "what is known of the part"
 STANDARD = np.sqrt(3)  # a half-width is so many standard uncertainties
 MILLI_G = 1000  # µg
@@ -164,7 +163,7 @@ def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -
     }
     stability = f"least Allan deviation: {sheet.bias_instability_ug:.3g} µg"
     lines = [
-        Contributor(INSTABILITY, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, wandered),
+        Contributor(WANDERING, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, wandered),
         Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flickered),
         *(
             Contributor(name, "B", "rectangular", half_width, unit, KNOWN, np.inf, spread.of(patterns))

@@ -109,7 +109,7 @@ def allowed_of(
     cube, square = (uncertainty.of(what, name, part) / 100 / np.sqrt(3) for what in CURVE)
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
-        repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
+        repeatability_rad=uncertainty.repeatability_std_rad,
         encoder_rad=uncertainty.angle_std_rad if arcs else 0.0,
         mount_rad=float(np.radians(uncertainty.mount_deg) / np.sqrt(3)),
         jitter_s=jitter_s,

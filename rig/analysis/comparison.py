@@ -15,9 +15,9 @@ from rig.analysis.alignment import mean_rates
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream
-from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation
+from rig.observation.observe import REST_SETTLING_S, Observation
 from rig.observation.observed_run import Delay, ObservedRun
-from rig.observation.windows import Window, rested, swept
+from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested, swept
 
 MAX_DELAY_S = 0.2  # between the filters of two sensors; more means that their time stamps do not belong together
 MAX_GAP = 2.5  # sampling intervals of the reference across which it is interpolated
@@ -215,7 +215,7 @@ def _deviation(errors: Sequence[Array]) -> Deviation:
 
 def _noise(rests: Sequence[Array]) -> Array | None:
     """Standard deviation (3,) within the rests, each about its own mean."""
-    long_enough = [rest for rest in rests if len(rest) >= MIN_REST_SAMPLES]
+    long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None
     squares = np.sum([np.sum((rest - rest.mean(axis=0)) ** 2, axis=0) for rest in long_enough], axis=0)

@@ -1,25 +1,29 @@
 """What contradicts itself does not pass: the checks of the verdict that hold a recording against itself."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.consistency import consistency
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
+from rig.analysis.over_temperature import taken_to_reference
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import (
+    DISTURBED_SWEEP,
     ReadInReference,
     of_accelerometer,
     of_magnetometer,
     reference_statistics,
 )
+from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
@@ -34,19 +38,22 @@ from rig.observation.observed_run import ObservedRun
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 SHARES = 13  # of each kind of readings of a sensor, its statistics
 OF_THE_MODEL = 2  # more where they are held to the model: the ways between sweeps, the angles between axes
-DISTURBED = "disturbed_sweep"
 
 
 @dataclass(frozen=True, slots=True)
 class Contradictions:
-    """The checks, in order, the sweeps of the plan, by index, that they name, and what of each sensor is told."""
+    """The checks, in order, and what of each sensor is told."""
 
     checks: tuple[Check, ...]
-    disturbed: frozenset[int]
     told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
 
+    @property
+    def disturbed(self) -> frozenset[int]:
+        """The sweeps of the plan, by index, that the checks name."""
+        return frozenset(check.means.sweep for check in self.checks if check.means.sweep is not None)
 
-NOTHING = Contradictions((), frozenset())
+
+NOTHING = Contradictions(())
 
 
 def contradictions(
@@ -66,7 +73,6 @@ def contradictions(
     if settings.site is None:
         return NOTHING
     checks: list[Check] = []
-    disturbed: set[int] = set()
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     rate = _rate(recordings[0].run, sensors, false_alarms)
     for name in sensors:
@@ -82,8 +88,8 @@ def contradictions(
         gyroscope = recordings[0].run.sensors[name].channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
-        sweeps = [fitness(name, "rate", f"{DISTURBED}.{sweep}", *named[sweep], sweep=sweep) for sweep in sorted(named)]
-        checks += sweeps or [fitness(name, "rate", DISTURBED, *found.piece)]
+        sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *named[sweep], sweep=sweep) for sweep in sorted(named)]
+        checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
         usual, has_bits = np.median if settings.holds_all_kinds else np.min, gyroscope.step is None
         of_readings = judge_readings(counts, pieces.windows, rate, usual, has_bits=has_bits)
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
@@ -91,10 +97,9 @@ def contradictions(
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
             leaning = _leaning_deg(explained.solution, stated_deg, rate)
             checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
-        disturbed |= named.keys()
         if surroundings is not None:
             told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
-    return Contradictions(tuple(checks), frozenset(disturbed), told_from)
+    return Contradictions(tuple(checks), told_from)
 
 
 def _leaning_deg(solution: VectorSolution, stated_deg: float, rate: float) -> Statistic:
@@ -139,9 +144,11 @@ def in_reference(
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     for (name, quantity), held in asked.items():
         found = reference_statistics(held, rate, drifting=drifting)
+        for at, statistic in found.pieces:
+            checks.append(fitness(name, quantity.name, at.what, *statistic, sweep=at.sweep, dwell=at.dwell))
         checks += [fitness(name, quantity.name, what, *each) for what, each in found.statistics.items()]
         told_from[name] = of_reference(found.told_from, quantity)
-    return Contradictions(tuple(checks), frozenset(), told_from)
+    return Contradictions(tuple(checks), told_from)
 
 
 def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
@@ -159,15 +166,23 @@ def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) ->
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """The sweeps in the recordings of a run so far that contradict the others; none where they cannot be solved."""
-    try:
+    """The sweeps in the recordings of a run so far that contradict the others by what any sensor felt in them.
+
+    Those that the verdict names; none of gyroscopes or of accelerometers where these cannot be solved yet.
+    """
+    settings = runs[0].settings if runs else None
+    if settings is None or not settings.planned_sweeps:
+        return frozenset()
+    named = frozenset[int]()
+    with suppress(RigError), solvable():
         recordings, _ = observe_as_mounted(runs)
-        if not recordings or not runs[0].settings.planned_sweeps:
-            return frozenset()
-        sensors = runs[0].settings.to_calibrate
-        chosen = {name: runs[0].sensors[name] for name in sensors}
+        if not recordings:
+            return named
+        if settings.reference_c is not None:
+            recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
+        chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings)
         results = solve_observed(chosen, recordings, surroundings=surroundings)
-        return contradictions(recordings, results, sensors, surroundings).disturbed
-    except RigError:
-        return frozenset()
+        named = contradictions(recordings, results, settings.to_calibrate, surroundings).disturbed
+        named |= in_reference(recordings, calibrate_accelerometers(recordings, settings, results), {}).disturbed
+    return named

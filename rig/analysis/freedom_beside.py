@@ -4,8 +4,6 @@ Its variance is split into what the budget's own lines of type A make of it, and
 (Welch and Satterthwaite's, JCGM 100, G.4); what is left, errors of the arm of a stated size, is known.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
@@ -15,15 +13,13 @@ from rig.analysis.reversal import MagnetometerReversal
 from rig.estimation.accelerometer_model import SECOND
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.budget import Budget
+from rig.estimation.budget import NOISE, WANDERING, Budget
 from rig.estimation.coverage import effective_freedom
-from rig.estimation.reference_budget import response_in_attitudes
+from rig.estimation.reference_budget import ATTITUDES, response_in_attitudes
 from rig.estimation.reference_model import F
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.vector_fit import Explained
 from rig.estimation.vector_model import VectorSolution, design_matrix, regress
-
-NOISE, WANDERING, ATTITUDES = "noise", "bias instability", "arm's attitudes"
 
 
 def of_angles(result: SensorResult) -> Array | None:
@@ -35,7 +31,7 @@ def of_angles(result: SensorResult) -> Array | None:
     turned = _to_angles(solution.matrix)
     readings = np.einsum("aij,ijkl,akl->a", turned, _of_matrix(solution), turned)
     walk = np.einsum("aij,ijl,ail->a", turned, _walk(explained)[:, :3, :3], turned)
-    return _split(np.diag(solution.angles_covariance_rad2), {NOISE: readings - walk, WANDERING: walk}, budget)
+    return _split(np.diag(solution.angles_covariance_rad2), _of_readings(readings - walk, walk, explained), budget)
 
 
 def of_sensitivity(result: SensorResult) -> Array | None:
@@ -48,7 +44,7 @@ def of_sensitivity(result: SensorResult) -> Array | None:
         return None
     whole = np.diag(covariance).reshape(3, 3)
     walk = np.diagonal(_walk(explained)[:, 4:, 4:], axis1=1, axis2=2)
-    return _split(whole, {NOISE: whole - walk, WANDERING: walk}, budget)
+    return _split(whole, _of_readings(whole - walk, walk, explained), budget)
 
 
 def of_acceleration_angles(result: AccelerometerResult) -> Array | None:
@@ -100,19 +96,24 @@ def _of_accelerometer(result: AccelerometerResult, response: Array, std: Array) 
     return _split(std**2, {NOISE: noise, ATTITUDES: std**2 - noise}, result.budget)
 
 
+def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:
+    """The parts of a gyroscope's variances by the lines they have the freedom of.
+
+    Where the readings tell no wandering, there is no line of it: the walk is the flicker of the data sheet, and known.
+    """
+    return {NOISE: noise, **({WANDERING: walk} if explained.bias.found else {})}
+
+
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Freedom (…) of variances (…) from their `parts`, by the name of the budget's lines; the rest is known."""
+    """Freedom (…) of variances (…) from their `parts`, by the name of the budget's lines; the rest is known.
+
+    Raises KeyError where the budget has no such line.
+    """
     made = [np.clip(each, 0.0, whole) for each in parts.values()]
     rest = np.clip(whole - np.sum(made, axis=0), 0.0, None)
-    freedom = [_line(budget, name) for name in parts]
+    freedom = [budget.line(name).freedom for name in parts]
     shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))
     return effective_freedom(np.array([*made, rest]), np.reshape([*freedom, np.inf], shape))
-
-
-def _line(budget: Budget, name: str) -> float:
-    """Degrees of freedom of a budget's line; infinite where it is not there, for nothing comes of it."""
-    found: Sequence[float] = [each.freedom for each in budget.contributors if each.name == name]
-    return found[0] if found else np.inf
 
 
 def _to_angles(matrix: Array) -> Array:

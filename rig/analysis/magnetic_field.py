@@ -166,10 +166,8 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None
-    repeatability_deg = 0.0 if settings.uncertainty is None else settings.uncertainty.repeatability_deg
-    found = field_drift(
-        [test.mean for test in tests], [test.variance for test in tests], float(np.radians(repeatability_deg))
-    )
+    means, variances = [test.mean for test in tests], [test.variance for test in tests]
+    found = field_drift(means, variances, _comes_back_rad(settings))
     if not found.steady:
         change_t, std_t = np.linalg.norm(found.change_t), np.linalg.norm(found.std_t)
         raise Fault(
@@ -179,6 +177,15 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
             "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
         )
     return found
+
+
+def _comes_back_rad(settings: RunSettings) -> float:
+    """How far off home, about each axis, the arm stands in a test; a half-width was taken for that before."""
+    if settings.uncertainty is None:
+        return 0.0
+    if settings.spreads_returns:
+        return settings.uncertainty.repeatability_std_rad
+    return float(np.radians(settings.uncertainty.repeatability_deg))
 
 
 def _solved(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:

@@ -14,7 +14,7 @@ from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.recorded_sensor import range_m_s2
-from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
+from rig.data.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
@@ -29,6 +29,7 @@ class PlannedAccelerometer:
 
     name: str
     sensor: SensorSection
+    range_m_s2: float
     plan: Plan
     settings: RunSettings
     site: Site
@@ -38,17 +39,15 @@ class PlannedAccelerometer:
     @property
     def sheet(self) -> Sheet:
         """What the data sheet lets the accelerometer do beside the model."""
-        assert self.sensor.acceleration is not None, "it has an accelerometer"
-        return sheet_of(self.known, self.name, self.sensor.part, range_m_s2(self.sensor.acceleration))
+        return sheet_of(self.known, self.name, self.sensor.part, self.range_m_s2)
 
 
 def planned_accelerometers(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> list[PlannedAccelerometer]:
     """The accelerometers of the sensors to calibrate, as the plan moves them."""
     settings = settings_of(config, plan)
-    site, known = settings.site, settings.uncertainty
-    assert site is not None and known is not None, "as new settings have them"
+    site, known = site_of(config.site), uncertainty_of(config)
     return [
-        PlannedAccelerometer(name, each, plan, settings, site, known, arm)
+        PlannedAccelerometer(name, each, range_m_s2(each.acceleration), plan, settings, site, known, arm)
         for name, each in config.to_calibrate.items()
         if each.acceleration is not None
     ]
@@ -67,7 +66,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
     sweeps = timed_of(plan, Sweep)
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), of.site.gravity_m_s2 * np.array(of.site.up)
-    repeatability_rad = float(np.radians(of.known.repeatability_deg) / np.sqrt(3))
+    repeatability_rad = of.known.repeatability_std_rad
     movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise, arm), repeatability_rad)
     # At a temperature that stays.
     pieces = [Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.q_rad))) for each in dwells]

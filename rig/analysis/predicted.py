@@ -19,11 +19,11 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import rotation_by
-from rig.data.settings import RunSettings, Uncertainty, settings_of
+from rig.data.settings import RunSettings, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
-from rig.estimation.budget import Budget, budget
+from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING, Budget, budget
 from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
@@ -32,7 +32,8 @@ from rig.motion.steps import TURN_RAD, Dwell, Plan, Rest, Sweep, closes
 from rig.observation.arm_motion import ATTITUDES
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
-from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, nearest_axis
+from rig.observation.observe import REST_SETTLING_S, Observation, nearest_axis
+from rig.observation.windows import MIN_SAMPLES_AT_REST
 
 ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
 STEP_K = 1 / 16  # of a thermometer, assumed
@@ -40,7 +41,7 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
-ANEW = ("noise", "bias instability", "flicker of the bias", "times of the arm's states")  # repeats lessen these
+ANEW = (NOISE, WANDERING, FLICKER, STATES)  # repeats lessen these
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
@@ -58,16 +59,14 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
     Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
     """
     settings = settings_of(config, plan)
-    site, known = settings.site, settings.uncertainty
-    assert site is not None and known is not None, "as new settings have them"
+    site, known = site_of(config.site), uncertainty_of(config)
     found = {}
     for name, sensor in config.to_calibrate.items():
         surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
         parts = [_part(config, each, sensor, made) for each in _stages(plan, settings)]
         seen = put_together(parts, surroundings)
         whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
-        kept = tuple(each for each in whole.contributors if not (endless and each.name in ANEW))
-        found[name] = replace(whole, contributors=kept)
+        found[name] = whole.without(ANEW) if endless else whole
     return found
 
 
@@ -143,7 +142,7 @@ def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: Sen
         elif isinstance(each.step, (Rest, Dwell)):
             here = each.step.q_rad if isinstance(each.step, Dwell) else here
             window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
-            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_REST_SAMPLES:
+            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_SAMPLES_AT_REST:
                 rests.append(_average(window_s, sensor, mount @ _attitude(made.kinematics, here)))
             continue
         here = getattr(each.step, "target_q_rad", here)

@@ -9,14 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import FLICKER
 from rig.analysis.planned_reference import PlannedAccelerometer, planned_accelerometers, planned_read
 from rig.analysis.reference_budgets import accelerometer_lines
 from rig.config.models import RigConfig
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import scale_of
 from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.budget import Budget
+from rig.estimation.budget import FLICKER, NOISE, Budget
 from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_budget import Spread, scale_and_bias
@@ -24,7 +23,7 @@ from rig.estimation.reference_model import matrix
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan
 
-ANEW = ("noise", FLICKER)  # repeats lessen these
+ANEW = (NOISE, FLICKER)  # repeats lessen these
 
 
 def predicted_accelerations(
@@ -40,8 +39,7 @@ def predicted_accelerations(
     found = {}
     for each in planned_accelerometers(config, plan, arm):
         whole = _budget(each)
-        kept = tuple(line for line in whole.contributors if not (endless and line.name in ANEW))
-        found[each.name] = replace(whole, contributors=kept)
+        found[each.name] = whole.without(ANEW) if endless else whole
     return found
 
 

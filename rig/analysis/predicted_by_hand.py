@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from rig.analysis.predicted import angle_walk_rad_sqrt_s
+from rig.config.hand_sections import ByHandSection
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.config.stage_section import rotation_by
-from rig.data.settings import ByHand, Uncertainty, settings_of
+from rig.data.settings import ByHand, Uncertainty, by_hand_of, uncertainty_of
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.by_hand.fit import fit
@@ -22,7 +23,6 @@ from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of
 from rig.estimation.by_hand.solution import CLOCK, RECORDED_HANDS, solution_of
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import Face, Instruction
-from rig.motion.steps import Plan
 from rig.observation.hand_runs import ITS_OWN_CLOCK, turned_face
 
 FLIP_S, TURN_S = 1.5, 2.5  # a move, from rest to rest; assumed
@@ -37,15 +37,14 @@ def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
 
 
 def predicted_by_hand(
-    config: RigConfig, moves: Sequence[Instruction], rest_s: float, *, endless: bool = False
+    config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float, *, endless: bool = False
 ) -> dict[str, Budget]:
     """The budget that a session of these moves will have, for each sensor to calibrate.
 
-    Of an `endless` one only what no reading tells is left. Raises Fault `no_fit`.
+    `section` says how well the item's faces are made. Of an `endless` session only what no reading tells is left.
+    Raises Fault `no_fit`.
     """
-    settings = settings_of(config, Plan((), (), ()))
-    known, said = settings.uncertainty, settings.by_hand
-    assert known is not None and said is not None, "as new settings of a session by hand have them"
+    known, said = uncertainty_of(config), by_hand_of(section)
     found = {}
     for name, sensor in config.to_calibrate.items():
         session = _session(sensor, moves, rest_s)

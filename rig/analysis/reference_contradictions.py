@@ -35,10 +35,27 @@ DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """A `sweep` or a `dwell` of the plan, by index; of neither where the one that fits worst does not contradict."""
+
+    what: str
+    sweep: int | None = None
+    dwell: int | None = None
+
+
+def _at_sweep(index: int) -> Place:
+    return Place(DISTURBED_SWEEP, sweep=index)
+
+
+def _at_dwell(index: int) -> Place:
+    return Place(DISTURBED_DWELL, dwell=index)
+
+
+@dataclass(frozen=True, slots=True)
 class ReadInReference:
     """One sensor's readings: `counts` (n, 3) of each recording, the windows and dwells cut from them, and the model.
 
-    `pieces` name the dwells and sweeps of `read`, in its order; `flicker_counts` is the least Allan deviation of the
+    `pieces` are the dwells and sweeps of `read`, in its order; `flicker_counts` is the least Allan deviation of the
     bias, by which the halves of a dwell differ beside their noise. `has_bits`: see `judge_readings`.
     """
 
@@ -46,15 +63,20 @@ class ReadInReference:
     dwells: Sequence[Dwelt]
     sweeps: Sequence[Window]
     read: Read
-    pieces: Sequence[str]
+    pieces: Sequence[Place]
     flicker_counts: float = 0.0
     has_bits: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceStatistics:
-    """Every statistic with its limit, by the name of its check; the size from which on it is told, by what happens."""
+    """Every statistic with its limit; the size from which on it is told, by what happens.
 
+    `pieces` are the dwells and sweeps that contradict the others, or the one that does most; `statistics` what is told
+    of all of them, by the name of its check.
+    """
+
+    pieces: list[tuple[Place, Statistic]]
     statistics: dict[str, Statistic]
     told_from: dict[str, float]
 
@@ -84,7 +106,7 @@ def of_accelerometer(
             times_s=np.array([each.window_s for each in pieces]).mean(axis=1),
             second_order=solution.second_order_s2_m is not None,
         ),
-        pieces=[f"{DISTURBED_DWELL if each.stood.wrist is None else DISTURBED_SWEEP}.{each.number}" for each in pieces],
+        pieces=[(_at_dwell if each.stood.wrist is None else _at_sweep)(each.number) for each in pieces],
         flicker_counts=flicker_m_s2 / channel.unit_per_count,
     )
 
@@ -114,19 +136,19 @@ def of_magnetometer(
             times_s=np.array([each.middle_s + each.since_s for each in dwells]),
             second_order=False,
         ),
-        pieces=[f"{DISTURBED_DWELL}.{each.index}" for each in dwells],
+        pieces=[_at_dwell(each.index) for each in dwells],
     )
 
 
 def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> ReferenceStatistics:
     """`rate` is that of false alarms for each."""
     found = reference_consistency(held.read, rate, drifting=drifting)
-    named = {held.pieces[place]: statistic for place, statistic in sorted(found.disturbed.items())}
+    named = [(held.pieces[place], statistic) for place, statistic in sorted(found.disturbed.items())]
+    worst = Place(DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP)
     windows = [*resting(held.dwells), *held.sweeps]
     statistics = {
-        **(named or {DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP: found.piece}),
         **found.statistics,
         **knocked(held.dwells, held.flicker_counts, rate),
         **judge_readings(held.counts, windows, rate, has_bits=held.has_bits),
     }
-    return ReferenceStatistics(statistics, found.told_from)
+    return ReferenceStatistics(named or [(worst, found.piece)], statistics, found.told_from)

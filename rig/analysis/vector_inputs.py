@@ -145,7 +145,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 def _return_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array:
     """(P, N, 3) errors as in `Seen`: joints that turn a sweep's axis come back a little elsewhere every time."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
-    leaning = np.radians(known.repeatability_deg) / np.sqrt(3) * np.swapaxes(errors[:, ZEROS], 0, 1)
+    leaning = known.repeatability_std_rad * np.swapaxes(errors[:, ZEROS], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _visits(turns)])
     off = (visits[:, None, :, None] * leaning).reshape(-1, len(turns), 3)
     off = off[off.any(axis=(1, 2))]
@@ -220,7 +220,7 @@ def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
         g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name, part) > 0,
-        repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
+        repeatability_rad=uncertainty.repeatability_std_rad,
         state_jitter_s=surroundings.state_jitter_s,
     )
 

@@ -21,6 +21,8 @@ from rig.estimation.budget import Budget
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors
 from rig.estimation.estimate import Estimate
 
+CLOCKS = "clocks_agree"
+
 
 @dataclass(frozen=True, slots=True)
 class Spread:
@@ -43,7 +45,7 @@ class _Held:
     def check(self, what: str, value: float | None) -> Check:
         """The check of one limit."""
         row, limit = limit_of(self.limits, self.quantity, what)
-        means = Meaning(row.kind, self.sensor, self.quantity, row.parameter)
+        means = Meaning(row.kind, self.sensor, self.quantity, row.parameter, what=what)
         return Check(_name(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, spread: Spread | None) -> Check:
@@ -90,10 +92,15 @@ def fitness(
     unit: str = "1",
     parameter: Parameter | None = None,
     sweep: int | None = None,
+    dwell: int | None = None,
 ) -> Check:
-    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own."""
-    means = Meaning("fitness", sensor, quantity, parameter, sweep)
-    return Check(_name(sensor, quantity, what), value, limit, unit, means)
+    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own.
+
+    The `sweep` or `dwell` of the plan that it is told of, by index, is part of its name.
+    """
+    means, piece = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
+    name = _name(sensor, quantity, what)
+    return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
 
 
 def judge(
@@ -142,8 +149,9 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
 
     Of several recordings those in which they agree least, each pair for itself.
     """
+    means = Meaning("fitness", what=CLOCKS)
     return tuple(
-        Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm", Meaning("fitness"))
+        Check(f"{CLOCKS}.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm", means)
         for each in worst_differences(clocks)
         for one, other in [each.clocks]
     )

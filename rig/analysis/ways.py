@@ -20,8 +20,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
 from rig.motion.geometry import flange_pose
 from rig.observation.arm_beside_lines import turned
-from rig.observation.arm_motion import MIN_RATE_RAD_S, ArmMotion
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
+from rig.observation.known_motion import MIN_RATE_RAD_S
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import rested, swept
 

@@ -39,10 +39,9 @@ def run(options: Namespace) -> int:
 
     config, simulated = load_sensors(options.config, options.overrides)
     with ExitStack() as stack:
+        if simulated is not None and (moved := stack.enter_context(own_address(config, simulated))):
+            config, simulated = load_sensors(options.config, [*options.overrides, *moved])
         if simulated is not None:
-            if moved := stack.enter_context(own_address(config, simulated)):
-                config, simulated = load_sensors(options.config, [*options.overrides, *moved])
-            assert simulated is not None
             stack.enter_context(simulated_laboratory(simulated))
         recorded = record_readings(config, options.out, options.duration_s)
     for path, each in recorded.items():

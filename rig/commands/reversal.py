@@ -17,18 +17,18 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print what the runs say together, and write it to `--out`; nothing else is changed. Returns 0.
 
-    Raises Refused `report_folder`, and Refused and Fault as `open_run`, `refuse_elsewhere`, `judged` and
+    Raises Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and
     `reversals` do.
     """
     from rig.analysis.reversal import reversals
     from rig.config.written_file import write_new
-    from rig.observation.arm_motion import refuse_elsewhere
+    from rig.observation.arm_motion import turner_of
     from rig.plans.recorded import judged, open_run
     from rig.report.reversal import print_reversal, reversal_document
 
     opened = [(str(each), open_run(each)) for each in options.runs]
     for _, run in opened:
-        refuse_elsewhere(run.movement[0])
+        turner_of(run.movement[0])
     document = reversal_document(reversals([(each, judged(run)) for each, run in opened]))
     print_reversal(document, as_json=options.json)
     if options.out is not None:

@@ -42,13 +42,13 @@ def _speed(text: str) -> float:
 def run(options: Namespace) -> int:
     """Replay every recording in a run folder, `--speed` times as fast as it was; the page stays until Ctrl-C.
 
-    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `refuse_elsewhere`, `check_arms_times` and
+    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
     `read_result` do.
     """
     from rig.data.result_file import read_result
     from rig.data.run_file import read_run
     from rig.data.run_folder import RESULT, recordings
-    from rig.observation.arm_motion import check_arms_times, refuse_elsewhere
+    from rig.observation.arm_motion import check_arms_times, turner_of
     from rig.page.control import Control
     from rig.page.feed import Feed
     from rig.page.page_state import Shown
@@ -62,7 +62,7 @@ def run(options: Namespace) -> int:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
     with raised_as(Refused):  # nothing runs here
         for run in runs:
-            refuse_elsewhere(run)
+            turner_of(run)
             check_arms_times(run.states)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
     feed = Feed(Shown(_about(folder, runs)))
@@ -82,6 +82,7 @@ def run(options: Namespace) -> int:
 
 def _about(folder: Path, runs: "list[RunData]") -> "About":
     from rig.data.provenance import calls_itself_simulated
+    from rig.observation.arm_motion import turner_of
     from rig.page.about import About
     from rig.page.arm import geometry
 
@@ -90,8 +91,7 @@ def _about(folder: Path, runs: "list[RunData]") -> "About":
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
     made_with = runs[0].provenance
     simulated = calls_itself_simulated(made_with.arm_software)
-    turner = runs[0].turner
-    assert turner is not None, "of what was not recorded elsewhere"
+    turner = turner_of(runs[0])
     arm = geometry(turner.geometry, turner.joints)
     arm |= {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
     return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)

@@ -9,7 +9,9 @@ from pydantic import Field, field_validator, model_validator
 from rig.config.history_address import history_url
 from rig.config.section import RATIO, Section, Vector3, Words
 
-MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
+# Sine of the angle between the vertical and what a heading is given of: that of `rig.estimation.earth_rate`, which the
+# world must not reach through a section.
+MIN_LEVEL = 0.1
 
 
 class SiteSection(Section):

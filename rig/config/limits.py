@@ -134,6 +134,11 @@ LIMITS: Mapping[str, Limit] = {
 _KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, row in LIMITS.items()}
 
 
+def key_of(quantity: str | None, what: str | None) -> str | None:
+    """The key under which a check of that quantity has its limit; None where a configuration has none for it."""
+    return _KEYS.get((quantity or "", what or ""))
+
+
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
     """The row of that name, and the limit itself, None where none is set. Raises KeyError without such a row."""
     key = _KEYS[quantity, what]

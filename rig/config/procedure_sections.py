@@ -34,7 +34,8 @@ Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the
 DEFAULT_PROCEDURE = "six_observation"
 LONGEST_SWEEP_S = 720  # once round at the slowest speed
 HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
-MIN_RANGE_C = 10.0  # what polynomials need: that of rig.estimation.over_temperature
+# What polynomials need: that of `rig.estimation.over_temperature`, which the world must not reach through a section.
+MIN_RANGE_C = 10.0
 
 
 class SixSweepsSection(ProcedureSection):

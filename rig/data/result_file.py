@@ -21,7 +21,7 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.hand_entries import ByHandEntry
 from rig.data.installed_kinds import quantities
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.meaning import Meaning, meaning_by_name
+from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
 from rig.data.result_types import (
     Entry,
     ErrorEntry,
@@ -65,7 +65,7 @@ class CheckEntry(Entry):
 
     `kind` says whether it holds a property of the item (conformity) or asks whether the measurement is fit for use;
     `sensor`, `quantity` and `parameter` what of which sensor is held, where it is of a single one; `sweep` which sweep
-    contradicts the others. Results of before say none of these.
+    contradicts the others, `what` is told of the quantity. Results of before say none of these, or all but `what`.
     """
 
     name: str
@@ -82,13 +82,15 @@ class CheckEntry(Entry):
     quantity: str | None = None
     parameter: Parameter | None = None
     sweep: int | None = None
+    what: str | None = None
 
     @property
     def means(self) -> Meaning:
         """What it says it is of; in results of before, what its name was taken to say."""
         if self.kind is None:
             return meaning_by_name(self.name)
-        return Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep)
+        said = Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.what)
+        return said if self.what is not None else completed_by_name(said, self.name)
 
 
 class StoredPolynomialsEntry(Entry):

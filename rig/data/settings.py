@@ -24,8 +24,9 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
 
 if TYPE_CHECKING:
+    from rig.config.hand_sections import ByHandSection
     from rig.config.judging_sections import SiteSection
-    from rig.config.models import ProcedureSection, RigConfig
+    from rig.config.models import RigConfig
     from rig.motion.steps import Dwell, Plan
 
 SCHEMA = "rig.settings/7"
@@ -107,6 +108,11 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
         if self.angle_std_deg is None:
             raise _angle_std_not_stated()
         return float(np.radians(self.angle_std_deg))
+
+    @property
+    def repeatability_std_rad(self) -> float:
+        """Standard deviation of an angle of the arm's, each time that it comes back."""
+        return float(np.radians(self.repeatability_deg) / np.sqrt(3))
 
     def knows(self, name: str, part: str) -> bool:
         """Whether `of` has an answer for a sensor."""
@@ -300,6 +306,11 @@ class RunSettings:
         """Whether one run in twenty is taken to have a disturbed dwell before its readings are seen, not one in two."""
         return self.reckoning >= 3
 
+    @property
+    def spreads_returns(self) -> bool:
+        """Whether tests of the field differ by a standard deviation of where an arm comes back to, not by its bound."""
+        return self.reckoning >= 3
+
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=3`.
 
@@ -352,11 +363,13 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
     Raises Refused `angle_std_not_stated` where it has arcs that nobody says how well the encoders tell.
     """
+    from rig.config.hand_sections import ByHandSection
+
     reference = None
     if config.reference is not None:
         name, section = config.reference
         reference = KnownReference(name, section.turntable.scale, section.turntable.bias_rad_s)
-    uncertainty = _uncertainty(config)
+    uncertainty = uncertainty_of(config)
     planned = tuple(
         PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s, sweep.angle_rad)
         for sweep in plan.sweeps
@@ -371,7 +384,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         home_q_rad=plan.home_q_rad,
         planned_sweeps=planned,
         matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
-        site=_site(config.site),
+        site=site_of(config.site),
         uncertainty=uncertainty,
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
@@ -379,7 +392,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         extension_m=config.turner.extension_m,
         reckoning=RECKONING,
         mounts=tuple(stage.mount for stage in plan.stages),
-        by_hand=_by_hand(config.procedure),
+        by_hand=by_hand_of(config.procedure) if isinstance(config.procedure, ByHandSection) else None,
         reference_c=getattr(config.procedure, "reference_c", None),
     )
     if settings.has_arcs and uncertainty.angle_std_deg is None:
@@ -398,11 +411,8 @@ def _limits(config: "RigConfig") -> Limits:
     return Limits(**said)
 
 
-def _by_hand(section: "ProcedureSection") -> ByHand | None:
-    from rig.config.hand_sections import ByHandSection
-
-    if not isinstance(section, ByHandSection):
-        return None
+def by_hand_of(section: "ByHandSection") -> ByHand:
+    """How a session by hand will be solved, and what it is to have."""
     return ByHand(
         flips=section.flips,
         turns=section.turns,
@@ -431,7 +441,7 @@ def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
     return tuple(planned)
 
 
-def _site(section: "SiteSection") -> Site:
+def site_of(section: "SiteSection") -> Site:
     """The site, with the Earth's rate in the frame of the base, where latitude and heading are known."""
     earth_rate: Vector3 | None = None
     if section.latitude_deg is not None and section.heading_deg is not None:
@@ -458,7 +468,7 @@ def _tesla(microtesla: float | None) -> float | None:
     return None if microtesla is None else microtesla / 1e6
 
 
-def _uncertainty(config: "RigConfig") -> Uncertainty:
+def uncertainty_of(config: "RigConfig") -> Uncertainty:
     """The uncertainties that the file states; what it does not say of a sensor is its part's."""
     said: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {

@@ -5,7 +5,7 @@ changes of scale and bias (JCGM 100, 5.1). Half-widths stand for equally likely 
 uncertainty is the half-width over √3.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,6 +18,9 @@ from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.mount_squares import of_mount_squares
 from rig.estimation.vector_fit import Explained, Seen
 
+NOISE = "noise"
+WANDERING, FLICKER = "bias instability", "flicker of the bias"
+STATES = "times of the arm's states"
 CLOCK = "controller clock"
 ENCODERS = "turner's encoders"
 AXES, REPEATABILITY, MOUNTS = "arm's axes", "arm's repeatability", "mounting anew"  # what directions may be off by
@@ -72,10 +75,17 @@ class Budget:
         std: Array = np.sqrt(np.diag(self.covariance))
         return std
 
+    def line(self, name: str) -> Contributor:
+        """One contributor. Raises KeyError where there is none of that name."""
+        return {each.name: each for each in self.contributors}[name]
+
     def of(self, name: str) -> Array:
-        """(6,) standard uncertainties by one contributor."""
-        std: Array = next(each.std for each in self.contributors if each.name == name)
-        return std
+        """(6,) standard uncertainties by one contributor. Raises KeyError as `line` does."""
+        return self.line(name).std
+
+    def without(self, names: Collection[str]) -> "Budget":
+        """The budget without contributors of these names."""
+        return replace(self, contributors=tuple(each for each in self.contributors if each.name not in names))
 
     @property
     def coverage_factors(self) -> Array:
@@ -229,7 +239,7 @@ def _of_times(seen: Seen, unknown: Unknown, turned: Array, of: Callable[[Array],
     each_turn = np.eye(len(turned))[:, :, None]
     jitter = each_turn * (unknown.state_jitter_s * each_end[:, None] * turned)[None]
     source = "scatter of the joint angles"
-    yield _found("times of the arm's states", source, of(jitter), unknown.state_jitter_freedom)
+    yield _found(STATES, source, of(jitter), unknown.state_jitter_freedom)
     if unknown.stamp_std_s:
         # A mean over a window that lies elsewhere holds other rates at its ends: those of the ripple.
         moved = each_turn * ((unknown.stamp_std_s * each_end * seen.ripples)[:, None] * turned)[None]
@@ -254,13 +264,13 @@ def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
     """What the readings contribute: their noise, and a bias that does not stand still."""
     bias, (flicker, wandering) = explained.bias, _of_bias(explained)
     noise = explained.solution.covariance - flicker - wandering
-    yield _found("noise", "scatter of the readings", noise, _noise_freedom(explained))
+    yield _found(NOISE, "scatter of the readings", noise, _noise_freedom(explained))
     if bias.found:
         source = "scatter of rests and sweeps about each other"
-        yield _found("bias instability", source, wandering, float(bias.freedom))
+        yield _found(WANDERING, source, wandering, float(bias.freedom))
     if bias.instability_rad_s:
         source = f"least Allan deviation: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
-        yield Contributor("flicker of the bias", "B", "normal", None, "", source, np.inf, flicker)
+        yield Contributor(FLICKER, "B", "normal", None, "", source, np.inf, flicker)
 
 
 def _of_bias(explained: Explained) -> tuple[Array, Array]:

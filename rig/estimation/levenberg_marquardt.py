@@ -24,14 +24,12 @@ REMEDY = "Sweep every wrist in both directions; a second sweep in one direction 
 class LevenbergMarquardtSolution:
     """Scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b).
 
-    `residuals_rad2_s2` (N,): ω² less the squared norm of the calibrated reading. `iterations` counts evaluations of the
-    model. `rank` and `condition` are those of the scaled design.
+    `iterations` counts evaluations of the model. `rank` and `condition` are those of the scaled design.
     """
 
     scale: Array
     bias_rad_s: Array
     covariance: Array
-    residuals_rad2_s2: Array
     observations: int
     rank: int
     condition: float
@@ -102,7 +100,6 @@ def solve_levenberg_marquardt(
         scale=theta[:3],
         bias_rad_s=theta[3:],
         covariance=(gain * variance) @ gain.T,
-        residuals_rad2_s2=residuals,
         observations=len(means),
         rank=told.rank,
         condition=told.condition,

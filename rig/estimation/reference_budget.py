@@ -13,10 +13,12 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError, effects, whitening_with
-from rig.estimation.budget import Budget, Contributor
+from rig.estimation.budget import NOISE, Budget, Contributor
 from rig.estimation.coverage import COVERAGE_FACTOR, effective_freedom
 from rig.estimation.reference_model import BIAS, F, covariance_bound, jacobian
 from rig.estimation.sensor_axes import parameter_jacobian
+
+ATTITUDES = "arm's attitudes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +103,9 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     """What the readings tell, how well the reference's size is known, and what else there is."""
     noise = spread.response @ spread.noise @ spread.response.T
     told = [
-        _found("noise", "scatter of the readings", noise, spread.known_noise),
+        _found(NOISE, "scatter of the readings", noise, spread.known_noise),
         _found(
-            "arm's attitudes",
+            ATTITUDES,
             "what the readings say of them",
             spread.covariance - noise,
             freedom_of(spread.attitude_error),

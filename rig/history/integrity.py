@@ -29,11 +29,6 @@ class Found:
     state: State
     why: str = ""
 
-    @property
-    def wrong(self) -> bool:
-        """Whether something is lost or not what it was."""
-        return self.state in ("changed", "missing")
-
 
 def examined(history: History) -> Iterator[Found]:
     """Rows against the journal, every run's against its result, files against their hashes where they were seen last.

@@ -16,10 +16,8 @@ from rig.observation.average import Stream, between
 from rig.observation.averaging import dwelling_of
 from rig.observation.known_motion import Motion
 from rig.observation.mean import Mean
-from rig.observation.windows import Dwelt, Window, dwelt
+from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Dwelt, Window, dwelt
 
-MAX_DWELL_TRAVEL_RAD = 1e-3  # of any joint, while it stands
-MIN_DWELL_SAMPLES = 20
 LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
 
 
@@ -136,7 +134,7 @@ def _check_standing(motion: Motion, window: Window, where: str) -> None:
             f"in {where} the arm's states are missing",
             "Check the network to the robot and the load of this computer, then repeat the run",
         )
-    if moved_rad > MAX_DWELL_TRAVEL_RAD:
+    if moved_rad > MAX_TRAVEL_AT_REST_RAD:
         raise Fault(
             "arm_moved_in_dwell",
             f"in {where} a joint moved by {np.degrees(moved_rad):.2f}°",
@@ -150,10 +148,10 @@ def check_complete(samples: NDArray[Any], where: str, settings: ObservationThres
     if count:
         sequence = samples["sequence"].astype(np.int64)
         lost = int(sequence[-1] - sequence[0]) + 1 - count
-    if count < MIN_DWELL_SAMPLES or lost > settings.max_lost_fraction * (count + lost):
+    if count < MIN_SAMPLES_AT_REST or lost > settings.max_lost_fraction * (count + lost):
         raise Fault(
             "lost_samples",
             f"in {where} there are {count} samples and {lost} are missing, "
-            f"{100 * settings.max_lost_fraction:g} % may be missing, and {MIN_DWELL_SAMPLES} are needed",
+            f"{100 * settings.max_lost_fraction:g} % may be missing, and {MIN_SAMPLES_AT_REST} are needed",
             "Check the cable to the board and the load of this computer, or dwell longer",
         )

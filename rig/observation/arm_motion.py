@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
@@ -22,11 +23,10 @@ from rig.motion.geometry import (
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Sweep
 from rig.observation.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
-from rig.observation.known_motion import check_span, closely_followed, not_finite
+from rig.observation.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.windows import Window
 
-MIN_RATE_RAD_S = 0.01
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
 PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
@@ -166,24 +166,23 @@ class ArmMotion:
 def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:
     """What turned in a recording, as it moves the item; `turned` (3, 3) is by how that sits off its nominal mount.
 
-    Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`.
+    Raises as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`.
     """
-    refuse_elsewhere(run)
-    turner = run.turner
-    assert turner is not None, "of what was not recorded elsewhere"
+    turner = turner_of(run)
     mount = np.array(run.settings.mount)
     mount = mount if turned is None else turned @ mount
     return ArmMotion(run.states, turner.geometry, turner.joints, mount, turner.reading_std_rad)
 
 
-def refuse_elsewhere(run: RunData) -> None:
-    """Nobody asks readings from elsewhere what an arm did. Raises Refused `recorded_elsewhere`."""
-    if run.elsewhere is not None:
+def turner_of(run: RunData) -> RecordedTurner:
+    """What turned in a recording. Raises Refused `recorded_elsewhere`: nobody asks files what an arm did."""
+    if run.turner is None:
         raise Refused(
             "recorded_elsewhere",
             "no arm turned the sensor: its readings come from a file, and its motion from another file",
             "Give the recording of an arm; for a command that uses readings alone, give the file",
         )
+    return run.turner
 
 
 def check_arms_times(states: NDArray[Any]) -> None:

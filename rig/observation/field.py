@@ -2,19 +2,21 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.channel import Channel
 from rig.data.quantity import FIELD
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import MIN_DWELL_SAMPLES, DwellReading, check_complete
+from rig.observation.acceleration import DwellReading, check_complete
 from rig.observation.mean import Mean, even_mean
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import Window, rested
+from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
 SETTLING_S = 0.2  # kept away from either end of a rest
@@ -49,11 +51,12 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
     other = beside(recording, name)
     if other is None:
         return ()
+    channel, inside = recording.run.sensors[name].channel(FIELD), partial(_inside, recording, name, other)
     return tuple(
         FieldReading(
             dwell.index,
             dwell.name,
-            _mean(recording, name, dwell.window, f"dwell {dwell.index} ({dwell.name})", thresholds),
+            _mean(channel, inside(dwell.window), f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds),
             dwell.attitude,
             dwell.window,
         )
@@ -78,15 +81,17 @@ def field_tests(
 
     One of fewer samples than a dwell needs is none: the last samples of a run may still be on their way when it ends.
     """
-    if beside(recording, name) is None:
+    other = beside(recording, name)
+    if other is None:
         return ()
+    channel, inside = recording.run.sensors[name].channel(FIELD), partial(_inside, recording, name, other)
     windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
     return tuple(
-        _mean(recording, name, window, "a field test", thresholds)
+        _mean(channel, inside(window), f"a field test of {name}", thresholds)
         for window in windows
         if window.end_s > window.start_s
         and _at_home(recording, window, home_q_rad)
-        and len(_inside(recording, name, window)) >= MIN_DWELL_SAMPLES
+        and len(inside(window)) >= MIN_SAMPLES_AT_REST
     )
 
 
@@ -95,10 +100,7 @@ def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) 
     return away_rad is not None and away_rad < AT_HOME_RAD
 
 
-def _mean(recording: ObservedRun, name: str, window: Window, what: str, thresholds: ObservationThresholds) -> Mean:
-    channel = recording.run.sensors[name].channel(FIELD)
-    where = f"{what} of {name}"
-    inside = _inside(recording, name, window)
+def _mean(channel: Channel, inside: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
     check_complete(inside, where, thresholds)
     if channel.saturated(inside).any():
         raise Fault(
@@ -109,10 +111,8 @@ def _mean(recording: ObservedRun, name: str, window: Window, what: str, threshol
     return even_mean(channel.values(inside), channel.resolution)
 
 
-def _inside(recording: ObservedRun, name: str, window: Window) -> NDArray[Any]:
-    """The samples (n,) in it."""
-    other = beside(recording, name)
-    assert other is not None, "asked for only where there is one"
+def _inside(recording: ObservedRun, name: str, other: str, window: Window) -> NDArray[Any]:
+    """The samples (n,) of `name` in a window of the arm's clock, by the sensor `other` that is stamped with it."""
     ends = np.searchsorted(recording.time_s(name, other), [window.start_s, window.end_s])
     inside: NDArray[Any] = recording.run.samples[name][slice(*ends.tolist())]
     return inside

@@ -12,6 +12,7 @@ from rig.motion.steps import Sweep
 from rig.observation.revolution import Revolution
 from rig.observation.windows import Window
 
+MIN_RATE_RAD_S = 0.01  # slower all the time, nothing has turned
 MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
 
 

@@ -32,13 +32,11 @@ from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import Finished, Window, rested, swept
+from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Finished, Window, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
-MAX_REST_TRAVEL_RAD = 1e-3
 MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
-MIN_REST_SAMPLES = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
 
 
@@ -165,7 +163,7 @@ def standing(motion: Motion, rest: Window) -> Window | None:
     """A rest without its beginning and its end; None where the arm moved in it or too few states tell."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.moved_rad(still)
-    return still if moved_rad is not None and moved_rad <= MAX_REST_TRAVEL_RAD else None
+    return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
 
 
 def _revolution(
@@ -266,7 +264,7 @@ def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) 
     if still is None:
         return None
     inside = between(stream, still.start_s, still.end_s)
-    if inside.stop - inside.start < MIN_REST_SAMPLES:
+    if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     readings = stream.readings_rad_s[inside]
     count = stream.sensor.channel(RATE).resolution_of(readings)

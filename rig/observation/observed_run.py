@@ -11,7 +11,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
-from rig.observation.arm_motion import ArmMotion, motion_of, refuse_elsewhere
+from rig.observation.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
@@ -107,10 +107,10 @@ def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATE
     """Every recording of one run that adds a finished sweep or dwell; one that several hold counts in the last one.
 
     The thresholds are those of the first recording; `turned` is as of `observe_run`, by the stage of the procedure.
-    Raises as `refuse_elsewhere`; Fault as `observe_run` does.
+    Raises as `turner_of`; Fault as `observe_run` does.
     """
     for run in runs:
-        refuse_elsewhere(run)
+        turner_of(run)
     return tuple(
         observe_run(run, runs[0].settings.observation, _repeated(runs, place), turned.get(run.settings.stage))
         for place, run in enumerate(runs)

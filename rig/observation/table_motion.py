@@ -5,11 +5,10 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.known_motion import closely_followed
+from rig.observation.known_motion import MIN_RATE_RAD_S, closely_followed
 
 MAX_STEP_S = 0.05  # between rows that still show how the table turned
 MIN_ROWS = 20
-MIN_RATE_RAD_S = 0.01
 
 
 class TableMotion:

@@ -16,6 +16,8 @@ from rig.data.events import (
 from rig.data.run_file import RunData
 from rig.motion.steps import Dwell, Sweep
 
+MAX_TRAVEL_AT_REST_RAD = 1e-3  # of any joint, while it stands
+MIN_SAMPLES_AT_REST = 20
 Ending = TypeVar("Ending", bound=Event)
 
 

@@ -3,11 +3,11 @@
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import quantities
-from rig.data.meaning import Meaning
+from rig.data.meaning import HELD, limit_held
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
@@ -16,7 +16,6 @@ from rig.report.kinds.registry import shown
 from rig.report.rounding import in_print
 from rig.station.events import Since
 
-PARAMETERS: Final = ("scale", "bias")
 Row = dict[str, Any]
 
 
@@ -25,10 +24,9 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
 
     `parts` are the sensors' parts and serial numbers.
     """
-    limits = {check.means: check.limit for check in result.checks}
     rows = []
     for found in shown(result):
-        scale, bias = (limits.get(Meaning("conformity", found.sensor, found.quantity.name, of)) for of in PARAMETERS)
+        scale, bias = (limit_held(result.checks, found.sensor, found.quantity.name, of) for of in HELD)
         if found.scale is None:  # limits are those of a calibration
             bias = None
         rows.append(

@@ -325,10 +325,9 @@ class _ByHand:
         return Candidate(procedure, (), (flips, turns, rest_s), lasting_s)
 
     def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
-        section = candidate.procedure
-        assert isinstance(section, ByHandSection)
+        flips, turns, rest_s = candidate.sizes
         try:
-            moves = list(listed(Asked(section.flips, section.turns)))
-            return Budgets(predicted_by_hand(self.config, moves, section.rest_s, endless=endless))
+            moves = list(listed(Asked(int(flips), int(turns))))
+            return Budgets(predicted_by_hand(self.config, self.section, moves, rest_s, endless=endless))
         except Fault:
             return None

@@ -18,6 +18,7 @@ from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.arrays import scale_of
+from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.known_increments import EarthSeen
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import REFERENCE, SECOND, F
@@ -168,9 +169,7 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, attitudes: InAttitudes, 
         budget=budget_entry(attitudes.budget),
         non_orthogonality_rad=axes.non_orthogonality_rad,
         non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
-        attitude_error_rad=None if error is None else error.std_rad,
-        attitude_error_std_rad=error.uncertainty_rad if error is not None and np.isfinite(error.uncertainty_rad)
-        else None,
+        **attitude_error(error),
         correction_matrix=axes.correction_matrix,
         laid_down=LaidDownEntry(
             placement_std=None if laid is None else laid.placement_std,
@@ -185,8 +184,17 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, attitudes: InAttitudes, 
     )  # fmt: skip
 
 
+def attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
+    """How far the attitudes are off about each axis, and how well that is known; none by a method that holds them."""
+    if error is None:
+        return {"attitude_error_rad": None, "attitude_error_std_rad": None}
+    known = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
+    return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": known}
+
+
 def _dwells(kind: Any, quantity: Quantity, attitudes: InAttitudes) -> list[Any]:
-    assert attitudes.seen is not None, "of placements"
+    if attitudes.seen is None:  # of rows there are no placements
+        return []
     expected = attitude_residual_std(attitudes.solution, attitudes.seen)
     rows = zip(attitudes.dwells, attitudes.solution.residuals, expected, strict=True)
     return [dwell_entry(kind, quantity, *each) for each in rows]

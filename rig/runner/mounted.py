@@ -109,13 +109,14 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
     doubtful = mounted.doubtful
     if not doubtful:
         return
+    said = [_elsewhere(each, each.elsewhere) for each in doubtful if each.elsewhere is not None]
     numbers = ", ".join(each.serial_number for each in doubtful)
     another = (
         "If this is another sensor, its serial number in the configuration is wrong, and this calibration would be "
         "taken for one of the other sensor."
     )
     question = Prompt(
-        (*map(_elsewhere, doubtful), another),
+        (*said, another),
         f"go on with {numbers} on another board",
         to_tick=f"I have looked: the serial number is {numbers}, on another board than before",
         for_a_person=True,
@@ -125,14 +126,13 @@ def ask_of_other_boards(mounted: Mounted, station: Station) -> None:
         stated = " ".join(f"--other-board {each.serial_number}" for each in doubtful)
         raise Refused(
             "other_board",
-            "; ".join(_elsewhere(each).rstrip(".") for each in doubtful),
+            "; ".join(each.rstrip(".") for each in said),
             f"Correct {wrong}; or, where a sensor was moved to this board, state that: {stated}",
         )
 
 
-def _elsewhere(sensor: MountedSensor) -> str:
-    assert sensor.elsewhere is not None
+def _elsewhere(sensor: MountedSensor, last: CalibratedBefore) -> str:
     return (
-        f"{sensor.part} {sensor.serial_number} was last calibrated {sensor.elsewhere.words} on ANOTHER board, "
-        f"{sensor.elsewhere.board_unique_id}; this one is {sensor.board}."
+        f"{sensor.part} {sensor.serial_number} was last calibrated {last.words} on ANOTHER board, "
+        f"{last.board_unique_id}; this one is {sensor.board}."
     )

@@ -9,7 +9,6 @@ import pytest
 from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.check import Check
-from rig.analysis.contradictions import DISTURBED as NAMED
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
 from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
@@ -206,7 +205,7 @@ def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     outcome = calibrated([run])
     assert not outcome.passed
     named = [check.name for check in outcome.checks if check.means.sweep is not None]
-    assert named == [f"gyro.{NAMED}.2", f"gyro.{NAMED}.3"]
+    assert named == ["gyro.disturbed_sweep.2", "gyro.disturbed_sweep.3"]
     assert disturbed_sweeps([run]) == {2, 3}
 
 

@@ -7,6 +7,7 @@ import yaml
 from rig.analysis.acceleration import calibrate_accelerometers
 from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
+from rig.analysis.contradictions import disturbed_sweeps
 from rig.errors import Fault
 from support.damaged_accelerations import (
     Damage,
@@ -154,6 +155,14 @@ def test_the_disturbed_dwell_is_named_and_fails_the_verdict() -> None:
     outcome = calibrated([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()])
     assert not outcome.passed
     assert [check.name for check in outcome.checks if not check.passed] == ["gyro.acceleration_disturbed_dwell.15"]
+
+
+def test_a_sweep_that_only_the_accelerometer_feels_to_be_disturbed_is_repeated_as_one_of_a_gyroscope_is() -> None:
+    run = offset(0.02, sweep_4)(readings_of(IMU, "gyro")).recording()
+    failed = {check.name: check.means.sweep for check in calibrated([run]).checks if not check.passed}
+    assert failed == {"gyro.acceleration_disturbed_sweep.4": 4, "gyro.acceleration_residuals": None}
+    assert disturbed_sweeps([run]) == {4}
+    assert disturbed_sweeps([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()]) == frozenset()
 
 
 def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:

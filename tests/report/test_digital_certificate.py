@@ -259,12 +259,21 @@ def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid()
     assert "Simulated laboratory" in simulated.decode()
 
 
+def half_known() -> ResultDocument:
+    """A result that says which parts its uncertainty has, and not what they come to."""
+    document = with_accelerometer()
+    of_all = document.accelerometers.items()
+    halves = {name: each.model_copy(update={"covariance_combined": None}) for name, each in of_all}
+    return document.model_copy(update={"accelerometers": halves})
+
+
 @pytest.mark.parametrize(
     ("refused", "why"),
     [
         (lambda: certificate(read_result(FIXTURES / "calibration")), "only the noise part of the uncertainty"),
         (lambda: certificate(result().model_copy(update={"sensors": {}})), "calibrated nothing"),
         (lambda: certificate(stated=Stated()), "country is not stated"),
+        (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),
     ],
 )
 def test_what_cannot_be_certified_is_refused(refused, why: str) -> None:  # type: ignore[no-untyped-def]

@@ -1,15 +1,19 @@
 """The end of a run fits a screen, says what matters in words, and its last line is the verdict."""
 
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+from rig.analysis.check import Check
+from rig.analysis.verdict import fitness
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
-from rig.report.check_words import check_words, words_of
+from rig.report.check_words import check_words, what_failed, words_of
 from rig.report.checks_page import page_text
 from rig.report.ending import ending
+from rig.report.entry import entry
 from rig.report.glossary_page import page_text as glossary_text
 from support.ended_runs import ONE, RECORDINGS, failed, of_three_parts
 from support.paths import DOCS, FIXTURES
@@ -24,6 +28,10 @@ def ended(result: ResultDocument, width: int = 80) -> list[str]:
     since = SINCE if len(result.sensors) > 2 else SINCE[:1]
     everything, certificate = f"rig show {RUN} --all", RUN / "certificate.html"
     return [*ending(result, folder=RUN, everything=everything, certificate=certificate, since=since, width=width)]
+
+
+def entry_of(check: Check) -> CheckEntry:
+    return entry(CheckEntry, check, coverage_factor=None, **asdict(check.means))
 
 
 ALL = [check.name for check in of_three_parts().checks]
@@ -87,6 +95,16 @@ def test_what_failed_is_said_in_words_with_a_command_that_can_be_copied() -> Non
     assert f"rig solve {RUN} --set limits.scale_deviation=VALUE" in text
     text = " ".join(" ".join(ended(failed(ONE, "gyro.disturbed_sweep"))).split())
     assert "one sweep contradicts the others" in text and f"rig resume {RUN}" in text
+
+
+def test_a_check_of_another_quantity_has_the_same_words_and_no_limit_that_nobody_can_set() -> None:
+    for quantity in ("inclination", "field"):
+        beyond, unlike = (fitness("tilt", quantity, what, 2.0, 1.0) for what in ("bias", "residuals"))
+        said = what_failed(entry_of(beyond), Path("run"))
+        assert said == "a bias is beyond its limit; the measurement is sound. Use another part"
+        assert (what_failed(entry_of(unlike), None) or "").startswith("an axis in a sweep or dwell has other readings")
+    as_spelt = fitness("gyro.bias", "inclination", "scale_std", 2.0, 1.0)
+    assert (what_failed(entry_of(as_spelt), None) or "").startswith("the uncertainty of a scale factor is above")
 
 
 def test_what_came_near_its_limit_is_named() -> None:

@@ -68,6 +68,7 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     assert said.startswith("inclinometer imu I-1, tilt2") and said.splitlines()[-1] == "verdict: PASS"
     whole = ran(installed, "-m", "rig", "show", run, "--all")
     assert "imu: inclinometer, m = φ / k + b" in whole and "inclination_residuals" in whole
+    assert ran(installed, "-m", "rig", "explain", "imu.inclination_residuals").startswith("residuals: a check of the ")
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     entry = result["others"]["inclinometers"]["imu"]
     std = np.sqrt(np.diag(entry["covariance"]))

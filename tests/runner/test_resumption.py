@@ -14,8 +14,9 @@ from rig.analysis.calibration import observe_recordings
 from rig.data.events import BoardObserved, Recorded
 from rig.data.run_file import RunData, read_run
 from rig.observation.windows import swept
-from rig.plans.script_file import installed_script
+from rig.plans.script_file import ScriptFile, installed_script
 from rig.runner.resumption import resumption
+from support import damaged_accelerations
 from support.commands import configuration, rig
 from support.damaged_readings import offset, readings_of, replaced
 from support.synthetic_run import Setup
@@ -48,6 +49,20 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     damaged = offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP))
     run = known_to_the_board(damaged.recording())
     assert resumption([run], run.settings, SCRIPT).done == {0, 1, 2, 3}
+
+
+@pytest.mark.slow
+def test_a_sweep_that_only_the_accelerometer_contradicts_is_repeated() -> None:
+    sound = damaged_accelerations.readings_of("rig.settings-6/imu", "gyro")
+    damaged = damaged_accelerations.offset(0.02, lambda seen: seen.sweep(4))(sound)
+    script = installed_script("imu")
+    before, run = (by_script(each.recording(), script) for each in (sound, damaged))
+    done = resumption([before], run.settings, script).done
+    assert 4 in done and resumption([run], run.settings, script).done == done - {4}
+
+
+def by_script(run: RunData, script: ScriptFile) -> RunData:
+    return replace(run, provenance=replace(run.provenance, script_sha256=script.sha256))
 
 
 @pytest.mark.slow

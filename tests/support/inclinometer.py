@@ -14,10 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.check import Check
 from rig.analysis.of_kinds import OfKind
 from rig.analysis.outcome import Outcome
-from rig.data.meaning import Meaning
+from rig.analysis.verdict import fitness
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import Entry
@@ -94,8 +93,7 @@ def solve(name: str, placements: Placements, site: Site) -> OfKind:
         turn = np.diag([-1 / slope**2, 1.0])
         covariance[np.ix_((i, 2 + i), (i, 2 + i))] = turn @ spread @ turn
     left = means - (rise / scale + bias)
-    held = Check(f"{name}.inclination_residuals", float(np.abs(left).max()), 0.01, "rad",
-                 Meaning("fitness", name, INCLINATION.name))  # fmt: skip
+    held = fitness(name, INCLINATION.name, "residuals", float(np.abs(left).max()), 0.01, unit="rad")
     return OfKind(Solution(scale, bias, covariance, left), (held,))
 
 

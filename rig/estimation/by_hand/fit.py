@@ -60,13 +60,12 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
     Raises Fault `no_fit`, Refused `first_face_not_told`.
     """
     biases = np.array([rest.mean_rad_s for rest in session.rests])
-    found, state = STATED, None
+    found = STATED
     begun = Taken(np.eye(3), biases, np.zeros((3, 3)), np.zeros(6))
     seen = moved(session, begun, np.tile([0.0, 0.0, 1.0], (len(biases), 1)))
     on = faced(session, told, seen)
-    iterations, settled = 0, False
+    state, iterations, settled = _start(seen, on, begun), 0, False
     while iterations < PASSES and not settled:
-        state = _start(seen, on, begun) if state is None else state
         rows = tuple(factors(Graph(session, on, told, state, seen, found)))
         step, covariance = solved(rows)
         for _ in range(SIZED if iterations else 0):
@@ -78,7 +77,6 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
         state, iterations = state.stepped(step), iterations + 1
         settled = iterations > 2 and bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
         seen = moved(session, state.taken, state.attitudes[:, 2])
-    assert state is not None
     rows = tuple(factors(Graph(session, on, told, state, seen, found)))
     _, covariance = solved(rows)
     chi_square, freedom = left(rows, covariance)

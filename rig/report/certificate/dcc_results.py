@@ -10,8 +10,9 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import SensorEntry, VerificationEntry
-from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
+from rig.data.result_types import ErrorEntry, Freedom, Matrix6, ToldFromEntry, WhenEntry
 from rig.data.temperature_entries import OverTemperatureEntry
+from rig.errors import Refused
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
 from rig.estimation.six_observation import PARAMETERS
 from rig.report.certificate.coverage_words import coverage_sentence
@@ -32,15 +33,14 @@ SOLUTION = "± U of the solution"
 
 def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
     """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
-    budget = sensor.budget
-    assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
+    budget, covariance = _known_whole(sensor)
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
     yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{_told(sensor.told_from)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
     yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE.d_si], expanded=bias))  # fmt: skip
-    yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE.d_si)
+    yield _joint([*sensor.scale, *sensor.bias_rad_s], covariance, RATE.d_si)
 
 
 def accelerometer(entry: AccelerometerEntry) -> Iterator[Element]:
@@ -148,13 +148,23 @@ def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
 def _relative(
     entry: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, statement: str, how: str = ""
 ) -> Iterator[Element]:
-    budget = entry.budget
-    assert budget is not None and entry.covariance_combined is not None  # or there is no digital certificate
+    budget, covariance = _known_whole(entry)
     statement = f"{statement} {_at(entry.found_at)}{_told(entry.told_from)}{coverage_sentence(budget)}"
     scale, bias = _expanded(budget)
     yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
-    yield _joint(numbers, entry.covariance_combined, unit, how)
+    yield _joint(numbers, covariance, unit, how)
+
+
+def _known_whole(entry: SensorEntry | AccelerometerEntry | MagnetometerEntry) -> tuple[BudgetEntry, Matrix6]:
+    """The budget and the covariance that combines it. Raises Refused `no_digital_certificate` where one is missing."""
+    if entry.budget is None or entry.covariance_combined is None:
+        raise Refused(
+            "no_digital_certificate",
+            f"only a part of the uncertainty of {entry.part} {entry.serial_number} is known",
+            "Calibrate with the vector model, as `rig run` does, and a configuration of this version",
+        )
+    return entry.budget, entry.covariance_combined
 
 
 def _at(when: WhenEntry | None) -> str:

@@ -134,8 +134,9 @@ def skew_rows(angles_rad: Sequence[float], widths_rad: Sequence[float]) -> list[
 
 
 def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
-    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with U."""
-    assert vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None
+    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with U; none if not looked for."""
+    if vector.g_sensitivity_rad_s_per_m_s2 is None or vector.g_sensitivity_std_rad_s_per_m_s2 is None:
+        return []
     freedom = vector.g_sensitivity_freedom or (None, None, None)
     rows = zip(
         AXES, vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, freedom, strict=True

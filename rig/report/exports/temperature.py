@@ -22,8 +22,7 @@ WATCHED = (RATE, ACCELERATION)  # whose biases a run of `bias_drift` follows
 def at_temperature(calibrations: Calibrations, drift: ResultDocument, temperature_c: float) -> Calibrations:
     """The calibrations with biases as they are at that temperature, by the slopes in `drift`.
 
-    Raises Refused `another_sensor`, `temperature_slope_unknown`,
-    `temperature_outside`.
+    Raises Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
     """
     _check_same(calibrations.result, drift)
     sensors = tuple(

@@ -27,7 +27,7 @@ from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
-from rig.report.elsewhere_entries import magnetometers_elsewhere
+from rig.report.elsewhere_entries import attitude_error, magnetometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.kinds.followed import Further
 from rig.report.kinds.kind import Standard
@@ -54,8 +54,7 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
     """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
-    solution, error = result.solution, result.solution.attitude_error
-    assert error is not None, "the method finds it"
+    solution = result.solution
     expected = attitude_residual_std(solution, result.seen)
     return entry(
         MagnetometerEntry, result, result.sensor, solution,
@@ -73,8 +72,7 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
         hard_iron_t=hard_iron(solution),
         field_base_t=solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
-        attitude_error_rad=error.std_rad,
-        attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
+        **attitude_error(solution.attitude_error),
         dwells=[
             dwell_entry(FieldDwellEntry, FIELD, *each)
             for each in zip(result.dwells, solution.residuals, expected, strict=True)

@@ -92,11 +92,10 @@ class BuiltInTest:
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """What bytes held: `messages` (n,) MESSAGE_DTYPE in order, built-in tests, and how many bytes were neither."""
+    """What bytes held: `messages` (n,) MESSAGE_DTYPE in order, and built-in tests."""
 
     messages: NDArray[Any]
     tests: tuple[BuiltInTest, ...]
-    discarded_bytes: int
 
 
 class MessageReader:
@@ -114,7 +113,7 @@ class MessageReader:
         backwards = memoryview(data.translate(_BITS_REVERSED))
         starts: dict[bytes, list[int]] = {header: [] for header in _HEADERS.values()}
         tests: list[BuiltInTest] = []
-        place = used = 0
+        place = 0
         while (found := _ANY_HEADER.search(data, place)) is not None:
             header, begun = found.group(), found.start()
             length = _LENGTHS[header]
@@ -131,13 +130,12 @@ class MessageReader:
             elif sum(data[begun : begun + length - 1]) % 256 == data[begun + length - 1]:
                 tests.append(BuiltInTest(data[begun + _HEADER_BYTES : begun + length - 1]))
                 place += length
-            used += place - begun
             if place == begun:  # damaged
                 place += 1
         else:
             place = max(place, len(data) - _HEADER_BYTES + 1)  # a header may have begun
         self._rest = data[place:]
-        return Decoded(_decoded(data, starts), tuple(tests), place - used)
+        return Decoded(_decoded(data, starts), tuple(tests))
 
 
 def encode(

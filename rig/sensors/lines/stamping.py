@@ -6,7 +6,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection
+from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection, LineTimeSection
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
@@ -79,7 +79,7 @@ class Stamper:
         passed_s = np.zeros(len(values))
         steps = np.ones(len(values), np.int64)
         if self.section.time is not None:
-            passed_s = self._passed_s(values[:, columns.index("time")])
+            passed_s = self._passed_s(values[:, columns.index("time")], self.section.time)
             steps = np.maximum(np.rint(passed_s * self.rate_hz), 1).astype(np.int64)
         elif "sequence" not in columns:
             steps[0] += skipped  # a line that was no sample was one, most likely
@@ -95,9 +95,8 @@ class Stamper:
             steps = np.where(np.abs(moved) < 2.0**53, moved, -1).astype(np.int64)
         return passed_s, steps
 
-    def _passed_s(self, printed: Array) -> Array:
-        assert self.section.time is not None
-        unit_s, wrap = SECONDS[self.section.time.unit], self.section.time.wrap
+    def _passed_s(self, printed: Array, column: LineTimeSection) -> Array:
+        unit_s, wrap = SECONDS[column.unit], column.wrap
         before = printed[0] if self._last_time is None else self._last_time
         passed = np.diff(printed, prepend=before)
         if wrap:

@@ -59,8 +59,8 @@ def _stance(report: ServoReport) -> str:
 
 
 def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport | None) -> list[Problem]:
-    problems = [problem for plan in plans for problem in step_problems(plan)]
-    motions = plans[-1].motions if plans else ()
+    problems = list(dict.fromkeys(problem for plan in plans for problem in step_problems(plan)))
+    motions = [motion for plan in plans for motion in plan.motions]  # of which one of each kind is told
     if report is None:
         return [*problems, *move_problems(motions, named(section.model).no_load_rad_s)]
     return [

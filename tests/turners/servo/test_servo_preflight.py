@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 import serial
 
+from rig.config.servo_section import ServoSection
 from rig.errors import Refused
 from rig.motion.carried import Carried
+from rig.motion.steps import Plan, Transfer
 from rig.turners.servo.driver import Servo
+from rig.turners.servo.kind import SERVO
 from rig.turners.servo.latency import lower_latency
 from rig.turners.servo.preflight import servo_problems
 from rig.world.servo.truth import LineTruth, ServoTruth
@@ -82,6 +85,17 @@ def test_a_board_too_far_from_the_shaft_is_refused() -> None:
     assert servo_problems(report, MODEL, replace(heavy, centre_m=(0.0, 0.0, 0.1)), 0.1) == []
     held_fast = replace(report, torque_on=True, operating_mode=3)
     assert [each.name for each in servo_problems(held_fast, MODEL, BOARD, 0.1)] == ["servo_torque_on"]
+
+
+def test_of_a_run_that_goes_on_the_movements_behind_it_are_judged_too_and_nothing_is_told_twice() -> None:
+    """They are made again in the verification that follows."""
+    section = ServoSection(port="/dev/ttyUSB0", model=MODEL, payload_kg=0.1)
+    fast = Transfer("ahead", (0.0,), (6.0,), speed_rad_s=50.0, acceleration_rad_s2=500.0, duration_s=0.22)
+    nowhere = Transfer("nowhere", (6.0,), (6.0,), speed_rad_s=1.0, acceleration_rad_s2=1.0, duration_s=0.0)
+    whole = Plan((fast, nowhere), start_q_rad=(0.0,), home_q_rad=(0.0,))
+    for rest in (whole, replace(whole, steps=(nowhere,))):
+        told = [each.name for each in SERVO.problems([whole, rest], section, None)]
+        assert sorted(told) == ["no_duration", "no_travel", "servo_too_fast"]
 
 
 def test_the_latency_timer_of_an_ftdi_adapter_is_set_or_refused_by_name(tmp_path: Path) -> None:

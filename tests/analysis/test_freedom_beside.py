@@ -1,0 +1,30 @@
+"""Degrees of freedom of angles beside scale and bias come from lines of the budget, none of which may be missed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.freedom_beside import of_acceleration_angles, of_angles
+from rig.estimation.budget import NOISE, WANDERING, Budget
+from rig.estimation.reference_budget import ATTITUDES
+from rig.plans.recorded import judged, open_run
+from support.frozen import RECORDINGS
+
+
+@pytest.mark.slow
+def test_a_line_that_angles_have_their_freedom_of_is_there_or_told_to_be_missing() -> None:
+    outcome = judged(open_run(RECORDINGS / "rig.settings-7" / "imu"))
+    (gyroscope, *_), (accelerometer, *_) = outcome.results.values(), outcome.accelerometers.values()
+    assert gyroscope.uncertainty is not None and accelerometer.budget is not None
+    for found in (of_angles(gyroscope), of_acceleration_angles(accelerometer)):
+        assert found is not None and np.isfinite(found).all()
+    with pytest.raises(KeyError, match=NOISE):
+        of_angles(replace(gyroscope, uncertainty=gyroscope.uncertainty.without([NOISE])))
+    with pytest.raises(KeyError, match=ATTITUDES):
+        of_acceleration_angles(replace(accelerometer, budget=accelerometer.budget.without([ATTITUDES])))
+
+
+def test_a_budget_tells_that_it_has_no_such_line() -> None:
+    with pytest.raises(KeyError, match=WANDERING):
+        Budget(()).of(WANDERING)

@@ -1,0 +1,9 @@
+"""Numbers that a configuration is refused by are those that its recording is judged by, where each room has its own."""
+
+from rig.config import judging_sections, procedure_sections
+from rig.estimation import earth_rate, over_temperature
+
+
+def test_a_configuration_is_refused_by_the_numbers_that_its_recording_would_be() -> None:
+    assert procedure_sections.MIN_RANGE_C == over_temperature.MIN_RANGE_C
+    assert judging_sections.MIN_LEVEL == earth_rate.MIN_LEVEL
