@@ -236,8 +236,7 @@ def turned_by(stretch: Stretch, steps: int) -> Array:
     for joint, first in _waves_of(motion).items():
         if np.ptp(q_rad[:, joint]) < STANDS_RAD:
             continue
-        for here, by in zip(middle, moved[:, joint], strict=True):
-            off[: len(AXIS_ERRORS)] += by * motion.axis_errors(here, joint)
+        off[: len(AXIS_ERRORS)] += np.tensordot(moved[:, joint], motion.axis_errors(middle, joint), axes=1)
         waves = [wave(times * q_rad[:, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
         off[first : first + len(WAVES)] += np.diff(waves) @ axes[:, :, joint]
     return off / (stretch.end_s - stretch.start_s)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.pieces import Window
 from rig.estimation.arrays import Array
-from rig.observation.coloured_noise import predicted
+from rig.observation.coloured_noise import innovations
 from rig.observation.sound_steps import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
@@ -78,8 +78,7 @@ def _innovation(readings: Array) -> float:
     """Standard deviation of the error of the best linear prediction from the `MEMORY` readings before."""
     if len(readings) < 4 * MEMORY:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
-    _, innovations = predicted(readings, MEMORY)
-    return float(1.4826 * np.median(np.abs(innovations)))
+    return float(1.4826 * np.median(np.abs(innovations(readings, MEMORY))))
 
 
 def _constant_bits(counts: NDArray[np.int64]) -> int:

@@ -5,6 +5,8 @@ others. What speaks of shoulder, elbow, forearm is of an arm like the UR10e, of 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate
 from math import isfinite, pi
 
 import numpy as np
@@ -68,26 +70,26 @@ NOMINAL = DenavitHartenberg(  # a UR10e's (maker's article 45257), which whateve
 
 
 def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(13, 3) change of the direction of a wrist's axis in the flange's frame, by radian of each of `AXIS_ERRORS`.
+    """(…, 13, 3) change of the direction of a wrist's axis in the flange's frame, by radian of each of `AXIS_ERRORS`.
 
-    At joint angles `q_rad` (n,). What turns the whole flange is seen by a sensor as its mounting. The wrists of another
-    chain are its last three joints; what it has not is never wrong.
+    At joint angles `q_rad` (…, n). What turns the whole flange is seen by a sensor as its mounting. The wrists of
+    another chain are its last three joints; what it has not is never wrong.
     """
     q = np.asarray(q_rad, dtype=np.float64)
-    frames = np.array(_frames(q, arm))[:, :3, :3]
-    to_flange = frames[-1].T
-    axis = to_flange @ frames[joint, :, 2]
+    frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
+    axis = frames[joint][..., 2]
     wrists = _last_three(arm)
 
     def turned(about: Array, link: int) -> Array:
         """How the joint's axis turns with all that lies beyond the joint `link`, the flange among it."""
-        return np.cross(axis, to_flange @ about) if joint <= link else np.zeros(3)
+        return np.cross(axis, about) if joint <= link else np.zeros_like(axis)
 
-    changes = [turned(frames[link + 1][:, 0], link) if link >= 0 else np.zeros(3) for link in wrists]
+    changes = [turned(frames[link + 1][..., 0], link) for link in wrists]
     for link in wrists[1:]:
-        by_zero = turned(frames[link][:, 2], link) if link >= 0 else np.zeros(3)
-        changes += [by_zero, *(wave * by_zero for wave in angle_waves(q[link] if link >= 0 else 0.0))]
-    return np.array(changes)
+        by_zero = turned(frames[link][..., 2], link)
+        changes += [by_zero, *(wave[..., None] * by_zero for wave in angle_waves(q[..., link]))]
+    in_flange: Array = np.stack(changes, axis=-2) @ frames[-1]
+    return in_flange
 
 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
@@ -113,45 +115,37 @@ def _last_three(arm: DenavitHartenberg) -> tuple[int, int, int]:
     return arm.joints - 3, arm.joints - 2, arm.joints - 1
 
 
-def angle_waves(angle_rad: float) -> Array:
-    """(4,) waves of an angle, as `WAVES` has them."""
+def angle_waves(angle_rad: Array | float) -> Array:
+    """(4, …) waves of angles, as `WAVES` has them."""
     return np.array([np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)])
 
 
-def _link(angle_rad: Array, a_m: float, d_m: float, alpha_rad: float) -> Array:
-    """(…, 4, 4) transform across one joint: turn about z, along z, along x, turn about x."""
+def _links(q_rad: Array, arm: DenavitHartenberg) -> Array:
+    """(n, …, 4, 4) transforms across each joint: turn about z, along z, along x, turn about x."""
+    angle_rad = q_rad + arm.theta_rad
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    cos_alpha, sin_alpha = _clean(np.cos(alpha_rad)), _clean(np.sin(alpha_rad))
-    link = np.zeros((*angle_rad.shape, 4, 4))
-    link[..., 0, 0], link[..., 0, 1], link[..., 0, 2], link[..., 0, 3] = (
-        cos,
-        -sin * cos_alpha,
-        sin * sin_alpha,
-        a_m * cos,
-    )
-    link[..., 1, 0], link[..., 1, 1], link[..., 1, 2], link[..., 1, 3] = (
-        sin,
-        cos * cos_alpha,
-        -cos * sin_alpha,
-        a_m * sin,
-    )
-    link[..., 2, 1], link[..., 2, 2], link[..., 2, 3] = sin_alpha, cos_alpha, d_m
-    link[..., 3, 3] = 1.0
-    return link
+    cos_alpha, sin_alpha = _twists(arm)
+    links = np.zeros((arm.joints, *q_rad.shape[:-1], 4, 4))
+    each = np.moveaxis(links, 0, -3)
+    each[..., 0, 0], each[..., 0, 1], each[..., 0, 2] = cos, -sin * cos_alpha, sin * sin_alpha
+    each[..., 1, 0], each[..., 1, 1], each[..., 1, 2] = sin, cos * cos_alpha, -cos * sin_alpha
+    each[..., 2, 1], each[..., 2, 2], each[..., 2, 3] = sin_alpha, cos_alpha, arm.d_m
+    each[..., 0, 3], each[..., 1, 3], each[..., 3, 3] = arm.a_m * cos, arm.a_m * sin, 1.0
+    return links
 
 
-def _clean(value: float) -> float:
-    """The sine or cosine of a link: those of a quarter turn are 0 and 1, but π/2 is rounded."""
-    return 0.0 if abs(value) < ROUNDING else float(value)
+@lru_cache
+def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
+    """(n,) cosines and sines of the links' twists: those of a quarter turn are 0 and 1, but π/2 is rounded."""
+    waves = np.cos(arm.alpha_rad), np.sin(arm.alpha_rad)
+    cos_alpha, sin_alpha = (np.where(np.abs(wave) < ROUNDING, 0.0, wave) for wave in waves)
+    return cos_alpha, sin_alpha
 
 
 def _frames(q_rad: ArrayLike, arm: DenavitHartenberg) -> list[Array]:
     """The n + 1 transforms (…, 4, 4) in the base frame: the base itself, then the frame after each joint."""
-    q = np.asarray(q_rad, dtype=np.float64)
-    frames = [np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))]
-    for joint, (theta, *link) in enumerate(zip(arm.theta_rad, arm.a_m, arm.d_m, arm.alpha_rad, strict=True)):
-        frames.append(frames[-1] @ _link(q[..., joint] + theta, *link))
-    return frames
+    links = _links(np.asarray(q_rad, dtype=np.float64), arm)
+    return [np.broadcast_to(np.eye(4), links.shape[1:]), *accumulate(links, np.matmul)]
 
 
 def flange_pose(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
@@ -170,7 +164,7 @@ def distance_to_forearm(
 ) -> Array:
     """(…,) m from a point of the flange's frame, its centre if none is given, to the line from elbow to wrist 1.
 
-    For joint angles `q_rad` (…, 6). Or to a line that lies `beside_m` beside that, on the side of wrist 1.
+    For joint angles `q_rad` (…, 6) and points (…, 3). Or to a line that lies `beside_m` beside that, on the side of wrist 1.
     """
     frames = _frames(q_rad, arm)
     _, elbow, wrist = _bends(frames)
@@ -215,23 +209,30 @@ def _bends(frames: list[Array]) -> tuple[Array, Array, Array]:
 def _beside(point: Array, axis: Array, frame: Array) -> Array:
     """(…, 3) m where the axis of a frame meets the plane through a point at right angles to its own joint's axis."""
     other = frame[..., :3, 2]
-    away = np.sum((point - frame[..., :3, 3]) * axis, axis=-1) / np.sum(other * axis, axis=-1)
+    away = _dot(point - frame[..., :3, 3], axis) / _dot(other, axis)
     beside: Array = frame[..., :3, 3] + away[..., None] * other
     return beside
 
 
 def _on_flange(frames: list[Array], point_m: ArrayLike) -> Array:
-    """(…, 3) m, in the base frame, of a point of the flange's frame."""
-    point: Array = frames[6][..., :3, 3] + frames[6][..., :3, :3] @ np.asarray(point_m, dtype=np.float64)
+    """(…, 3) m, in the base frame, of points (…, 3) of the flange's frame."""
+    point: Array = frames[6][..., :3, 3] + np.einsum("...ij,...j->...i", frames[6][..., :3, :3], point_m)
     return point
 
 
 def _distance(point: Array, start: Array, end: Array) -> Array:
     """(…,) distances from points to the lines between starts and ends (…, 3)."""
     way = end - start
-    along = np.sum((point - start) * way, axis=-1) / np.sum(way**2, axis=-1)
-    nearest = start + np.clip(along, 0, 1)[..., None] * way
-    return np.asarray(np.linalg.norm(point - nearest, axis=-1), dtype=np.float64)
+    along = np.clip(_dot(point - start, way) / _dot(way, way), 0, 1)
+    off = point - start - along[..., None] * way
+    distances: Array = np.sqrt(_dot(off, off))
+    return distances
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """(…,) products of vectors (…, 3)."""
+    products: Array = np.einsum("...i,...i->...", one, other)
+    return products
 
 
 def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
@@ -256,6 +257,14 @@ def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -
 
 
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, n)."""
-    rate: Array = np.einsum("...ij,...j->...i", flange_axes(q_rad, arm), np.asarray(qd_rad_s, dtype=np.float64))
-    return rate
+    """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, n).
+
+    Carried from link to link, each seeing it in its own frame: a recording has many states.
+    """
+    angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
+    x, y, z = np.zeros((3, *angles.shape[1:]))
+    speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)
+    for cos, sin, speed, cos_alpha, sin_alpha in zip(np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True):
+        x, y, z = cos * x + sin * y, cos * y - sin * x, z + speed
+        y, z = cos_alpha * y + sin_alpha * z, cos_alpha * z - sin_alpha * y
+    return np.stack([x, y, z], axis=-1)

@@ -1,6 +1,6 @@
 """How near to the arm itself a plan brings what it carries. Pure."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from math import radians
 from typing import NamedTuple
 
@@ -94,32 +94,31 @@ def _nearest_to_forearm(
     q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
     """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
+    names, points = _carried(carried)
     beside_m, lengths = model.forearm.beside_m, arm or model.drawing
-    return _least(
-        (what, distance_to_forearm(q_rad, point, lengths, beside_m=beside_m)) for what, point in _points(carried)
-    )
+    return _least(names, distance_to_forearm(q_rad, points, lengths, beside_m=beside_m))
 
 
 def _nearest_to_upper_arm(
     q_rad: Array, carried: Carried, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
     """What comes nearest to the upper arm, as above."""
+    names, points = _carried(carried)
     beside_m, lengths = model.upper_arm.beside_m, arm or model.drawing
-    return _least(
-        (what, distance_to_upper_arm(q_rad, point, lengths, beside_m=beside_m)) for what, point in _points(carried)
-    )
+    return _least(names, distance_to_upper_arm(q_rad, points, lengths, beside_m=beside_m))
 
 
-def _least(distances: Iterable[tuple[str, Array]]) -> tuple[str, float]:
-    return min(((what, float(distance_m.min())) for what, distance_m in distances), key=lambda each: each[1])
+def _least(names: Sequence[str], distances_m: Array) -> tuple[str, float]:
+    """The least of the distances (k, N) of what is called so."""
+    least_m = distances_m.min(axis=1)
+    return names[int(least_m.argmin())], float(least_m.min())
 
 
-def _points(carried: Carried) -> Iterator[tuple[str, Array]]:
-    """What the flange carries, point by point in its frame, m."""
-    yield "flange", np.zeros(3)
-    yield "payload", np.array(carried.centre_m)
-    for point in _along(carried):
-        yield "extension", point
+def _carried(carried: Carried) -> tuple[list[str], Array]:
+    """What the flange carries, point by point: names, and points (k, 1, 3) in its frame, m."""
+    along = _along(carried)
+    points = np.array([np.zeros(3), carried.centre_m, *along])
+    return ["flange", "payload", *["extension"] * len(along)], points[:, None]
 
 
 def _along(carried: Carried) -> list[Array]:

@@ -69,9 +69,10 @@ class ArmMotion:
             self.angles = CubicSpline(times_s, angles)
         else:
             self.angles = CubicSpline(self.time_s, self._states["q_rad"])
-            every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
-            times_s, angles = self.time_s[:: max(every, 1)], self._states["q_rad"][:: max(every, 1)]
-            joint_rates = CubicSpline(times_s, angles)(times_s, 1)
+            step = RATE_STEP_S / float(np.median(np.diff(self.time_s)))
+            every = max(min(round(step), len(self.time_s) // 4), 1)
+            times_s, angles = self.time_s[::every], self._states["q_rad"][::every]
+            joint_rates = (CubicSpline(times_s, angles) if every > 1 else self.angles)(times_s, 1)
         rates = flange_rate(angles, joint_rates, kinematics)
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
@@ -97,7 +98,7 @@ class ArmMotion:
         return axes
 
     def axis_errors(self, q_rad: Array, joint: int) -> Array:
-        """(13, 3) how the arm's own errors turn the axis of a joint, per radian (`rig.motion.geometry.AXIS_ERRORS`)."""
+        """(…, 13, 3) how the arm's own errors turn a joint's axis, per radian (`rig.motion.geometry.AXIS_ERRORS`)."""
         errors: Array = axis_errors(q_rad, joint, self.kinematics) @ self.mount.T
         return errors
 

@@ -50,7 +50,8 @@ def left_of(residuals: Array, memories: Sequence[int] = MEMORIES) -> Left:
         return Left(1.0, max(len(residuals) - 1.0, 1.0))
     centred = residuals - residuals.mean()
     memories = [memory for memory in memories if memory * SAMPLES_EACH <= len(centred)]
-    _, spectrum_at_zero, memory = min(_autoregression(centred, memory, memories[-1]) for memory in memories)
+    products, count = _products(centred, memories[-1]), len(centred) - memories[-1]
+    _, spectrum_at_zero, memory = min(_autoregression(products, count, memory) for memory in memories)
     return Left(spectrum_at_zero / float(np.mean(centred**2)), _freedom(centred, memory))
 
 
@@ -60,32 +61,44 @@ def left_by_correlations(residuals: Array) -> Left:
 
 
 def _freedom(centred: Array, memory: int) -> float:
-    before = np.lib.stride_tricks.sliding_window_view(centred[:-1], memory)
-    coefficients, innovations = predicted(centred, memory)
-    count, damped = len(innovations), 1 - float(coefficients.sum())
-    information = np.linalg.pinv(before.T @ before, hermitian=True)
-    of_the_sum = float(innovations @ innovations) / (count - memory) * float(information.sum())
+    products, count = _products(centred, memory), len(centred) - memory
+    coefficients, power = _predicted(products)
+    damped = 1 - float(coefficients.sum())
+    information = np.linalg.pinv(products[:-1, :-1], hermitian=True)
+    of_the_sum = power / (count - memory) * float(information.sum())
     return max(2 / (2 / count + 4 * of_the_sum / damped**2), 1.0) if damped else 1.0
 
 
-def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, float, int]:
-    """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory; this one."""
-    coefficients, innovations = predicted(centred[longest - memory :], memory)
-    count, power = len(innovations), float(innovations @ innovations)
+def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
+    """Akaike's criterion and the spectrum at zero, by `_products` of so many residuals; this memory."""
+    coefficients, power = _predicted(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf
     criterion = likelihood + 2 * memory
     damped = (1 - float(coefficients.sum())) ** 2
     return criterion, power / (count - memory) / damped if damped else np.inf, memory  # what never returns has no mean
 
 
-def predicted(residuals: Array, memory: int) -> tuple[Array, Array]:
-    """The best linear prediction of each of the residuals (n,) from the `memory` before it.
+def _products(residuals: Array, memory: int) -> Array:
+    """(memory + 1, memory + 1) sums of products of residuals (n,) and of the `memory` before each, the nearest last."""
+    lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
+    products: Array = lagged @ lagged.T
+    return products
 
-    Its coefficients (memory,), and its errors (n - memory,), which are called innovations.
+
+def _predicted(products: Array) -> tuple[Array, float]:
+    """The best linear prediction of residuals from the k before each, by their `_products`.
+
+    Its coefficients (k,), and the squares' sum of its errors, which are called innovations.
     """
-    before, now = np.lib.stride_tricks.sliding_window_view(residuals[:-1], memory), residuals[memory:]
+    before, now = products[:-1, :-1], products[:-1, -1]
     coefficients = np.asarray(np.linalg.lstsq(before, now, rcond=None)[0], dtype=np.float64)
-    return coefficients, now - before @ coefficients
+    return coefficients, max(float(products[-1, -1] - coefficients @ now), 0.0)
+
+
+def innovations(residuals: Array, memory: int) -> Array:
+    """(n - memory,) errors of the best linear prediction of residuals (n,) from the `memory` before each."""
+    coefficients, _ = _predicted(_products(residuals, memory))
+    return residuals[memory:] - np.lib.stride_tricks.sliding_window_view(residuals[:-1], memory) @ coefficients
 
 
 def _correlations(residuals: Array) -> Array | None:

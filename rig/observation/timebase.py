@@ -5,7 +5,9 @@ board may have been switched on at any time); a weighted least-squares fit of th
 then finds the offset to a fraction of a millisecond. The delay of the sensor's own filter is part of the offset.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and mo
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
+NO_TURNING = 1e-12  # of the square of the fastest: a body that turns about one axis has only rounding about others
 SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
 FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
 SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0  # then, and so often, what is left is gone at once, at most so far
@@ -165,8 +168,9 @@ def _coarse(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBa
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
     count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
+    arm_rate = lru_cache(maxsize=1)(partial(_arm_rate, motion))  # nearly always the same for all drifts
     found = (
-        (*_coarse_offset((board_time_s - reference) * (1 + drift), readings, motion), drift)
+        (*_coarse_offset((board_time_s - reference) * (1 + drift), readings, arm_rate), drift)
         for drift in spacing * np.arange(-count, count + 1)
     )
     explained, offset, drift = max(found)
@@ -175,48 +179,62 @@ def _coarse(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBa
     return TimeBase(float(offset - reference), float(drift), float(reference), np.zeros((2, 2)), np.zeros(3))
 
 
-def _coarse_offset(time_s: Array, readings: Array, motion: KnownMotion) -> tuple[float, float]:
+def _arm_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
+    """When the motion begins, and from then on in such steps its rate (3, n) less its mean."""
+    grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
+    rate = motion.rate(grid).T
+    return float(grid[0]), rate - rate.mean(axis=1, keepdims=True)
+
+
+def _coarse_offset(
+    time_s: Array, readings: Array, arm_rate: Callable[[float], tuple[float, Array]]
+) -> tuple[float, float]:
     """Share explained, and offset (controller − `time_s`) to within a step.
 
     Looks at peaks of the correlation, each axis with each (not of magnitudes, in which a bias can hide the turning),
     judged by the vector fit. A step holds at least one sample.
     """
+    from scipy.fft import next_fast_len
+
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
     counts = np.bincount(bins)
     seen = counts > 0
-    sums = np.stack([np.bincount(bins, readings[:, axis]) for axis in range(3)], axis=1)
-    board = np.where(seen[:, None], sums / np.maximum(counts, 1)[:, None], 0.0)
-    grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
-    arm = motion.rate(grid)
+    board = np.array([np.bincount(bins, readings[:, axis]) for axis in range(3)]) / np.maximum(counts, 1)
+    turning = np.where(seen, board - board[:, seen].mean(axis=1, keepdims=True), 0.0)
+    start_s, moving = arm_rate(step_s)
 
-    turning = np.where(seen[:, None], board - board[seen].mean(axis=0), 0.0)
-    moving = arm - arm.mean(axis=0)
-    size = 1 << (len(turning) + len(moving)).bit_length()
-    spectra = np.conj(np.fft.rfft(turning, size, axis=0)).T, np.fft.rfft(moving, size, axis=0).T
+    count = len(seen) + moving.shape[1]
+    size = next_fast_len(count, real=True)
+    spectra = np.conj(np.fft.rfft(turning, size)), np.fft.rfft(moving, size)
     squares = sum(np.fft.irfft(one * other, size) ** 2 for one in spectra[0] for other in spectra[1])
-    correlation = np.roll(squares, len(turning))[: len(turning) + len(moving)]
+    correlation = np.roll(squares, len(seen))[:count]
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
-    best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(turning)
+    best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(seen)
 
-    explained, lag = max(((_explained(board, seen, arm, int(lag)), int(lag)) for lag in best), default=(0.0, 0))
+    explained = _explained(turning, seen, moving, best)
+    share, lag = max(zip(explained.tolist(), best.tolist(), strict=True), default=(0.0, 0))
     # Bin j of the board, whose middle lies half a step after its start, stands beside point j + lag of the arm's grid.
-    return explained, float(grid[0] + lag * step_s - time_s[0] - step_s / 2)
+    return share, float(start_s + lag * step_s - time_s[0] - step_s / 2)
 
 
-def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> float:
-    """Share of the board's variance that a linear map of the arm's rate explains when shifted by `lag` bins."""
-    start, end = max(0, -lag), min(len(board), len(arm) - lag)
-    used = seen[start:end]
-    if used.sum() < 0.5 * min(len(board), len(arm)):
-        return 0.0
-    m, rate = board[start:end][used], arm[start + lag : end + lag][used]
-    m, rate = m - m.mean(axis=0), rate - rate.mean(axis=0)
-    total = float(np.sum(m**2))
-    # By the normal equations: the fine fit starts from whatever is best, so its precision is not needed here.
-    seen_together = rate.T @ m
-    inverse = np.linalg.pinv(rate.T @ rate, rcond=1e-10, hermitian=True)
-    return float(np.sum(seen_together * (inverse @ seen_together))) / total if total > 0 else 0.0
+def _explained(turning: Array, seen: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]) -> Array:
+    """Shares (k,) of the variance of what the board has `seen` (n,) turning (3, n) that a linear map of the arm's rate
+    (3, m) explains when shifted by lags (k,) of bins; zero where they have little time in common.
+
+    By the normal equations: the fine fit starts from whatever is best, so its precision is not needed here.
+    """
+    board, products = np.vstack([seen, turning]), np.empty((len(lags), 7, 7))
+    for product, lag in zip(products, lags, strict=True):
+        start, end = max(0, -lag), min(len(seen), moving.shape[1] - lag)
+        both = np.vstack([board[:, start:end], moving[:, start + lag : end + lag] * seen[start:end]])
+        product[:] = both.copy() @ both.T  # of a matrix and itself the product takes twice as long
+    count, sums = products[:, :1, :1], products[:, :1, 1:]
+    spread = products[:, 1:, 1:] - np.swapaxes(sums, 1, 2) @ sums / np.maximum(count, 1)
+    together, total = spread[:, 3:, :3], np.trace(spread[:, :3, :3], axis1=1, axis2=2)
+    inverse = np.linalg.pinv(spread[:, 3:, 3:], rcond=1e-10, hermitian=True)
+    enough = (count[:, 0, 0] >= 0.5 * min(len(seen), moving.shape[1])) & (total > 0)
+    return np.sum(together * (inverse @ together), axis=(1, 2)) / np.where(enough, total, np.inf)
 
 
 def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
@@ -245,18 +263,16 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: Know
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])
-    inverse = np.linalg.pinv(columns)
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=NO_TURNING, hermitian=True) @ columns.T
     fitted = inverse @ readings
     residual = readings - columns @ fitted
     by_offset = motion.rate(t, 1) @ fitted[:3]
-    normal, right = np.zeros((2, 2)), np.zeros(2)
-    for axis in range(3):
-        noise = residual[:, axis]
-        weight = 1 / (np.mean(noise**2) * widening(noise) + np.finfo(np.float64).tiny)
-        by_clock = np.column_stack([by_offset[:, axis], by_offset[:, axis] * since])
-        by_clock -= columns @ (inverse @ by_clock)
-        normal += weight * by_clock.T @ by_clock
-        right += weight * by_clock.T @ noise
+    by_clock = np.hstack([by_offset, by_offset * since[:, None]])
+    by_clock -= columns @ (inverse @ by_clock)
+    widened = np.array([widening(noise) for noise in residual.T])
+    weights = 1 / (np.einsum("na,na->a", residual, residual) / len(t) * widened + np.finfo(np.float64).tiny)
+    normal = np.einsum("iaja,a->ij", (by_clock.T @ by_clock).reshape(2, 3, 2, 3), weights)
+    right = np.einsum("iaa,a->i", (by_clock.T @ residual).reshape(2, 3, 3), weights)
     covariance = np.asarray(np.linalg.pinv(normal, hermitian=True), dtype=np.float64)
     step = covariance @ right
     return TimeBase(
