@@ -9,6 +9,7 @@ from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
 from rig.analysis.analyses import calibrated, calibrated_by_hand, drifted, verified, verified_alone
+from rig.analysis.check import Check, fitness
 from rig.analysis.outcome import Outcome
 from rig.config.hand_sections import ByHandSection, HandSection
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, TurnerSection
@@ -25,7 +26,7 @@ from rig.config.procedure_sections import (
 from rig.config.servo_procedure import ServoSixObservationSection
 from rig.config.servo_section import ServoSection
 from rig.data.run_file import RunData
-from rig.errors import Refused
+from rig.errors import Fault, Refused
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.by_hand import plan_by_hand
@@ -38,11 +39,11 @@ from rig.plans.thermal import plan_thermal
 from rig.plans.verbs import Verbs
 
 __all__ = [
-    "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Dwell", "HandSection", "ImuSection",
-    "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
+    "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Check", "Dwell", "Fault", "HandSection",
+    "ImuSection", "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
     "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
     "StaticAttitudesSection", "Step", "Sweep", "ThermalSection", "Transfer", "TurnerSection", "Verbs", "VerifySection",
-    "calibrated", "calibrated_by_hand", "drifted", "plan_by_hand", "plan_imu", "plan_servo_six_observation",
+    "calibrated", "calibrated_by_hand", "drifted", "fitness", "plan_by_hand", "plan_imu", "plan_servo_six_observation",
     "plan_six_observation", "plan_static_attitudes", "plan_thermal", "run_script", "trapezoid_duration", "travel",
     "verified", "verified_alone",
 ]  # fmt: skip

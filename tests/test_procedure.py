@@ -3,12 +3,15 @@
 import ast
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import rig.procedure
-from support.paths import DOCS, ROOT
+from rig.data.run_file import read_run
+from rig.procedure import Outcome, calibrated, fitness
+from support.paths import DOCS, FIXTURES, ROOT
 
 STOCK = sorted(path for path in (ROOT / "procedures").glob("*.py") if path.name != "__init__.py")
 OWN_PAGE = DOCS / "how-to" / "own-procedure.md"
@@ -51,3 +54,17 @@ def test_the_door_has_all_that_the_stock_scripts_need_and_says_so() -> None:
     }
     assert len(STOCK) == 8 and used <= {*rig.procedure.__all__}
     assert all(hasattr(rig.procedure, name) for name in rig.procedure.__all__)
+
+
+def test_an_analysis_of_one_s_own_adds_a_check_to_the_verdict() -> None:
+    def judged(limit: float) -> Outcome:
+        outcome = calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
+        turns = outcome.results["gyro"].observations
+        shortest_s = min(turn.average.duration_s for turn in turns)
+        return replace(
+            outcome, checks=(*outcome.checks, fitness("gyro", "rate", "turn_s", shortest_s, limit, unit="s"))
+        )
+
+    assert judged(60.0).passed and not judged(1.0).passed
+    check = judged(1.0).checks[-1]
+    assert (check.name, check.unit, check.means.what) == ("gyro.turn_s", "s", "turn_s")

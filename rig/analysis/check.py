@@ -1,8 +1,9 @@
-"""One check of the verdict: what was measured beside its limit. Pure."""
+"""One check of the verdict: what was measured beside its limit, and how it is called. Pure."""
 
 import math
 from dataclasses import dataclass
 
+from rig.config.limits import Parameter
 from rig.data.meaning import Meaning
 from rig.estimation.coverage import COVERAGE_FACTOR, beyond
 
@@ -40,3 +41,29 @@ class Check:
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.freedom))
+
+
+def fitness(
+    sensor: str,
+    quantity: str,
+    what: str,
+    value: float | None,
+    limit: float | None,
+    *,
+    unit: str = "1",
+    parameter: Parameter | None = None,
+    sweep: int | None = None,
+    dwell: int | None = None,
+) -> Check:
+    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own.
+
+    The `sweep` or `dwell` of the plan that it is told of, by index, is part of its name.
+    """
+    means, piece = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
+    name = check_name(sensor, quantity, what)
+    return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
+
+
+def check_name(sensor: str, quantity: str, what: str) -> str:
+    """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
+    return f"{sensor}.{what}" if quantity == "rate" else f"{sensor}.{quantity}_{what}"

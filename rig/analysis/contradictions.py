@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
-from rig.analysis.check import Check
+from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import consistency
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
@@ -27,7 +27,6 @@ from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.verdict import fitness
 from rig.analysis.ways import with_ways
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData

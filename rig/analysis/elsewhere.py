@@ -9,14 +9,13 @@ import numpy as np
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.by_hand import solved_by_hand
 from rig.analysis.calibration import SensorResult, or_fault, solve_observations, solve_six_observation, solve_vector
-from rig.analysis.check import Check
+from rig.analysis.check import Check, fitness
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
 from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference, with_rate_polynomials
 from rig.analysis.sweeps_agree import check_agree, contradiction, counted
-from rig.analysis.verdict import fitness
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings

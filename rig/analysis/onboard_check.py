@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.check import Check
-from rig.analysis.verdict import fitness
+from rig.analysis.check import Check, fitness
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData

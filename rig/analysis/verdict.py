@@ -9,11 +9,11 @@ import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
-from rig.analysis.check import Check
+from rig.analysis.check import Check, check_name, fitness
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
 from rig.config.judged_by import DecisionRule
-from rig.config.limits import Limits, Parameter, limit_of
+from rig.config.limits import Limits, limit_of
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
@@ -46,7 +46,7 @@ class _Held:
         """The check of one limit."""
         row, limit = limit_of(self.limits, self.quantity, what)
         means = Meaning(row.kind, self.sensor, self.quantity, row.parameter, what=what)
-        return Check(_name(self.sensor, self.quantity, what), value, limit, row.unit, means)
+        return Check(check_name(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, spread: Spread | None) -> Check:
         """The check of the value, of three, that comes nearest to its limit, and what the rule makes of it."""
@@ -80,27 +80,6 @@ class _Held:
         for what, each in expanded.items():
             if limit_of(self.limits, self.quantity, what)[1] is not None:
                 yield self.check(what, _largest(each))
-
-
-def fitness(
-    sensor: str,
-    quantity: str,
-    what: str,
-    value: float | None,
-    limit: float | None,
-    *,
-    unit: str = "1",
-    parameter: Parameter | None = None,
-    sweep: int | None = None,
-    dwell: int | None = None,
-) -> Check:
-    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own.
-
-    The `sweep` or `dwell` of the plan that it is told of, by index, is part of its name.
-    """
-    means, piece = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
-    name = _name(sensor, quantity, what)
-    return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
 
 
 def judge(
@@ -188,11 +167,6 @@ def drift_checks(
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
     """ "pass" when there are checks and all of them passed."""
     return "pass" if checks and all(check.passed for check in checks) else "fail"
-
-
-def _name(sensor: str, quantity: str, what: str) -> str:
-    """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
-    return f"{sensor}.{what}" if quantity == "rate" else f"{sensor}.{quantity}_{what}"
 
 
 def _spreads(budget: Budget) -> tuple[Spread, Spread]:

@@ -264,7 +264,9 @@ def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = 
     angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
     x, y, z = np.zeros((3, *angles.shape[1:]))
     speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)
-    for cos, sin, speed, cos_alpha, sin_alpha in zip(np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True):
+    for cos, sin, speed, cos_alpha, sin_alpha in zip(
+        np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True
+    ):
         x, y, z = cos * x + sin * y, cos * y - sin * x, z + speed
         y, z = cos_alpha * y + sin_alpha * z, cos_alpha * z - sin_alpha * y
     return np.stack([x, y, z], axis=-1)

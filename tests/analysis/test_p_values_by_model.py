@@ -7,7 +7,7 @@ from itertools import cycle
 
 import pytest
 
-from rig.analysis.verdict import fitness
+from rig.analysis.check import fitness
 from support.checked_runs import checks_of, failed, kind_of, probability, solved
 from support.drawn_recording import KINDS, Kind, drawn
 from support.synthetic_run import Setup

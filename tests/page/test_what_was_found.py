@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.analysis.check import Check
-from rig.analysis.verdict import fitness
+from rig.analysis.check import Check, fitness
 from rig.data.meaning import Meaning
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
 from rig.station.events import Since

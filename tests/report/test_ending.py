@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.check import Check
-from rig.analysis.verdict import fitness
+from rig.analysis.check import Check, fitness
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.report.check_words import check_words, what_failed, words_of

@@ -14,9 +14,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from rich.table import Table
 
+from rig.analysis.check import fitness
 from rig.analysis.of_kinds import OfKind
 from rig.analysis.outcome import Outcome
-from rig.analysis.verdict import fitness
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import Entry

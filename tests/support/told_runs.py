@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from firmware_host.answers import BoardObservation
-from rig.analysis.check import Check
-from rig.analysis.verdict import fitness
+from rig.analysis.check import Check, fitness
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.meaning import Meaning
