@@ -40,10 +40,10 @@ from rig.plans.verbs import Verbs
 
 __all__ = [
     "ArmSection", "AttitudesSection", "BiasDriftSection", "ByHandSection", "Check", "Dwell", "Fault", "HandSection",
-    "ImuSection", "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig", "RunData",
-    "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
-    "StaticAttitudesSection", "Step", "Sweep", "ThermalSection", "Transfer", "TurnerSection", "Verbs", "VerifySection",
-    "calibrated", "calibrated_by_hand", "drifted", "fitness", "plan_by_hand", "plan_imu", "plan_servo_six_observation",
-    "plan_six_observation", "plan_static_attitudes", "plan_thermal", "run_script", "trapezoid_duration", "travel",
-    "verified", "verified_alone",
+    "ImuSection", "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig",
+    "RunData", "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
+    "StaticAttitudesSection", "Step", "Sweep", "ThermalSection", "Transfer", "TurnerSection", "Verbs",
+    "VerifySection", "calibrated", "calibrated_by_hand", "drifted", "fitness", "plan_by_hand", "plan_imu",
+    "plan_servo_six_observation", "plan_six_observation", "plan_static_attitudes", "plan_thermal", "run_script",
+    "trapezoid_duration", "travel", "verified", "verified_alone",
 ]  # fmt: skip

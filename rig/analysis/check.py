@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from rig.config.limits import Parameter
+from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
 from rig.estimation.coverage import COVERAGE_FACTOR, beyond
 
@@ -66,4 +67,4 @@ def fitness(
 
 def check_name(sensor: str, quantity: str, what: str) -> str:
     """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
-    return f"{sensor}.{what}" if quantity == "rate" else f"{sensor}.{quantity}_{what}"
+    return f"{sensor}.{quantities()[quantity].prefix}{what}"

@@ -14,7 +14,7 @@ from pydantic import Field
 from firmware_host.samples import STAMPS
 from rig.data.checked import Finite, Positive
 from rig.data.installed_kinds import measured
-from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
+from rig.data.quantity import TEMPERATURE, Quantity, Scalar
 from rig.estimation.arrays import Array
 
 ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]
@@ -95,7 +95,7 @@ def of_three_axes(
     quantity: Quantity, unit_per_count: float, full_scale_counts: int, end_of_scale: float | None
 ) -> Channel:
     """The channel of a sensor of three axes as the board and the KVH 1775 deliver it."""
-    column = "counts" if quantity == RATE else f"{quantity.name}_counts"
+    column = f"{quantity.prefix}counts"
     return Channel(quantity.name, column, "<i4", unit_per_count, 0.0, full_scale_counts, end_of_scale)
 
 

@@ -44,6 +44,7 @@ class Quantity:
       so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
     - `d_si` is the unit as a digital certificate writes it. `towards` is what a sensor at rest is turned towards.
     - `mistaken` is for what unit its readings are taken by mistake.
+    - `offset` is how many times the bias a reading is off at nothing: −1 where a bias is what corrects it, m = g/k − b.
     - `axes`: the letters of the axes that it is measured along.
     """
 
@@ -63,6 +64,7 @@ class Quantity:
     d_si: str
     towards: str = "the reference"
     mistaken: Mistaken | None = None
+    offset: int = 1
     axes: str = "xyz"
 
     def __str__(self) -> str:
@@ -74,7 +76,12 @@ class Quantity:
 
     def of(self, sensor: str) -> str:
         """How the readings of a sensor of that name are called: that a gyroscope reads rates goes without saying."""
-        return sensor if self is RATE else self.beside(sensor)
+        return self.beside(sensor) if self.prefix else sensor
+
+    @property
+    def prefix(self) -> str:
+        """What names of its checks, limits and columns begin with, as `acceleration_`; nothing for a rate."""
+        return "" if self.name == RATE.name else f"{self.name}_"
 
     def beside(self, sensor: str) -> str:
         """How they are called where others of that sensor stand too."""
@@ -140,6 +147,7 @@ RATE: Final = Quantity(
     steady=5e-3,
     d_si=r"\radian\second\tothe{-1}",
     mistaken=Mistaken("°/s", "numpy.radians(readings)", 400.0),
+    offset=-1,
 )
 ACCELERATION: Final = Quantity(
     name="acceleration",

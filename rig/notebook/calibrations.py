@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.data.budget_entries import expanded_uncertainties
-from rig.data.quantity import RATE, Quantity
+from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
@@ -101,8 +101,7 @@ class Calibration:
         """
         limit = getattr(self.entry, self.quantity.named("range"), None)
         found = own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")
-        offset = self.bias if self.quantity == RATE else -self.bias
-        corrected: Array = (found + offset) @ self.correction_matrix.T
+        corrected: Array = (found - self.quantity.offset * self.bias) @ self.correction_matrix.T
         return corrected
 
     def to_dict(self) -> dict[str, Any]:

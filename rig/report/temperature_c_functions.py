@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from rig.data.quantity import RATE
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.c_functions import c_rows, prefix_of
@@ -15,9 +14,9 @@ def temperature_lines(finding: Finding[OverTemperatureEntry], _: Mapping[str, Ar
     """C of a sensor over temperature, beside matrix and bias of its calibration at the reference temperature."""
     entry, quantity = finding.entry, finding.quantity
     sensor, unit = prefix_of(finding.sensor), quantity.suffix
-    of = sensor if quantity == RATE else f"{sensor}_{quantity}"
-    function = f"{sensor}_calibrate" if quantity == RATE else f"{sensor}_calibrate_{quantity}"
-    sign, low, high = ("+" if quantity == RATE else "-"), *entry.range_c
+    of = "_".join([sensor, *([quantity.name] if quantity.prefix else [])])
+    function = of.replace(sensor, f"{sensor}_calibrate", 1)
+    sign, low, high = ("+" if quantity.offset < 0 else "-"), *entry.range_c
     share = np.array(entry.scale[1:]) / np.array(entry.scale[0])
     yield from (
         "",

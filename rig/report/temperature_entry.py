@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.data.motion_file import Item
-from rig.data.quantity import RATE, Quantity
+from rig.data.quantity import Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureLineEntry
 from rig.estimation.over_temperature import COEFFICIENTS, OverTemperature, powers_at
@@ -16,7 +16,7 @@ def temperature_entry(
     quantity: Quantity, polynomials: OverTemperature, sensor: RecordedSensor | Item
 ) -> OverTemperatureEntry:
     """The polynomials of that sensor, in SI units; of a gyroscope b = −c, which g = K (m + b) adds."""
-    sign = -1.0 if quantity == RATE else 1.0
+    sign = float(quantity.offset)
     signs = np.repeat([1.0, sign], COEFFICIENTS // 2)
     at = powers_at(0.0)
     return entry(

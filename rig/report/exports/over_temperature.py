@@ -12,6 +12,7 @@ A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither has 
 from collections.abc import Iterator, Mapping
 from math import comb
 
+from rig.data.installed_kinds import quantities
 from rig.data.temperature_entries import OverTemperatureEntry
 
 ARDUPILOT_REFERENCE_C, ARDUPILOT_SIZE = 35.0, 1e6
@@ -23,8 +24,7 @@ Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and 
 
 def offset_of(quantity: str, entry: OverTemperatureEntry, order: int) -> tuple[float, ...]:
     """(3,) what an autopilot subtracts for each Kⁿ of that order."""
-    sign = -1.0 if quantity == "rate" else 1.0
-    return tuple(sign * each for each in entry.bias[order])
+    return tuple(quantities()[quantity].offset * each for each in entry.bias[order])
 
 
 def px4_parameters(polynomials: Polynomials, places: Mapping[str, int]) -> Parameters:
