@@ -7,7 +7,7 @@ others. What speaks of shoulder, elbow, forearm is of an arm like the UR10e, of 
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
-from math import isfinite, pi
+from math import isfinite, pi, prod
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -77,16 +77,14 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
     """
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [frame[..., :3, :3] for frame in _frames(q, arm)]
-    axis = frames[joint][..., 2]
     wrists = _last_three(arm)
-
-    def turned(about: Array, link: int) -> Array:
-        """How the joint's axis turns with all that lies beyond the joint `link`, the flange among it."""
-        return np.cross(axis, about) if joint <= link else np.zeros_like(axis)
-
-    changes = [turned(frames[link + 1][..., 0], link) for link in wrists]
-    for link in wrists[1:]:
-        by_zero = turned(frames[link][..., 2], link)
+    twists, zeros = [frames[link + 1][..., 0] for link in wrists], [frames[link][..., 2] for link in wrists[1:]]
+    turned = np.cross(frames[joint][..., 2], [*twists, *zeros])
+    for place, link in enumerate((*wrists, *wrists[1:])):
+        if joint > link:  # with what lies beyond the link the joint's axis does not turn
+            turned[place] = 0.0
+    changes = [*turned[: len(wrists)]]
+    for by_zero, link in zip(turned[len(wrists) :], wrists[1:], strict=True):
         changes += [by_zero, *(wave[..., None] * by_zero for wave in angle_waves(q[..., link]))]
     in_flange: Array = np.stack(changes, axis=-2) @ frames[-1]
     return in_flange
@@ -120,32 +118,34 @@ def angle_waves(angle_rad: Array | float) -> Array:
     return np.array([np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)])
 
 
-def _links(q_rad: Array, arm: DenavitHartenberg) -> Array:
-    """(n, …, 4, 4) transforms across each joint: turn about z, along z, along x, turn about x."""
-    angle_rad = q_rad + arm.theta_rad
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    cos_alpha, sin_alpha = _twists(arm)
-    links = np.zeros((arm.joints, *q_rad.shape[:-1], 4, 4))
-    each = np.moveaxis(links, 0, -3)
-    each[..., 0, 0], each[..., 0, 1], each[..., 0, 2] = cos, -sin * cos_alpha, sin * sin_alpha
-    each[..., 1, 0], each[..., 1, 1], each[..., 1, 2] = sin, cos * cos_alpha, -cos * sin_alpha
-    each[..., 2, 1], each[..., 2, 2], each[..., 2, 3] = sin_alpha, cos_alpha, arm.d_m
-    each[..., 0, 3], each[..., 1, 3], each[..., 3, 3] = arm.a_m * cos, arm.a_m * sin, 1.0
-    return links
-
-
 @lru_cache
 def _twists(arm: DenavitHartenberg) -> tuple[Array, Array]:
     """(n,) cosines and sines of the links' twists: those of a quarter turn are 0 and 1, but π/2 is rounded."""
     waves = np.cos(arm.alpha_rad), np.sin(arm.alpha_rad)
-    cos_alpha, sin_alpha = (np.where(np.abs(wave) < ROUNDING, 0.0, wave) for wave in waves)
-    return cos_alpha, sin_alpha
+    cos, sin = (np.where(np.abs(wave) < ROUNDING, 0.0, wave) for wave in waves)
+    return cos, sin
+
+
+@lru_cache
+def _shares(arm: DenavitHartenberg) -> Array:
+    """(n, 3, 4, 4) what each link's transform has of its angle's cosine, what of its sine, and what always.
+
+    It turns about z, goes along z and along x, turns about x.
+    """
+    (cos, sin), shares = _twists(arm), np.zeros((arm.joints, 3, 4, 4))
+    shares[:, 0, 0, 0], shares[:, 0, 1, 1], shares[:, 0, 1, 2], shares[:, 0, 0, 3] = 1.0, cos, -sin, arm.a_m
+    shares[:, 1, 1, 0], shares[:, 1, 0, 1], shares[:, 1, 0, 2], shares[:, 1, 1, 3] = 1.0, -cos, sin, arm.a_m
+    shares[:, 2, 2, 1], shares[:, 2, 2, 2], shares[:, 2, 2, 3], shares[:, 2, 3, 3] = sin, cos, arm.d_m, 1.0
+    return shares
 
 
 def _frames(q_rad: ArrayLike, arm: DenavitHartenberg) -> list[Array]:
     """The n + 1 transforms (…, 4, 4) in the base frame: the base itself, then the frame after each joint."""
-    links = _links(np.asarray(q_rad, dtype=np.float64), arm)
-    return [np.broadcast_to(np.eye(4), links.shape[1:]), *accumulate(links, np.matmul)]
+    angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
+    waves = np.stack([np.cos(angles), np.sin(angles), np.ones(angles.shape)], axis=-1)
+    links = waves.reshape(arm.joints, prod(angles.shape[1:]), 3) @ _shares(arm).reshape(arm.joints, 3, 16)
+    base = np.broadcast_to(np.eye(4), (*angles.shape[1:], 4, 4))
+    return [base, *accumulate(links.reshape(arm.joints, *base.shape), np.matmul)]
 
 
 def flange_pose(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
@@ -164,7 +164,8 @@ def distance_to_forearm(
 ) -> Array:
     """(…,) m from a point of the flange's frame, its centre if none is given, to the line from elbow to wrist 1.
 
-    For joint angles `q_rad` (…, 6) and points (…, 3). Or to a line that lies `beside_m` beside that, on the side of wrist 1.
+    For joint angles `q_rad` (…, 6) and points (…, 3). Or to a line that lies `beside_m` beside that, on the side of
+    wrist 1.
     """
     frames = _frames(q_rad, arm)
     _, elbow, wrist = _bends(frames)
@@ -216,7 +217,8 @@ def _beside(point: Array, axis: Array, frame: Array) -> Array:
 
 def _on_flange(frames: list[Array], point_m: ArrayLike) -> Array:
     """(…, 3) m, in the base frame, of points (…, 3) of the flange's frame."""
-    point: Array = frames[6][..., :3, 3] + np.einsum("...ij,...j->...i", frames[6][..., :3, :3], point_m)
+    points = np.asarray(point_m, dtype=np.float64)
+    point: Array = frames[6][..., :3, 3] + np.einsum("...ij,...j->...i", frames[6][..., :3, :3], points)
     return point
 
 
@@ -262,11 +264,9 @@ def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = 
     Carried from link to link, each seeing it in its own frame: a recording has many states.
     """
     angles = np.moveaxis(np.asarray(q_rad, dtype=np.float64) + arm.theta_rad, -1, 0)
-    x, y, z = np.zeros((3, *angles.shape[1:]))
     speeds = np.moveaxis(np.asarray(qd_rad_s, dtype=np.float64), -1, 0)
-    for cos, sin, speed, cos_alpha, sin_alpha in zip(
-        np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True
-    ):
+    x, y, z = np.zeros((3, *angles.shape[1:]))
+    for cos, sin, speed, *twist in zip(np.cos(angles), np.sin(angles), speeds, *_twists(arm), strict=True):
         x, y, z = cos * x + sin * y, cos * y - sin * x, z + speed
-        y, z = cos_alpha * y + sin_alpha * z, cos_alpha * z - sin_alpha * y
+        y, z = twist[0] * y + twist[1] * z, twist[0] * z - twist[1] * y
     return np.stack([x, y, z], axis=-1)

@@ -61,8 +61,9 @@ def shaped(readings: Array) -> Array:
 def _window(count: int) -> Array:
     """(n,) Blackman and Harris' window, of which the squares add up to 1."""
     phase = 2 * np.pi * (np.arange(count) + 0.5) / count
-    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
-    return window / np.sqrt(np.sum(window**2))
+    window = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
+    shares: Array = window / np.sqrt(np.sum(window**2))
+    return shares
 
 
 def freedom_at_zero(count: int) -> float:

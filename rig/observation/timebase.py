@@ -234,7 +234,8 @@ def _explained(turning: Array, seen: NDArray[np.bool_], moving: Array, lags: NDA
     together, total = spread[:, 3:, :3], np.trace(spread[:, :3, :3], axis1=1, axis2=2)
     inverse = np.linalg.pinv(spread[:, 3:, 3:], rcond=1e-10, hermitian=True)
     enough = (count[:, 0, 0] >= 0.5 * min(len(seen), moving.shape[1])) & (total > 0)
-    return np.sum(together * (inverse @ together), axis=(1, 2)) / np.where(enough, total, np.inf)
+    shares: Array = np.sum(together * (inverse @ together), axis=(1, 2)) / np.where(enough, total, np.inf)
+    return shares
 
 
 def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:

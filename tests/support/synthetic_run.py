@@ -120,31 +120,29 @@ class Motion:
         self.end_s = float(self.ends[-1]) + 1.0
 
     def joints(self, time_s: Array) -> tuple[Array, Array]:
-        """q (n, 6) and its derivative with respect to time (n, 6)."""
-        smooth, speed = np.empty((len(time_s), 6)), np.zeros((len(time_s), 6))
-        smooth[:] = self.plan.home_q_rad
-        place = np.searchsorted(self.ends, time_s)
-        place[time_s < 101.0] = -1
+        """q (n, 6) and its derivative with respect to time (n, 6), at rising times (n,)."""
         here = np.array(self.plan.home_q_rad)
-        smooth[place == -1] = here
-        for index, step in enumerate(self.plan.steps):
-            inside = place == index
+        smooth, speed = np.tile(here, (len(time_s), 1)), np.zeros((len(time_s), 6))
+        places = [np.searchsorted(time_s, 101.0), *np.searchsorted(time_s, self.ends, side="right")]
+        for step, end_s, inside in zip(self.plan.steps, self.ends, map(slice, places[:-1], places[1:]), strict=True):
             if isinstance(step, (Rest, Dwell)):
                 smooth[inside] = here
                 continue
-            fraction, rate = _trapezoid(time_s[inside] - (self.ends[index] - step.duration_s), step)
+            fraction, rate = _trapezoid(time_s[inside] - (end_s - step.duration_s), step)
             start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
             smooth[inside] = start + fraction[:, None] * (target - start)
             speed[inside] = rate[:, None] * (target - start)
             here = target
         q, gain = smooth.copy(), np.ones_like(smooth)
         for cycles, rate_share, phase in zip(self.cycles, self.rates, self.phases, strict=True):
-            q[:, 3:] += rate_share / cycles * np.sin(cycles * smooth[:, 3:] + phase)
-            gain[:, 3:] += rate_share * np.cos(cycles * smooth[:, 3:] + phase)
+            turned = cycles * smooth[:, 3:] + phase
+            q[:, 3:] += rate_share / cycles * np.sin(turned)
+            gain[:, 3:] += rate_share * np.cos(turned)
         qd, turn = gain * speed, 2 * np.pi * self.seen_hz
-        phase = turn * time_s[:, None] + self.seen_phases
-        q[:, 3:] += np.sqrt(2) * self.seen_rad_s / turn * np.sin(phase)
-        qd[:, 3:] += np.sqrt(2) * self.seen_rad_s * np.cos(phase)
+        if self.seen_rad_s:
+            phase = turn * time_s[:, None] + self.seen_phases
+            q[:, 3:] += np.sqrt(2) * self.seen_rad_s / turn * np.sin(phase)
+            qd[:, 3:] += np.sqrt(2) * self.seen_rad_s * np.cos(phase)
         return q, qd
 
     def events(self) -> tuple[Recorded, ...]:
