@@ -52,9 +52,7 @@ def load(
     masses, own = np.array([*bodies.masses_kg, payload_kg]), np.array([*bodies.centres_m, payload_centre_m])
     rotations, places = _frames(q, links)
     here = _centres(rotations, places, own)
-    before, after = (
-        _centres(*_frames(q + sign * STEP_S * qd + STEP_S**2 / 2 * qdd, links), own) for sign in (-1, 1)
-    )
+    before, after = (_centres(*_frames(q + sign * STEP_S * qd + STEP_S**2 / 2 * qdd, links), own) for sign in (-1, 1))
     forces = masses[:, None] * ((after - 2 * here + before) / STEP_S**2 + GRAVITY)
     turns = _cross(here - places[:-1, None], forces)  # (6, 7, 3): about each joint, of each mass
     axes = rotations[:-1, :, 2]
