@@ -56,9 +56,8 @@ class Drift:
         while len(self._knots) < knot + 2:
             fresh = self._random.standard_normal((_BLOCK, len(self._flicker) + 1, 3))
             flickers, steps = self._fresh * fresh[:, 1:], self._step * fresh[:, 0]
-            for flicker in flickers:  # in place: each goes on from the one before
-                flicker += self._keep * self._flicker
-                self._flicker = flicker
+            for number, new in enumerate(flickers):
+                self._flicker = flickers[number] = self._keep * self._flicker + new
             walks = np.add.accumulate([self._walk, *steps])[1:]
             self._walk = walks[-1]
             self._knots += (flickers.sum(axis=1) + walks).tolist()

@@ -41,7 +41,7 @@ class Connection:
     def __init__(self, network: "Network", peer: socket.socket, session: Session, listener: "Listener") -> None:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
-        self._due = b""  # what ticks made for this client and its wire does not take yet
+        self.due = b""  # what ticks made for this client and its wire does not take yet
         self._delivered_s = 0.0  # wall time
         self._ticks = 0
         self._wire = Wire(network.sockets.unread(peer), listener.lag_s, time.monotonic)
@@ -92,17 +92,17 @@ class Connection:
     def tick(self) -> None:
         """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
         self._ticks += 1
-        self._due = (b"" if self.listener.silent else self._due) + self.session.tick()
+        self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
         """Send what ticks made, unless `patient` and the client is too far behind: then the wall time to wait."""
-        if not self._due or self.listener.silent:
+        if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
             return 0.0
         wait_s = self.wait_s = self._wire.wait_s(self._ticks * TICK_S) if patient else 0.0
         if wait_s <= 0.0:
-            due, self._due = self._due, b""
+            due, self.due = self.due, b""
             self._delivered_s = time.monotonic()
             self.send(due)
         return wait_s
@@ -290,7 +290,8 @@ class Network:
         A tick is over when this returns 0. `idle`: the next one is not due yet, so that nothing is gathered any longer.
         `patient`: clients that are behind are waited for, as no real controller and no real board does.
         """
-        return max([connection.deliver(idle, patient) for connection in tuple(self.connections)], default=0.0)
+        due = [connection for connection in self.connections if connection.due]
+        return max([connection.deliver(idle, patient) for connection in due], default=0.0)
 
     def waited_for(self) -> str:
         """The clients that are behind, in words; any thread may ask."""

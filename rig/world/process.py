@@ -186,15 +186,17 @@ class World:
         polled_s = 0.0
         while not self._ended:
             wait_s = self.clock.wait_s()
-            behind_s = self.network.deliver(idle=wait_s > 0.0, patient=self.clock.time_scale > 1.0)
-            if behind_s or wait_s > 0.0 or time.monotonic() - polled_s >= BUSY_POLL_S:
+            due = wait_s <= 0.0
+            behind_s = self.network.deliver(idle=not due, patient=self.clock.time_scale > 1.0)
+            if behind_s or not due or time.monotonic() - polled_s >= BUSY_POLL_S:
                 self.network.poll(behind_s or min(wait_s, IDLE_POLL_S))
                 polled_s = time.monotonic()
+                due = self.clock.wait_s() <= 0.0
             if self._silent_until_s and time.monotonic() >= self._silent_until_s:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
-            if not behind_s and not self._ended and self.clock.wait_s() <= 0.0:
+            if due and not behind_s and not self._ended:
                 self._tick()
                 alive()
             elif wait_s > 0.0:

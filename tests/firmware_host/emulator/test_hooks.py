@@ -25,15 +25,17 @@ class PlainEngine(Engine):
     blocks = 0
     reads = 0
 
-    def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int]) -> None:
+    def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int | None]) -> None:
         def on_block(_handle: int, address: int, size: int) -> None:
             try:
                 PlainEngine.blocks += 1
-                if timeline.now >= timeline.deadline and not timeline.go_on():
+                may_run = timeline.now < timeline.deadline or timeline.go_on()
+                taken = measure(address, size) if may_run else None
+                if taken is None:
                     self.paused = True
                     self.stop()
                 else:
-                    timeline.now += measure(address, size)
+                    timeline.now += taken
             except BaseException as error:
                 self._fail(error)
 

@@ -9,16 +9,37 @@ from firmware_host.emulator.thumb import instructions, is_floating_point, word_a
 from support.paths import IMAGE
 
 ELF = IMAGE / "rig_l432.elf"
-FLASH = 0x08000000
 SEVERAL_WORDS = re.compile(r"(ldrd|strd|ldm|stm|vldr|vstr|vldm|vstm)")
+
+
+@cache
+def listed() -> list[tuple[int, bytes, str, str]]:
+    """Address, code, mnemonic and operands of every instruction of the image."""
+    listing = subprocess.run(["arm-none-eabi-objdump", "-dz", ELF], check=True, capture_output=True, text=True).stdout
+    lines = re.findall(r"^ +([0-9a-f]+):\t([0-9a-f ]+)\t(\S+)(?:\t([^@\n]*))?", listing, re.MULTILINE)
+    return [
+        (int(address, 16), b"".join(bytes.fromhex(halfword)[::-1] for halfword in code.split()), name, operands)
+        for address, code, name, operands in lines
+        if not name.startswith(".")
+    ]
 
 
 @cache
 def disassembly() -> dict[int, tuple[str, str]]:
     """Address → (mnemonic, operands) of every instruction of the image."""
-    listing = subprocess.run(["arm-none-eabi-objdump", "-dz", ELF], check=True, capture_output=True, text=True).stdout
-    lines = re.findall(r"^ +([0-9a-f]+):\t[0-9a-f ]+\t(\S+)(?:\t([^@\n]*))?", listing, re.MULTILINE)
-    return {int(address, 16): (name, operands) for address, name, operands in lines if not name.startswith(".")}
+    return {address: (name, operands) for address, _, name, operands in listed()}
+
+
+def stretches() -> list[tuple[int, bytes]]:
+    """Where each stretch of instructions starts, and its bytes: between them lie literals and tables."""
+    found: list[tuple[int, bytes]] = []
+    for address, code, _, _ in listed():
+        start, before = found[-1] if found else (0, b"")
+        if address == start + len(before):
+            found[-1] = start, before + code
+        else:
+            found.append((address, code))
+    return found
 
 
 @cache
@@ -26,13 +47,7 @@ def symbols() -> Symbols:
     return Symbols(ELF.read_bytes())
 
 
-def stretches() -> list[tuple[int, bytes]]:
-    """Where each stretch of instructions starts, and its bytes."""
-    image = (IMAGE / "rig_l432.bin").read_bytes()
-    return [(start, image[start - FLASH : end - FLASH]) for start, end in symbols().code()]
-
-
-def test_instructions_are_told_from_data_and_from_each_other() -> None:
+def test_instructions_are_told_from_each_other() -> None:
     found = {}
     for start, code in stretches():
         address = start
