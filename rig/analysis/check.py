@@ -67,4 +67,5 @@ def fitness(
 
 def check_name(sensor: str, quantity: str, what: str) -> str:
     """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
-    return f"{sensor}.{quantities()[quantity].prefix}{what}"
+    known = quantities().get(quantity)
+    return f"{sensor}.{f'{quantity}_' if known is None else known.prefix}{what}"

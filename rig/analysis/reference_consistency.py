@@ -15,9 +15,10 @@ from rig.analysis.reference_suspected import DAMAGES, Read, bias_over_time, of_p
 from rig.analysis.suspicion import Consistency, Statistic, basis, told_beside, told_by, told_from, unlike_the_others
 from rig.estimation.accelerometer_model import effects, predicted
 from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import likeliest
 from rig.estimation.imu_fit import slopes
 from rig.estimation.reading_errors import noise
-from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
+from rig.estimation.shared_errors import apart, information
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +45,14 @@ class HeldReadings:
     def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
         """Twice the logarithm of how much likelier the readings are with the columns, which is χ² where δ is known.
 
-        Where it is not, the limit is that of F, as far as δ is what the columns stand out against. Of anything at all
-        it is χ² of what the model leaves.
+        Each with the δ that makes them likeliest, of what the model leaves (Welham and Thompson, J. R. Stat. Soc. B 59
+        (1997) 701). Where δ is not known, the limit is that of F, as far as δ is what the columns stand out against. Of
+        anything at all it is χ² of what the model leaves.
         """
         from scipy.special import chdtri
 
         base = self._beside(beside)
-        std_rad = self._off(base)
+        std_rad, without = likeliest(self.growth, self.left, base)
         if columns is None:
             freedom = len(self.left) - base.shape[1]
             left = self._unexplained(base, std_rad)[1]
@@ -58,7 +60,8 @@ class HeldReadings:
         new = told_beside(basis(base), self.turn @ columns)
         if not new.shape[1]:
             return None
-        return more_likely(self._apart(), self.left, base, new), self._limit(base, new, std_rad, rate)
+        _, beside_new = likeliest(self.growth, self.left, base, new)
+        return 2 * (without - beside_new), self._limit(base, new, std_rad, rate)
 
     def told_from(self, damages: Array, suspected: Sequence[Array], rate: float) -> float:
         """The size from which on damages (n, k) are told by what is suspected: as `rig.analysis.suspicion` has it."""
@@ -86,10 +89,7 @@ class HeldReadings:
 
     def _off(self, base: Array) -> float:
         """δ, by what `base` leaves."""
-        return likeliest_error(self._apart(), self.left, base)
-
-    def _apart(self) -> Apart:
-        return Apart(np.eye(len(self.left)), self.growth)
+        return likeliest(self.growth, self.left, base)[0]
 
     def _unexplained(self, base: Array, std_rad: float) -> tuple[Array, Array]:
         """`base` and what it leaves, white."""
@@ -104,7 +104,7 @@ class HeldReadings:
 
     def _freedom(self, base: Array, std_rad: float) -> float:
         """Degrees of freedom of δ²: how many readings tell it."""
-        return 2 * information(self._apart(), std_rad, base) * std_rad**4
+        return 2 * information(self.growth, std_rad, base) * std_rad**4
 
     def _share(self, base: Array, columns: Array, std_rad: float) -> float:
         """Share of δ in the variance along columns, from 0 to 1."""

@@ -34,6 +34,7 @@ OWN_ERRORS = 3  # of a dwell: a small turn of the flange
 SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
 TURNS = 6  # of these ten, both turns
 OWN_SHARE = 0.2  # of δ², in what is off anew in each dwell; the others are what each wrist always errs by
+CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)  # [v]× of the axes
 SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
 
 
@@ -194,9 +195,9 @@ def jacobian(theta: Array, movement: Movement) -> Array:
     later = by_delay[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, 3)
     later[:, 1] = -movement.sweeps.speeds_rad_s[:, None] * waves[:, 2]
     later[:, 2] = movement.sweeps.speeds_rad_s[:, None] * waves[:, 1]
-    columns[..., REFERENCE] = _read(gravity, theta, movement)
-    columns[..., LEVER] = _read(of_lever(movement), theta, movement)
-    columns[..., DELAY] = _read(by_delay[..., None], theta, movement)[..., 0]
+    columns[..., REFERENCE] = _read(gravity, s, theta, movement)
+    columns[..., LEVER] = _read(of_lever(movement), s, theta, movement)
+    columns[..., DELAY] = _read(by_delay[..., None], s, theta, movement)[..., 0]
     columns[..., SECOND] = matrix(theta) * square[:, None, :]
     return columns.reshape(-1, PARAMETERS)
 
@@ -232,40 +233,40 @@ def turned(theta: Array, movement: Movement) -> Array:
     gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
     stations, places = np.unique(sweeps.stations, return_inverse=True)
     changes = np.zeros((len(gravity), 3, OWN_ERRORS * count + SHARED_ERRORS * len(stations)))
-    for dwell in range(count):
-        changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = cross(s[dwell])
-    for sweep, (axis, speed) in enumerate(zip(sweeps.axes_flange, sweeps.speeds_rad_s, strict=True)):
-        rows = slice(count + 3 * sweep, count + 3 * sweep + 3)
-        first = OWN_ERRORS * count + SHARED_ERRORS * places[sweep]
-        own = changes[rows, :, first : first + SHARED_ERRORS]
-        own[..., 0:3] = cross(s[rows])
-        own[..., 3:6] = gravity[rows] @ cross(theta[REFERENCE])
-        arm = sweeps.arms_m[sweep] + theta[LEVER]
-        own[..., 6:10] = _of_angle(gravity[rows] @ theta[REFERENCE], axis, speed**2, arm)
-        own *= SHARE
-    return _read(changes, theta, movement).reshape(3 * len(gravity), -1)
+    for dwell, own in enumerate(cross(s[:count])):
+        changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = own
+    in_base, pulled = gravity[count:] @ cross(theta[REFERENCE]), gravity[count:] @ theta[REFERENCE]
+    shared = SHARE * np.concatenate([cross(s[count:]), in_base, _of_angle(pulled, theta, sweeps)], axis=2)
+    for row, place in enumerate(np.repeat(places, 3)):
+        first = OWN_ERRORS * count + SHARED_ERRORS * place
+        changes[count + row, :, first : first + SHARED_ERRORS] = shared[row]
+    return _read(changes, s, theta, movement).reshape(3 * len(gravity), -1)
 
 
-def _of_angle(pulled: Array, axis: Array, speed_squared: float, arm: Array) -> Array:
-    """(3, 3, 4) change of mean, cosine and sine by waves w of the angle: gravity turns by w, the rate grows by ω w′.
+def _of_angle(pulled: Array, theta: Array, sweeps: Sweeps) -> Array:
+    """(3 M, 3, 4) change of what is felt by waves w of the angle: gravity `pulled` turns by w, the rate grows by ω w′.
 
     Gravity by w times the derivative of its first harmonic; centripetal 2 ω² w′ (a aᵀ − 1) (p + r) and Euler
     ω² w″ a × (p + r) have a first harmonic for the waves once a turn. What the delay changes in this is left out.
     """
-    _, cos, sin = pulled
-    centripetal, euler = (speed_squared * each for each in (axis * (axis @ arm) - arm, np.cross(axis, arm)))
-    changes = np.zeros((3, 3, 4))
-    changes[0, :, 0], changes[1, :, 0], changes[2, :, 0] = sin / 2, -euler, -2 * centripetal
-    changes[0, :, 1], changes[1, :, 1], changes[2, :, 1] = -cos / 2, 2 * centripetal, -euler
-    changes[1, :, 2], changes[2, :, 2] = sin / 2, cos / 2
-    changes[1, :, 3], changes[2, :, 3] = -cos / 2, sin / 2
-    return changes
+    axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
+    _, cos, sin = np.moveaxis(pulled.reshape(-1, 3, 3), 1, 0)
+    centripetal = squares * (axes * np.sum(axes * arms, axis=1, keepdims=True) - arms)
+    euler, nothing = squares * np.cross(axes, arms), np.zeros_like(arms)
+    waves = [
+        (sin / 2, -euler, -2 * centripetal),
+        (-cos / 2, 2 * centripetal, -euler),
+        (nothing, sin / 2, cos / 2),
+        (nothing, -cos / 2, sin / 2),
+    ]
+    return np.moveaxis(np.array(waves), (0, 1, 2), (3, 1, 0)).reshape(-1, 3, 4)
 
 
-def _read(changes: Array, theta: Array, movement: Movement) -> Array:
-    """What changes (K, 3, P) of s change in the readings."""
-    s = felt(theta, movement)[..., None]
-    grown: Array = changes + 2 * theta[SECOND][:, None] * _product(s, changes, movement)
+def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
+    """What changes (K, 3, P) of s (K, 3) change in the readings."""
+    if not theta[SECOND].any():
+        return np.asarray(matrix(theta) @ changes, dtype=np.float64)
+    grown: Array = changes + 2 * theta[SECOND][:, None] * _product(s[..., None], changes, movement)
     return np.asarray(matrix(theta) @ grown, dtype=np.float64)
 
 
@@ -292,7 +293,4 @@ def _waves(vectors: Array, movement: Movement) -> Array:
 
 def cross(vectors: Array) -> Array:
     """(…, 3, 3) matrices [v]×."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    nothing = np.zeros_like(x)
-    rows = [np.stack(row, axis=-1) for row in ((nothing, -z, y), (z, nothing, -x), (-y, x, nothing))]
-    return np.stack(rows, axis=-2)
+    return np.asarray((vectors @ CROSS.reshape(3, 9)).reshape(*vectors.shape, 3), dtype=np.float64)

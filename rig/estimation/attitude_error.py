@@ -9,7 +9,6 @@ well known as ever. For δ → 0 this is the fit of equal directions, for δ →
 δ is what restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) makes of the residuals.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,31 +143,47 @@ def _restricted(theta: Array, placed: Placed) -> float:
     """The likeliest δ."""
     r, v_bar = placed.attitudes, placed.v_bar
     turned = effects(theta, r, v_bar)
-    residuals = placed.readings - predicted(theta, r, v_bar)
+    white = whitening_with(placed.variances, turned, placed.attitude_std_rad)
+    spread = white @ turned
+    growth, directions = np.linalg.eigh(spread @ np.swapaxes(spread, -1, -2))
+    white = np.swapaxes(directions, -1, -2) @ white
+    residuals = whitened(white, placed.readings - predicted(theta, r, v_bar))
+    fit = weighted_jacobian(theta, r, v_bar, white, norm_known=placed.norm_known)
+    return likeliest(growth.clip(min=0.0).ravel(), residuals.ravel(), fit)[0]
+
+
+def likeliest(growth: Array, residuals: Array, slopes: Array, beside: Array | None = None) -> tuple[float, float]:
+    """δ, rad, that makes residuals (n,) of independent readings with variances 1 + δ² γ likeliest, and − ln of that.
+
+    The likelihood is of what the slopes (n, q) leave; columns (n, k) `beside` them explain more. It is up to a constant
+    that is of the slopes alone. δ is the best of a grid, then between its neighbours.
+    """
+    from scipy.optimize import minimize_scalar
+
+    count = slopes.shape[1]
+    # The likelihood does not know what the columns explain: by orthonormal ones, it keeps its digits.
+    basis = np.linalg.qr(slopes if beside is None else np.column_stack([slopes, beside]))[0]
+    left = residuals - basis @ (basis.T @ residuals)
 
     def lost(log_delta: float) -> float:
-        white = whitening_with(placed.variances, turned, np.hypot(placed.attitude_std_rad, np.exp(log_delta)))
-        fit = weighted_jacobian(theta, r, v_bar, white, norm_known=placed.norm_known)
-        orthogonal, triangle = np.linalg.qr(fit)
-        left = whitened(white, residuals).reshape(-1)
-        left = left - orthogonal @ (orthogonal.T @ left)
-        sizes = np.linalg.slogdet(white)[1].sum() - np.log(np.abs(np.diag(triangle))).sum()
-        return float(0.5 * left @ left - sizes)
-
-    return likeliest(lost)
-
-
-def likeliest(lost: Callable[[float], float]) -> float:
-    """δ, rad, of the least `lost` at ln δ: the best of a grid, then between its neighbours."""
-    from scipy.optimize import minimize_scalar
+        weights = 1 / (1 + np.exp(2 * log_delta) * growth)
+        weighted = basis * weights[:, None]
+        try:
+            lower = np.linalg.cholesky(basis.T @ weighted)
+        except np.linalg.LinAlgError:  # δ so far beyond the noise that rounding is all there is
+            return float("inf")
+        explained = np.linalg.solve(lower, left @ weighted)
+        chi_square = left**2 @ weights - explained @ explained
+        return float(0.5 * (chi_square - np.log(weights).sum()) + np.log(np.diag(lower)[:count]).sum())
 
     grid = np.linspace(np.log(SMALLEST_RAD), np.log(LARGEST_RAD), GRID)
     values = [lost(each) for each in grid]
     best = int(np.argmin(values))
     if best == 0 or values[0] - values[best] < 1e-6:
-        return 0.0  # no likelier than exact attitudes
+        return 0.0, lost(-np.inf)  # no likelier than exact attitudes
     bounds = grid[best - 1], grid[min(best + 1, GRID - 1)]
-    return float(np.exp(minimize_scalar(lost, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x))
+    found = minimize_scalar(lost, bounds=bounds, method="bounded", options={"xatol": 1e-5})
+    return float(np.exp(found.x)), float(found.fun)
 
 
 def _uncertainty(delta: float, fit: Array, turned: Array) -> float:

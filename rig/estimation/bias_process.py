@@ -4,7 +4,7 @@ The readings are averaged over windows. A random walk of rate q (rad/s per √s)
 from that of an earlier one the more the farther they are apart; flicker noise is between that and a scatter s that has
 no memory. How much of flicker a part of its kind has is known, for few averages tell it; walk and scatter beside that
 are found from the averages themselves by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971)
-545), which takes into account how much of the scatter the fitted parameters have taken up.
+545), the likelihood of what no value of the fitted parameters changes in them.
 """
 
 from collections.abc import Callable
@@ -181,8 +181,7 @@ def _bias_process(
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
         return BiasProcess(0.0, 0.0, max(freedom, 0), known)
-    # The likelihood does not know what the parameters explain. Left in, it would cost a quiet sensor half the digits.
-    means = means - z @ np.linalg.lstsq(z, means)[0]
+    free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # to which the parameters are nothing
     unit = walk_covariance(windows_s)
     flicker = _flicker(known, windows_s) if known else np.zeros(unit.shape)
     typical = float(np.median(variances))
@@ -192,8 +191,9 @@ def _bias_process(
     likelihood = np.zeros(len(squares))
     for axis in range(3):
         own = np.diag(variances[:, axis]) + flicker
-        walking = (own if shared is None else own + shared[axis]) + walks[:, None, None] * unit
-        likelihood += _restricted_likelihood(z, means[:, axis], walking, grid).ravel()
+        own = own if shared is None else own + shared[axis]
+        walking = free @ own @ free.T + walks[:, None, None] * (free @ unit @ free.T)
+        likelihood += _likelihood(free @ means[:, axis], walking, grid).ravel()
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom, known)
 
@@ -220,17 +220,13 @@ def _likeliest(sizes: Array, likelihood: Array) -> Array:
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
 
-def _restricted_likelihood(design: Array, means: Array, noise: Array, scatters: Array) -> Array:
-    """(K, L) logarithms, up to a constant, for noise covariances (K, N, N), each with L squared scatters beside it.
+def _likelihood(seen: Array, noise: Array, scatters: Array) -> Array:
+    """(K, L) logarithms, up to a constant, for noise covariances (K, n, n), each with L squared scatters beside it.
 
     A scatter adds to every eigenvalue alike, so each covariance is taken apart but once.
     """
     values, vectors = np.linalg.eigh(noise)
-    right = np.swapaxes(vectors, -1, -2) @ np.column_stack([design, means])  # (K, N, p + 1)
-    sizes = values[:, None, :] + scatters[:, None]
-    inner = np.swapaxes(right, -1, -2)[:, None] @ (right[:, None] / sizes[..., None])  # [ZᵀV⁻¹Z, ZᵀV⁻¹m; ·, mᵀV⁻¹m]
-    parameters, rest = inner[..., :-1, :-1], inner[..., :-1, -1]
-    explained = np.sum(rest * np.linalg.solve(parameters, rest[..., None])[..., 0], axis=-1)
-    determinants = np.log(sizes).sum(axis=-1) + np.linalg.slogdet(parameters)[1]
-    likelihood: Array = -0.5 * (determinants + inner[..., -1, -1] - explained)
+    squares = np.square(seen @ vectors)[:, None]
+    sizes = values[:, None] + scatters[:, None]
+    likelihood: Array = -0.5 * np.sum(np.log(sizes) + squares / sizes, axis=-1)
     return likelihood

@@ -97,9 +97,10 @@ def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     blind = weights - weighted @ np.linalg.solve(design.T @ weighted, np.swapaxes(weighted, -1, -2))  # to F, c, G
-    seen = np.einsum("pni,inm->pmi", effects, blind)
-    covariance = np.linalg.inv(np.eye(len(effects)) + np.einsum("pni,qni->pq", seen, effects))
-    return np.einsum("pq,qni->pni", covariance, seen), covariance
+    known = np.moveaxis(effects, 2, 0)
+    seen = known @ blind  # (3, P, N)
+    covariance = np.linalg.inv(np.eye(len(effects)) + np.sum(seen @ np.swapaxes(known, 1, 2), axis=0))
+    return np.moveaxis(covariance @ seen, 0, 2), covariance
 
 
 def _known_to(solution: VectorSolution, whole: Array, left: Array, noise: Array, speed_noise: Array) -> VectorSolution:
@@ -110,8 +111,8 @@ def _known_to(solution: VectorSolution, whole: Array, left: Array, noise: Array,
     """
     columns = whole.shape[1]
     of_speed = np.einsum("ipjn,nj->ipn", whole, speed_noise).reshape(3 * columns, -1)
-    raw = np.einsum("ipjn,jnm,kqjm->ipkq", whole, noise, whole).reshape(3 * columns, 3 * columns)
-    raw += of_speed @ of_speed.T
+    by_axis = np.moveaxis(whole.reshape(3 * columns, 3, -1), 1, 0)
+    raw = np.sum(by_axis @ noise @ np.swapaxes(by_axis, 1, 2), axis=0) + of_speed @ of_speed.T
     of_matrix, of_gravity = places(columns)
     matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(solution.matrix, solution.scale)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.shared_errors import of_white
 
 WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
@@ -57,9 +56,12 @@ def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[floa
     typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
     walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES) if std_rad is None else np.array([std_rad])
-    whites = [np.linalg.inv(np.linalg.cholesky(seen.known + rate**2 * seen.walk)) for rate in walks]
-    of_arm = [seen.effects(share) for share in shares]
-    belief = np.array([[_likelihood(seen, white, effects, sizes) for white in whites] for effects in of_arm])
+    columns = seen.slopes.shape[1]
+    free = np.linalg.qr(seen.slopes, mode="complete")[0][:, columns:].T  # to which the columns are nothing
+    left, known, walk = free @ seen.left, free @ seen.known @ free.T, free @ seen.walk @ free.T
+    whites = [np.linalg.inv(np.linalg.cholesky(known + rate**2 * walk)) for rate in walks]
+    of_arm = [free @ seen.effects(share) for share in shares]
+    belief = np.array([[_likelihood(left, white, effects, sizes) for white in whites] for effects in of_arm])
     belief[:, 1:] -= np.log(WALKS)
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
@@ -94,19 +96,14 @@ def expected_disturbances(seen: Scattered, sizes: Sizes, causes: Sequence[Array]
     return expected
 
 
-def _likelihood(seen: Scattered, white: Array, effects: Array, sizes: Array) -> Array:
-    """(k,) logarithms of the restricted likelihood, up to a constant, for `sizes` (k,) of δ.
+def _likelihood(left: Array, white: Array, effects: Array, sizes: Array) -> Array:
+    """(k,) logarithms of the likelihood of what is left (n,), up to a constant, for `sizes` (k,) of δ.
 
     `white` (n, n), triangular, leaves white all that is known beside the `effects` (n, P) of the arm.
     """
-    found = of_white(white, effects)
-    basis, triangle = np.linalg.qr(found.turn @ seen.slopes)
-    left = found.turn @ seen.left
-    left = left - basis @ (basis.T @ left)  # the likelihood does not know what the columns explain
-    variance = 1 + np.square(sizes)[:, None] * found.growth
-    weighted = basis / variance[..., None]
-    information, rest = basis.T @ weighted, left @ weighted
-    explained = np.sum(rest * np.linalg.solve(information, rest[..., None])[..., 0], axis=1)
-    lost = np.log(variance).sum(axis=1) + np.linalg.slogdet(information)[1] + (left**2 / variance).sum(axis=1)
-    turned = np.log(np.diag(white)).sum() - np.log(np.abs(np.diag(triangle))).sum()
-    return np.asarray(turned - (lost - explained) / 2, dtype=np.float64)
+    spread = white @ effects
+    growth, directions = np.linalg.eigh(spread @ spread.T)
+    squares = np.square(white @ left @ directions)
+    variance = 1 + np.square(sizes)[:, None] * growth.clip(min=0.0)
+    lost = np.sum(np.log(variance) + squares / variance, axis=1)
+    return np.asarray(np.log(np.diag(white)).sum() - lost / 2, dtype=np.float64)

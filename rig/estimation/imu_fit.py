@@ -77,15 +77,16 @@ def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_
     """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
     theta, steps = start, 0
     delta, last = attitude_std_rad or 0.0, np.inf
+    readings = apart(noise(theta, movement), effects(theta, movement))
     for _ in range(PASSES):
-        readings = apart(noise(theta, movement), effects(theta, movement))
         theta, taken = _least_squares(theta, movement, held, readings.white(delta))
         steps += taken
         if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
             break
         slopes = jacobian(theta, movement) @ free_ways(theta, held)
         residuals = (movement.readings() - predicted(theta, movement)).ravel()
-        last, delta = delta, likeliest_error(apart(noise(theta, movement), effects(theta, movement)), residuals, slopes)
+        readings = apart(noise(theta, movement), effects(theta, movement))
+        last, delta = delta, likeliest_error(readings, residuals, slopes)
     free = free_ways(theta, held)
     return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
 

@@ -48,6 +48,15 @@ class Course:
 
 
 @dataclass(frozen=True, slots=True)
+class Track:
+    """The course at each of n readings: attitudes (n, 3, 3) and rates (n, 3), and S (3, 12) at the last."""
+
+    attitudes: Array
+    rates_rad_s: Array
+    sensitivity: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Increments:
     """How the body turned between w pairs of instants.
 
@@ -67,18 +76,11 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
 
     Times rise strictly, instants rise and lie within them: ValueError otherwise.
     """
-    if len(time_s) < 2 or readings.shape != (len(time_s), 3) or not (np.diff(time_s) > 0).all():
-        raise ValueError("a course needs readings (n, 3) at two rising times (n,) at least")
     if len(at_s) and (at_s[0] < time_s[0] or at_s[-1] > time_s[-1] or (np.diff(at_s) < 0).any()):
         raise ValueError("instants must rise, and lie within the readings' times")
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-    rates = (readings - bias) @ inverse.T
-    slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
-    slopes[2:-2] = (8 * (rates[3:-1] - rates[1:-3]) - rates[4:] + rates[:-4]) / 12
-    found = [
-        _in_block(_Stretch(time_s[taken], rates[taken], slopes[taken]), at_s[asked], inverse)
-        for taken, asked in _blocks(time_s, at_s)
-    ]
+    whole = _stretch(time_s, (readings - bias) @ inverse.T)
+    found = [_in_block(whole.part(taken), at_s[asked], inverse) for taken, asked in _blocks(time_s, at_s)]
     attitude, sensitivity = np.eye(3), np.zeros((3, PARAMETERS))
     attitudes, sensitivities, there = [], [], []
     for c, s, w in found:
@@ -87,6 +89,18 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
         there.append(w)
         attitude, sensitivity = attitude @ c[-1], sensitivity + attitude @ s[-1]
     return Course(at_s, np.concatenate(attitudes), np.concatenate(sensitivities), np.concatenate(there))
+
+
+def track(time_s: Array, readings: Array, matrix: Array) -> Track:
+    """The course at the readings themselves, given less their bias; otherwise as `course`."""
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    whole = _stretch(time_s, readings @ inverse.T)
+    steps = _whole_steps(whole)
+    attitudes = _running_product(steps.vectors)
+    middle = attitudes[:-1] @ steps.middle(inverse)
+    by_matrix = np.tensordot(middle, steps.turned, (0, 0)).reshape(3, 9)
+    by_bias = np.tensordot(middle, steps.lasting_s, (0, 0))[..., 0]
+    return Track(attitudes, whole.rates, np.hstack([by_matrix, by_bias]))
 
 
 def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
@@ -120,35 +134,63 @@ class _Stretch:
     rates: Array
     slopes: Array
 
+    def part(self, taken: slice) -> "_Stretch":
+        return _Stretch(self.time_s[taken], self.rates[taken], self.slopes[taken])
+
+
+def _stretch(time_s: Array, rates: Array) -> _Stretch:
+    if len(time_s) < 2 or rates.shape != (len(time_s), 3) or not (np.diff(time_s) > 0).all():
+        raise ValueError("a course needs readings (n, 3) at two rising times (n,) at least")
+    slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
+    slopes[2:-2] = (8 * (rates[3:-1] - rates[1:-3]) - rates[4:] + rates[:-4]) / 12
+    return _Stretch(time_s, rates, slopes)
+
 
 def _in_block(taken: _Stretch, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
     """C and S at the instants of a block and, last, at its end, in body coordinates of its beginning; the rates."""
     before = np.clip(np.searchsorted(taken.time_s, at_s, side="right") - 1, 0, len(taken.time_s) - 2)
-    every = np.arange(len(taken.time_s) - 1)
-    whole = _step(taken, every, np.ones(len(every)), inverse)
+    whole = _whole_steps(taken)
     attitudes = _running_product(whole.vectors)
     sensitivities = np.zeros((len(taken.time_s), 3, PARAMETERS))
-    np.cumsum(attitudes[:-1] @ whole.sensitivities, axis=0, out=sensitivities[1:])
-    part = _step(taken, before, (at_s - taken.time_s[before]) / np.diff(taken.time_s)[before], inverse)
+    np.cumsum(whole.sensitivities(attitudes[:-1], inverse), axis=0, out=sensitivities[1:])
+    part, rates = _steps(taken, before, (at_s - taken.time_s[before]) / np.diff(taken.time_s)[before])
     c = attitudes[before] @ _matrices(part.vectors)
-    s = sensitivities[before] + attitudes[before] @ part.sensitivities
-    return np.concatenate([c, attitudes[-1:]]), np.concatenate([s, sensitivities[-1:]]), part.rates
+    s = sensitivities[before] + part.sensitivities(attitudes[before], inverse)
+    return np.concatenate([c, attitudes[-1:]]), np.concatenate([s, sensitivities[-1:]]), rates
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
-    """Steps from readings on: rotation vectors φ (k, 3), S (k, 3, 12) in body coordinates of the start, rates then."""
+class _Steps:
+    """Steps from readings on: rotation vectors φ (k, 3), of which `turned` (k, 3) is without coning, times (k, 1)."""
 
     vectors: Array
-    sensitivities: Array
-    rates: Array
+    turned: Array
+    lasting_s: Array
+
+    def middle(self, inverse: Array) -> Array:
+        """How the rates' errors turn the steps, (k, 3, 3) in body coordinates of their start.
+
+        The attitude half-way stands for all of the step: that is the exponential's derivative to φ²/24.
+        """
+        return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
+
+    def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
+        """S (k, 3, 12) of each step from `attitudes` (k, 3, 3) on."""
+        middle = (attitudes @ self.middle(inverse))[..., None]
+        by_matrix = middle * self.turned[:, None, None, :]
+        return np.concatenate([by_matrix.reshape(-1, 3, 9), middle[..., 0] * self.lasting_s[..., None]], axis=2)
 
 
-def _step(taken: _Stretch, start: NDArray[np.intp], part: Array, inverse: Array) -> _Step:
-    """Steps from readings `start` (k,) a `part` (k,) of the way to the next.
+def _whole_steps(taken: _Stretch) -> _Steps:
+    """The steps from each reading to the next."""
+    h = np.diff(taken.time_s)[:, None]
+    (w0, w1), (d0, d1) = ((each[:-1], each[1:]) for each in (taken.rates, taken.slopes))
+    turned = h * ((w0 + w1) / 2 + (d0 - d1) / 12)
+    return _Steps(turned + h**2 * np.cross(w0, w1) / 12, turned, h)
 
-    The attitude half-way stands for all of the step in S: that is the exponential's derivative to φ²/24.
-    """
+
+def _steps(taken: _Stretch, start: NDArray[np.intp], part: Array) -> tuple[_Steps, Array]:
+    """Steps from readings `start` (k,) a `part` (k,) of the way to the next, and the rates (k, 3) then."""
     u = part[:, None]
     h = np.diff(taken.time_s)[start][:, None]
     w0, w1, d0, d1 = (each[place] for each in (taken.rates, taken.slopes) for place in (start, start + 1))
@@ -159,11 +201,7 @@ def _step(taken: _Stretch, start: NDArray[np.intp], part: Array, inverse: Array)
         + (u**4 / 4 - u**3 / 3) * d1
     )
     rates = w0 + u**2 * (3 - 2 * u) * (w1 - w0) + u * (1 - u) * ((1 - u) * d0 - u * d1)
-    vectors = turned + (u * h) ** 2 * np.cross(w0, rates) / 12
-    middle = -_matrices(vectors / 2) @ inverse
-    by_matrix = middle[..., None] * turned[:, None, None, :]
-    by_bias = middle * (u * h)[..., None]
-    return _Step(vectors, np.concatenate([by_matrix.reshape(-1, 3, 9), by_bias], axis=2), rates)
+    return _Steps(turned + (u * h) ** 2 * np.cross(w0, rates) / 12, turned, u * h), rates
 
 
 def _matrices(vectors: Array) -> Array:

@@ -52,36 +52,40 @@ class _Linear:
     turned: Array
     std_rad: Array
 
-    def fit(self, delta: float, zeta: float) -> "_Fit":
-        """The fit for given sizes of the errors: the step, its covariance by causes, and the restricted likelihood."""
+    def fits(self, delta: float, zetas: Array) -> "_Fits":
+        """The fits for given sizes of the errors: steps, their covariances by causes, the restricted likelihoods."""
         spread = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],
             ATTITUDES: spread @ np.swapaxes(spread, -1, -2),
-            PLACEMENTS: np.broadcast_to(zeta**2 * np.eye(3), spread.shape),
+            PLACEMENTS: zetas[:, None, None, None] ** 2 * np.eye(3),
         }
         covariance = errors[NOISE] + errors[ATTITUDES] + errors[PLACEMENTS]
-        weight = np.linalg.inv(covariance)
-        weighted = weight @ self.design
-        information = np.einsum("nip,niq->pq", self.design, weighted)
-        unit = 1 / np.sqrt(np.diag(information))
-        inverse = np.linalg.inv(information * unit[:, None] * unit) * unit[:, None] * unit
-        step = inverse @ np.einsum("nip,ni->p", weighted, self.residuals)
-        left = self.residuals - self.design @ step
-        chi_square = float(np.einsum("ni,nij,nj->", left, weight, left))
-        sizes = float(np.linalg.slogdet(covariance)[1].sum() + np.linalg.slogdet(information)[1])
+        weighted = np.linalg.solve(covariance, self.design)
+        columns = self.design.shape[-1]
+        across = np.swapaxes(weighted.reshape(len(zetas), -1, columns), 1, 2)
+        information = across @ self.design.reshape(-1, columns)
+        unit = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+        unit = unit[:, :, None] * unit[:, None]
+        inverse = np.linalg.inv(information * unit) * unit
+        steps = (inverse @ (across @ self.residuals.ravel())[..., None])[..., 0]
+        left = self.residuals[..., None] - self.design @ steps[:, None, :, None]
+        chi_square = np.sum(left * np.linalg.solve(covariance, left), axis=(1, 2, 3))
+        sizes = np.linalg.slogdet(covariance)[1].sum(axis=1) + np.linalg.slogdet(information)[1]
         causes = {
-            name: inverse @ np.einsum("nip,nij,njq->pq", weighted, each, weighted) @ inverse
+            name: inverse @ across @ (each @ weighted).reshape(len(zetas), -1, columns) @ inverse
             for name, each in errors.items()
         }
-        return _Fit(step, causes, -0.5 * (chi_square + sizes))
+        return _Fits(steps, causes, -0.5 * (chi_square + sizes))
 
 
 @dataclass(frozen=True, slots=True)
-class _Fit:
-    step: Array
+class _Fits:
+    """Steps (k, q), their covariances (k, q, q) by causes, the logarithms (k,) of the likelihood."""
+
+    steps: Array
     causes: dict[str, Array]
-    likelihood: float
+    likelihood: Array
 
 
 def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variances: Array) -> LaidDown:
@@ -98,14 +102,14 @@ def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variance
     size = float(np.linalg.norm(theta[REFERENCE]))
     sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, GRID)
     looked = np.array([(delta, size * each) for delta in sizes for each in sizes])
-    fits = [linear.fit(delta, zeta) for delta, zeta in looked.tolist()]
-    likelihood = np.array([fit.likelihood for fit in fits]) + _before(looked, size)
+    fits = [linear.fits(delta, size * sizes) for delta in sizes.tolist()]
+    likelihood = np.concatenate([each.likelihood for each in fits]) + _before(looked, size)
     weights = np.exp(likelihood - likelihood.max())
     weights /= weights.sum()
-    steps = np.array([fit.step for fit in fits])
+    steps = np.concatenate([each.steps for each in fits])
     step = weights @ steps
     causes = {
-        name: free @ np.tensordot(weights, np.array([fit.causes[name] for fit in fits]), 1) @ free.T
+        name: free @ np.tensordot(weights, np.concatenate([each.causes[name] for each in fits]), 1) @ free.T
         for name in (NOISE, ATTITUDES, PLACEMENTS)
     }
     causes[PLACEMENTS] = causes[PLACEMENTS] + free @ ((steps - step).T * weights @ (steps - step)) @ free.T

@@ -101,7 +101,7 @@ def free_directions(theta: Array, *, norm_known: bool) -> Array:
     mirror = unit + sign * np.array([1.0, 0.0, 0.0])
     mirror = mirror / np.linalg.norm(mirror, axis=-1, keepdims=True)
     free[..., REFERENCE, REFERENCE] = np.eye(3) - 2 * mirror[..., :, None] * mirror[..., None, :]
-    return np.delete(free, 9, axis=-1)
+    return free[..., np.arange(p) != REFERENCE.start]
 
 
 def whitening(variances: Array) -> Array:
@@ -117,7 +117,10 @@ def whitened(white: Array, residuals: Array) -> Array:
 
 def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
     """W J (…, 3 N, q), reduced to the free directions: (W J)ᵀ W J is the Fisher information."""
-    free = free_directions(theta, norm_known=norm_known)
+    return _reduced(theta, attitudes, v_bar, white, free_directions(theta, norm_known=norm_known))
+
+
+def _reduced(theta: Array, attitudes: Array, v_bar: Array, white: Array, free: Array) -> Array:
     rows = white @ jacobian(theta, attitudes, v_bar)
     reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
     return reduced
@@ -125,11 +128,11 @@ def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, white: Array
 
 def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
     """(…, p, p) inverse of the Fisher information: the covariance of the maximum-likelihood estimate to first order."""
-    reduced = weighted_jacobian(theta, attitudes, v_bar, white, norm_known=norm_known)
+    free = free_directions(theta, norm_known=norm_known)
+    reduced = _reduced(theta, attitudes, v_bar, white, free)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)
     scaled = reduced / size
     inverse = np.linalg.inv(np.swapaxes(scaled, -1, -2) @ scaled) / (np.swapaxes(size, -1, -2) * size)
-    free = free_directions(theta, norm_known=norm_known)
     bound: Array = free @ inverse @ np.swapaxes(free, -1, -2)
     return bound
 
@@ -143,14 +146,15 @@ def most_likely(
     steps = 0
     while steps < STEP_LIMIT:
         steps += 1
-        reduced = weighted_jacobian(theta, attitudes, v_bar, white, norm_known=norm_known)
+        free = free_directions(theta, norm_known=norm_known)
+        reduced = _reduced(theta, attitudes, v_bar, white, free)
         residuals = whitened(white, readings - predicted(theta, attitudes, v_bar))
         size = np.linalg.norm(reduced, axis=-2)
         scaled = reduced / size[..., None, :]
-        right = np.einsum("...rq,...r->...q", scaled, residuals.reshape(*residuals.shape[:-2], -1))
-        step = np.linalg.solve(np.swapaxes(scaled, -1, -2) @ scaled, right[..., None])[..., 0]
-        free = free_directions(theta, norm_known=norm_known)
-        theta = theta + np.einsum("...pq,...q->...p", free, step / size)
+        across = np.swapaxes(scaled, -1, -2)
+        right = across @ residuals.reshape(*residuals.shape[:-2], -1, 1)
+        step = np.linalg.solve(across @ scaled, right)[..., 0]
+        theta = theta + (free @ (step / size)[..., None])[..., 0]
         if norm_known:
             reference = theta[..., REFERENCE]
             theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))

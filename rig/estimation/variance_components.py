@@ -131,7 +131,7 @@ class MixedModel:
         def lost(logarithms: Array) -> float:
             strayed = float(np.sum(((logarithms - middle) / spread) ** 2)) / 2
             try:
-                return strayed - self._fit(_sizes(logarithms))[2]
+                return strayed - self._factored(_sizes(logarithms))[2]
             except np.linalg.LinAlgError:  # sizes so far apart that rounding is all there is
                 return float("inf")
 
@@ -145,6 +145,14 @@ class MixedModel:
         return _sizes(np.asarray(found.x, dtype=np.float64))
 
     def _fit(self, sizes: Sizes) -> tuple[Array, Array, float]:
+        lower, told, likelihood = self._factored(sizes)
+        inverse = np.linalg.inv(lower)
+        return inverse.T @ told, inverse.T @ inverse, likelihood
+
+    def _factored(self, sizes: Sizes) -> tuple[Array, Array, float]:
+        """L (p, p) of the information L Lᵀ, and L⁻¹ Xᵀ y (p,), both of white rows, and the likelihood's logarithm."""
+        from scipy.linalg import solve_triangular
+
         columns = self._design.shape[2]
         variances = sizes.scattered**2 * self._spread + sizes.walked**2
         weights = 1 / np.sqrt(variances)[:, None]
@@ -157,13 +165,11 @@ class MixedModel:
             known -= 2 * len(group) * np.log(size)
         information = design.T @ design + np.diag(precision)
         unit = 1 / np.sqrt(np.diag(information))
-        lower = np.linalg.cholesky(information * unit[:, None] * unit)
-        inverse = np.linalg.inv(lower) * unit
-        covariance = inverse.T @ inverse
-        theta = covariance @ (design.T @ observed)
-        left = float(observed @ observed - theta @ information @ theta)
-        determinant = 2 * float(np.sum(np.log(np.diag(lower))) - np.sum(np.log(unit)))
-        return theta, covariance, -0.5 * (3 * float(np.sum(np.log(variances))) + determinant - known + left)
+        lower = np.linalg.cholesky(information * unit[:, None] * unit) / unit[:, None]
+        told = solve_triangular(lower, observed @ design, lower=True, check_finite=False)
+        left = float(observed @ observed - told @ told)
+        determinant = 2 * float(np.sum(np.log(np.diag(lower))))
+        return lower, told, -0.5 * (3 * float(np.sum(np.log(variances))) + determinant - known + left)
 
 
 def widened(covariance: Array, freedom: Array) -> Array:

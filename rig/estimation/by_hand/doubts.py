@@ -1,7 +1,7 @@
 """What of a session contradicts all the rest of it, by name.
 
-Each doubt is that some factors are not what they were taken for: they are left out, and what is left is compared. The
-doubt after which least is left is the one that is named.
+Each doubt is that some factors are not what they were taken for: each of their equations gets a column, which leaves it
+out, and what is left is compared. The doubt after which least is left is the one that is named.
 
 One rest or turn that is far off makes the sizes large that are found of a hand, and hides behind them: the result
 holds, with a larger U. It is found by the sizes without it (`hidden`). A bias is left out of this: real ones go by
@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.by_hand.fit import Fit, resized, sized_anew, solved
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand.fit import Fit, resized, sized_anew, solved, white
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
 from rig.estimation.by_hand.session import LARGEST, STATED, Sizes
 
@@ -30,6 +31,7 @@ OF_DOUBT = {
 JUMP_RAD_S = 1e-3  # no bias walks so far from one rest to the next
 OF_ONE, HIDING = 3.0, ("repeat_rad", "closure_rad")  # sizes that one rest or move makes so many times as large
 HIDDEN = ("not_flat", "table_moved", "turn_not_closed")
+FREE = 1e-9  # of an equation: where less of it is left, the others do not tell what it says
 AT_ONCE = 8.0  # the same where somebody stands beside it and can do it again: 1 in 10^3
 
 
@@ -44,8 +46,7 @@ class Doubt:
 
 def doubted(fit: Fit, since: int | None = None) -> Fault | None:
     """What is wrong with a session, or with what came `since` a rest; None where nothing is."""
-    told = [Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, since)]
-    worst = max(told, key=lambda each: each.less, default=None)
+    worst = max(_told(fit, since), key=lambda each: each.less, default=None)
     if worst is not None and worst.less > (BY_MUCH if since is None else AT_ONCE):
         return named(fit, worst)
     return None if since is not None else _beyond(fit)
@@ -55,7 +56,7 @@ def hidden(fit: Fit) -> Fault | None:
     """The one rest or turn by which the sizes of a hand are much larger than they are without it, and with them U."""
     if not _much_larger(fit.sizes, STATED):
         return None
-    told = sorted((Doubt(*doubt, _less(fit, *doubt)) for doubt in _doubts(fit, None)), key=lambda each: each.less)
+    told = sorted(_told(fit, None), key=lambda each: each.less)
     most = {each.name: each for each in told if each.name in HIDDEN}
     anew = [replace(each, less=_less_anew(fit, each.name, each.at)) for each in most.values()]
     worst = max(anew, key=lambda each: each.less, default=None)
@@ -78,31 +79,39 @@ def _doubts(fit: Fit, since: int | None) -> Iterator[tuple[str, int]]:
         yield from (("table_moved", at) for at in range(max(first, 1), count) if faces[at] is not None)
 
 
-def _without(fit: Fit, name: str, at: int) -> tuple[list[Factor], int]:
-    """The rows of a session without what is doubted, and how many equations these are fewer."""
-    if name == "table_moved":
-        return [_after(fit, row, at) for row in fit.factors], 2
-    rows = [row for row in fit.factors if not _is(row, at, *OF_DOUBT[name])]
-    return rows, sum(len(row.missed) for row in fit.factors) - sum(len(row.missed) for row in rows)
+def _told(fit: Fit, since: int | None) -> list[Doubt]:
+    """The doubts, each with the chi square that goes with what is doubted, beyond what goes with as many equations.
 
+    What the solution takes up of its columns goes with it in any case, so the graph is not solved for each doubt.
+    """
+    design, missed = white(fit.factors)
+    std = np.concatenate([row.std for row in fit.factors])
+    basis = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
 
-def _less(fit: Fit, name: str, at: int) -> float:
-    """The chi square that goes with what is doubted, beyond what goes with as many equations."""
-    rows, freed = _without(fit, name, at)
-    try:
-        return _left_of(fit.factors) - _least(rows) - A_ROW * freed if freed else 0.0
-    except np.linalg.LinAlgError:
-        return 0.0
+    def without(taken: Array) -> Array:
+        return np.asarray(taken - basis @ (basis.T @ taken), dtype=np.float64)
+
+    left, told = without(missed), []
+    for name, at in _doubts(fit, since):
+        columns = without(_columns(fit, name, at) / std[:, None])
+        rest = left - columns @ np.linalg.lstsq(columns, left, rcond=FREE)[0]
+        less = float(missed @ missed - rest @ rest) - A_ROW * columns.shape[1]
+        told.append(Doubt(name, at, less if columns.size else 0.0))
+    return told
 
 
 def _less_anew(fit: Fit, name: str, at: int) -> float:
     """The chi square that goes, by the sizes without what is doubted; 0 where none of these is much smaller."""
-    rows, freed = _without(fit, name, at)
+    columns = _columns(fit, name, at)
+    ends = np.cumsum([len(row.missed) for row in fit.factors])[:-1]
+    parts = zip(fit.factors, np.split(columns, ends), strict=True)
+    rows = [replace(row, design=np.hstack([row.design, part])) for row, part in parts]
     try:
         rows, sizes = sized_anew(rows, fit.sizes)
-        if not freed or not _much_larger(fit.sizes, sizes):
+        if not columns.size or not _much_larger(fit.sizes, sizes):
             return 0.0
-        return _least(resized(fit.factors, fit.sizes, sizes)) - _least(rows) - A_ROW * freed
+        less = _least(resized(fit.factors, fit.sizes, sizes)) - _least(rows)
+        return less - float(A_ROW * columns.shape[1])
     except np.linalg.LinAlgError:
         return 0.0
 
@@ -111,8 +120,16 @@ def _is(row: Factor, at: int, *kinds: str) -> bool:
     return row.at == at and row.kind in kinds
 
 
-def _after(fit: Fit, row: Factor, at: int) -> Factor:
-    """The row with two columns more: how the table leans from rest `at` on, and by what the way there turned more.
+def _columns(fit: Fit, name: str, at: int) -> Array:
+    """(R, q) columns beside the design of all R equations, for what is doubted."""
+    if name == "table_moved":
+        return np.concatenate([_leaning_from(fit, row, at) for row in fit.factors])
+    out = np.concatenate([np.full(len(row.missed), _is(row, at, *OF_DOUBT[name])) for row in fit.factors])
+    return np.eye(len(out))[:, out]
+
+
+def _leaning_from(fit: Fit, row: Factor, at: int) -> Array:
+    """(r, 2) of a row: how the table leans from rest `at` on, and by what the way there turned more.
 
     Not so at the last rest: there, a side that does not lie flat looks like this.
     """
@@ -121,7 +138,7 @@ def _after(fit: Fit, row: Factor, at: int) -> Factor:
         other = row.design[:, TABLE]
     elif row.kind == MOVE and row.at == at - 1 and at < len(fit.session.rests) - 1:
         other = fit.state.attitudes[row.at].T[:, :2] @ np.array([[0.0, -1.0], [1.0, 0.0]])
-    return replace(row, design=np.hstack([row.design, other]))
+    return other
 
 
 def _much_larger(sizes: Sizes, than: Sizes) -> bool:
@@ -130,12 +147,8 @@ def _much_larger(sizes: Sizes, than: Sizes) -> bool:
 
 def _least(rows: Sequence[Factor]) -> float:
     """What is left of the rows where it is least."""
-    step, _ = solved(rows)
-    return _left_of([replace(row, missed=row.missed + row.design @ step) for row in rows])
-
-
-def _left_of(rows: Sequence[Factor]) -> float:
-    return sum(float(np.sum((row.missed / row.std) ** 2)) for row in rows)
+    design, missed = white(rows)
+    return float(np.sum(np.square(missed + design @ solved(rows)[0])))
 
 
 def named(fit: Fit, doubt: Doubt) -> Fault:

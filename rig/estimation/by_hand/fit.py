@@ -12,7 +12,7 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.faces import faced
-from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, WALK, Factor, Graph, State, factors
+from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, PRIOR, WALK, Factor, Graph, State, factors
 from rig.estimation.by_hand.moves import Moved, Taken, moved
 from rig.estimation.by_hand.session import LARGEST, STATED, Faced, Handled, Sizes, Told
 
@@ -49,9 +49,8 @@ class Fit:
 
     def freedom_of(self, factor: Factor) -> Array:
         """(r,) share of each row of a factor that the solution does not take up."""
-        design = factor.design / factor.std[:, None]
-        taken: Array = np.einsum("rp,pq,rq->r", design, self.covariance, design)
-        return np.asarray(np.clip(1 - taken, 1e-6, 1.0), dtype=np.float64)
+        design, _ = white([factor])
+        return np.asarray(np.clip(1 - _taken(design, self.covariance), 1e-6, 1.0), dtype=np.float64)
 
 
 def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
@@ -66,21 +65,19 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
     on = faced(session, told, seen)
     state, iterations, settled = _start(seen, on, begun), 0, False
     while iterations < PASSES and not settled:
-        rows = tuple(factors(Graph(session, on, told, state, seen, found)))
+        rows = list(factors(Graph(session, on, told, state, seen, found)))
+        if iterations:
+            rows, found = sized_anew(rows, found, trusted)
         step, covariance = solved(rows)
-        for _ in range(SIZED if iterations else 0):
-            found = _sized([row for row in rows if trusted is None or _ends(row) < trusted], step, covariance, found)
-            rows = tuple(factors(Graph(session, on, told, state, seen, found)))
-            step, covariance = solved(rows)
         if not np.isfinite(step).all() or np.abs(step[:9]).max() > 1.0:
             raise Fault("no_fit", "the moves contradict each other so much that no fit converges", _REMEDY)
         state, iterations = state.stepped(step), iterations + 1
         settled = iterations > 2 and bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
         seen = moved(session, state.taken, state.attitudes[:, 2])
-    rows = tuple(factors(Graph(session, on, told, state, seen, found)))
+    rows = list(factors(Graph(session, on, told, state, seen, found)))
     _, covariance = solved(rows)
     chi_square, freedom = left(rows, covariance)
-    return Fit(session, told, on, state, seen, found, rows, covariance, chi_square, freedom, iterations, settled)
+    return Fit(session, told, on, state, seen, found, tuple(rows), covariance, chi_square, freedom, iterations, settled)
 
 
 _REMEDY = "See that each move is between two rests on the table, that no reading is lost, and which axes are which"
@@ -127,19 +124,32 @@ def _ends(row: Factor) -> int:
 
 def solved(rows: Sequence[Factor]) -> tuple[Array, Array]:
     """The step (p,) that the rows ask for, and its covariance (p, p)."""
-    design = np.vstack([row.design / row.std[:, None] for row in rows])
-    missed = np.concatenate([row.missed / row.std for row in rows])
+    design, missed = white(rows)
     size = np.linalg.norm(design, axis=0)
-    information = (design / size).T @ (design / size)
-    covariance = np.asarray(np.linalg.inv(information), dtype=np.float64) / np.outer(size, size)
+    scaled = design / size
+    covariance = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=np.float64) / np.outer(size, size)
     return -covariance @ (design.T @ missed), covariance
 
 
-def sized_anew(rows: Sequence[Factor], now: Sizes) -> tuple[list[Factor], Sizes]:
-    """Rows whose sizes are `now`, with the sizes that they alone tell."""
+def white(rows: Sequence[Factor]) -> tuple[Array, Array]:
+    """The design (r, p) of all rows and what they missed (r,), in standard deviations."""
+    std = np.concatenate([row.std for row in rows])
+    design, missed = np.concatenate([row.design for row in rows]), np.concatenate([row.missed for row in rows])
+    return design / std[:, None], missed / std
+
+
+def _taken(design: Array, covariance: Array) -> Array:
+    """(r,) share of each row of a design (r, p) that the solution takes up."""
+    taken: Array = np.sum(design @ covariance * design, axis=1)
+    return taken
+
+
+def sized_anew(rows: Sequence[Factor], now: Sizes, trusted: int | None = None) -> tuple[list[Factor], Sizes]:
+    """Rows whose sizes are `now`, with the sizes that they alone tell: those of the first `trusted` rests, or all."""
     found = list(rows)
     for _ in range(SIZED):
-        sizes = _sized(found, *solved(found), now)
+        step, covariance = solved(found)
+        sizes = _sized([row for row in found if trusted is None or _ends(row) < trusted], step, covariance, now)
         found, now = resized(found, now, sizes), sizes
     return found, now
 
@@ -157,13 +167,8 @@ def resized(rows: Sequence[Factor], now: Sizes, then: Sizes) -> list[Factor]:
 
 def left(rows: Sequence[Factor], covariance: Array) -> tuple[float, float]:
     """What is left of all but the priors, and its degrees of freedom."""
-    chi_square = freedom = 0.0
-    for row in rows:
-        if row.kind != "prior":
-            design = row.design / row.std[:, None]
-            chi_square += float(np.sum((row.missed / row.std) ** 2))
-            freedom += len(design) - float(np.einsum("rp,pq,rq->", design, covariance, design))
-    return chi_square, freedom
+    design, missed = white([row for row in rows if row.kind != PRIOR])
+    return float(missed @ missed), len(design) - float(_taken(design, covariance).sum())
 
 
 def _sized(rows: Sequence[Factor], step: Array, covariance: Array, now: Sizes) -> Sizes:
@@ -172,14 +177,13 @@ def _sized(rows: Sequence[Factor], step: Array, covariance: Array, now: Sizes) -
     for name, (kind, cause) in OF_KIND.items():
         stated = getattr(STATED, name)
         square = freedom = SEEN
-        for row in (row for row in rows if row.kind == kind):
-            design, variance = row.design / row.std[:, None], row.std**2
-            share = row.causes[cause] ** 2 / variance
-            free = np.clip(1 - np.einsum("rp,pq,rq->r", design, covariance, design), 0.0, 1.0)
-            unit = row.causes[cause] * stated / getattr(now, name)
-            left = (row.missed + row.design @ step) ** 2 - free * variance * (1 - share)
-            square += float(np.sum(share * left / unit**2))
-            freedom += float(np.sum(share * free))
+        if own := [row for row in rows if row.kind == kind]:
+            design, missed = white(own)
+            share = np.concatenate([np.square(row.causes[cause] / row.std) for row in own])
+            free = np.clip(1 - _taken(design, covariance), 0.0, 1.0)
+            left = np.square(missed + design @ step) - free * (1 - share)
+            square += float(left.sum()) * (getattr(now, name) / stated) ** 2
+            freedom += float(share @ free)
         least = stated * (1.0 if name in NEVER_LESS else LEAST)
         size = stated * float(np.sqrt(max(square, 0.0) / freedom))
         found[name] = min(max(least, size), getattr(LARGEST, name))

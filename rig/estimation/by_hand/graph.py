@@ -88,7 +88,7 @@ class State:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Factor:
     """Rows (r,) that `missed` what is expected, their `design` (r, p) so that missed + design δ is left, by causes.
 
@@ -101,7 +101,7 @@ class Factor:
     design: Array
     causes: dict[str, Array]
 
-    @property
+    @cached_property
     def std(self) -> Array:
         return np.asarray(np.sqrt(sum(np.square(each) for each in self.causes.values())), dtype=np.float64)
 
@@ -123,6 +123,21 @@ class Graph:
         return RESTS + 6 * len(self.session.rests)
 
     @cached_property
+    def between(self) -> Array:
+        """(N − 1, 3, 3) attitude at the end of each move, in coordinates of its start."""
+        return np.asarray(np.swapaxes(self.state.attitudes[:-1], -1, -2) @ self.state.attitudes[1:], dtype=np.float64)
+
+    @cached_property
+    def turned_rad(self) -> Array:
+        """(N − 1, 3) rotation vectors of `between`."""
+        return _vectors(self.between)
+
+    @cached_property
+    def missed_rad(self) -> Array:
+        """(N − 1, 3) by how much more the body turned in each move as the gyroscope says."""
+        return _vectors(self.moved.rotations @ np.swapaxes(self.between, -1, -2))
+
+    @cached_property
     def noise_rad_s(self) -> float:
         """The scatter of a reading at rest."""
         return noise(self.session)
@@ -140,6 +155,12 @@ class Graph:
         """
         apart = np.sort(np.abs(np.diff(self.session.time_s, 2)))
         return float(np.sqrt(np.mean(np.square(apart[: round(BUT_GAPS * len(apart))])) / 6))
+
+    @cached_property
+    def quiet_m_s2(self) -> float:
+        """The scatter of an accelerometer's reading at the quietest of the rests."""
+        scatter = [each.acceleration_noise_m_s2 for each in self.session.rests]
+        return float(np.sqrt(np.min([np.mean(each**2) for each in scatter if each is not None])))
 
 
 def factors(graph: Graph) -> Iterator[Factor]:
@@ -164,9 +185,10 @@ def factors(graph: Graph) -> Iterator[Factor]:
 
 def across(axis: Array) -> Array:
     """(2, 3) unit vectors at right angles to an axis (3,) and to each other."""
-    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    turning = _skew(axis)
+    first = turning[:, np.argmin(np.abs(axis))]
     first = first / np.linalg.norm(first)
-    return np.array([first, np.cross(axis, first)])
+    return np.array([first, turning @ first])
 
 
 def noise(session: Handled) -> float:
@@ -187,20 +209,19 @@ def _place(row: int) -> tuple[slice, slice]:
 
 
 def _move(graph: Graph, row: int) -> Factor:
-    state, moved, sizes = graph.state, graph.moved, graph.sizes
-    between = state.attitudes[row].T @ state.attitudes[row + 1]
+    moved, sizes = graph.moved, graph.sizes
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _place(row), _place(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = moved.by_matrix[row], moved.by_gravity[row]
     design[:, BENDS] = moved.by_bends[row]
     design[:, first_bias] = design[:, second_bias] = moved.by_bias[row] / 2
-    design[:, first], design[:, second] = np.eye(3), -between
+    design[:, first], design[:, second] = np.eye(3), -graph.between[row]
     causes = {
         "noise": np.full(3, graph.walk_rad_sqrt_s * np.sqrt(moved.durations_s[row])),
         "stamps": np.full(3, graph.stamp_std_s * moved.changes_rad_s[row]),
         "of_angle": np.full(3, sizes.of_angle * np.sqrt(QUARTER_RAD * moved.paths_rad[row])),
     }
-    return Factor(MOVE, row, _vector(moved.rotations[row] @ between.T), design, causes)
+    return Factor(MOVE, row, graph.missed_rad[row], design, causes)
 
 
 def _lean(graph: Graph, row: int) -> Factor:
@@ -217,12 +238,11 @@ def _lean(graph: Graph, row: int) -> Factor:
 
 
 def _closure(graph: Graph, row: int) -> Factor:
-    state, up = graph.state, graph.faced.up[row]
-    between = state.attitudes[row].T @ state.attitudes[row + 1]
+    up = graph.faced.up[row]
     design = np.zeros((1, graph.width))
-    design[0, _place(row)[0]], design[0, _place(row + 1)[0]] = -up, up @ between
+    design[0, _place(row)[0]], design[0, _place(row + 1)[0]] = -up, up @ graph.between[row]
     causes = {"closure": np.array([graph.sizes.closure_rad])}
-    return Factor(CLOSURE, row, np.array([up @ _vector(between)]), design, causes)
+    return Factor(CLOSURE, row, np.array([up @ graph.turned_rad[row]]), design, causes)
 
 
 def _bias_walk(graph: Graph, row: int) -> Factor:
@@ -273,12 +293,10 @@ def _acceleration(graph: Graph, row: int) -> Factor:
     axes = np.vstack([across(direction), direction])
     missed = axes @ (rest.acceleration_m_s2 - state.level @ felt - state.offset)
     scatter = float(np.sqrt(np.mean(rest.acceleration_noise_m_s2**2) / max(rest.samples, 1)))
-    others = [each.acceleration_noise_m_s2 for each in session.rests if each.acceleration_noise_m_s2 is not None]
-    quiet = float(np.sqrt(np.min([np.mean(each**2) for each in others])))
     causes = {
         "acceleration": np.full(3, graph.sizes.acceleration_m_s2),
         "acceleration noise": np.full(3, scatter),
-        "held": np.full(3, _held(rest.acceleration_noise_m_s2, quiet, rest.end_s - rest.start_s)),
+        "held": np.full(3, _held(rest.acceleration_noise_m_s2, graph.quiet_m_s2, rest.end_s - rest.start_s)),
         "along": np.array([0.0, 0.0, ALONG_M_S2]),
     }
     return Factor(ACCELERATION, row, missed, axes @ design, causes)
@@ -304,10 +322,10 @@ def _priors(graph: Graph) -> Iterator[Factor]:
     yield prior("bias", slice(RESTS + 3, RESTS + 6), state.biases[0], BIAS_STD_RAD_S)
 
 
-def _vector(matrix: Array) -> Array:
+def _vectors(matrices: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
-    return np.asarray(Rotation.from_matrix(matrix).as_rotvec(), dtype=np.float64)
+    return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)
 
 
 def _skew(vector: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled
-from rig.estimation.increments import course
+from rig.estimation.increments import track
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +59,21 @@ def moved(session: Handled, taken: Taken, up: Array) -> Moved:
         inside = _inside(session.time_s, move.start_s, move.end_s)
         at_s = session.time_s[inside]
         corrected = session.rates[inside] - np.column_stack([np.interp(at_s, middles, each) for each in biases.T])
-        there = course(at_s, corrected, matrix, np.zeros(3), at_s)
-        squares = np.hstack([corrected**2, corrected * np.abs(corrected)])
+        there = track(at_s, corrected, matrix)
+        squares = np.stack([corrected**2, corrected * np.abs(corrected)], axis=1)
         if sensitivity.any() or bends.any():
-            bent = (squares * bends).reshape(-1, 2, 3).sum(axis=1)
-            corrected = corrected - _vertical(there.attitudes, up[row]) @ sensitivity.T - bent
-            there = course(at_s, corrected, matrix, np.zeros(3), at_s)
-        attitudes, back = there.attitudes, there.attitudes[0].T
-        rotations.append(back @ attitudes[-1])
-        by_theta.append(back @ (there.sensitivities[-1] - there.sensitivities[0]))
-        turned = -(back @ attitudes @ inverse)
-        along = turned[..., None] * _vertical(attitudes, up[row])[:, None, None, :]
-        by_gravity.append(np.trapezoid(along.reshape(len(at_s), 3, 9), at_s, axis=0))
-        by_bends.append(np.trapezoid(np.tile(turned, (1, 1, 2)) * squares[:, None], at_s, axis=0))
-        swept.append(np.trapezoid(corrected, at_s, axis=0))
+            bent = (squares * bends.reshape(2, 3)).sum(axis=1)
+            corrected = corrected - up[row] @ there.attitudes @ sensitivity.T - bent
+            there = track(at_s, corrected, matrix)
+        rotations.append(there.attitudes[-1])
+        by_theta.append(there.sensitivity)
+        lasting_s = _lasting(at_s)
+        turned = there.attitudes @ inverse * -lasting_s[:, None, None]
+        by_gravity.append(np.tensordot(turned, up[row] @ there.attitudes, (0, 0)).reshape(3, 9))
+        by_bends.append(np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6))
+        swept.append(lasting_s @ corrected)
         durations.append(float(np.ptp(at_s)))
-        paths.append(float(np.trapezoid(np.linalg.norm(there.rates_rad_s, axis=1), at_s)))
+        paths.append(float(lasting_s @ np.linalg.norm(there.rates_rad_s, axis=1)))
         changes.append(float(np.linalg.norm(there.rates_rad_s[2:] - there.rates_rad_s[:-2]) / 2))
     theta = _stacked(by_theta, (3, 12))
     return Moved(
@@ -95,9 +94,11 @@ def _inside(time_s: Array, start_s: float, end_s: float) -> slice:
     return slice(first, min(last, len(time_s) - 1) + 1)
 
 
-def _vertical(attitudes: Array, up: Array) -> Array:
-    """The vertical (m, 3) in the body along attitudes (m, 3, 3), where it is `up` (3,) at the first of them."""
-    return np.asarray((np.swapaxes(attitudes, -1, -2) @ (attitudes[0] @ up)[:, None])[..., 0], dtype=np.float64)
+def _lasting(at_s: Array) -> Array:
+    """(m,) s for which each of m readings stands, by the trapezoidal rule."""
+    half: Array = np.diff(at_s) / 2
+    lasting: Array = np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
+    return lasting
 
 
 def _stacked(rows: Sequence[Array], shape: tuple[int, ...]) -> Array:

@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand.axes import check_axes
 from rig.estimation.by_hand.doubts import doubted, hidden
-from rig.estimation.by_hand.fit import SEEN, Fit, fit
+from rig.estimation.by_hand.fit import SEEN, Fit, fit, white
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
 from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told
 from rig.estimation.known_turns import TurnedSolution
@@ -129,7 +129,7 @@ def solution_of(found: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
     clock = np.zeros((6, 6))
     clock[:3, :3] = np.outer(axes.scale, axes.scale) * (1e-6 * told.clock_ppm) ** 2 / 3
     of_session = to_parameters @ covariance @ to_parameters.T + clock
-    design = np.vstack([row.design / row.std[:, None] for row in found.factors])
+    design, _ = white(found.factors)
     conditioned = design / np.linalg.norm(design, axis=0)
     turned = TurnedSolution(
         scale=axes.scale,
