@@ -48,13 +48,12 @@ def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
 
 def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
     """β (…, p) of Eq. (5): scaled so that ‖v_ref‖ = `norm`, turned so that v_ref lies on the side of `side` (3,)."""
-    scaled = x / sizes[..., None, :]
-    _, directions = np.linalg.eigh(np.swapaxes(scaled, -1, -2) @ scaled)  # half the work of a singular decomposition
-    beta = directions[..., 0] / sizes
+    _, _, directions = np.linalg.svd(x / sizes[..., None, :], full_matrices=False)
+    beta = directions[..., -1, :] / sizes
     reference = beta[..., REFERENCE]
     sign = np.where(reference @ side < 0, -1.0, 1.0)
-    found: Array = beta * (norm * sign / np.linalg.norm(reference, axis=-1))[..., None]
-    return found
+    scaled: Array = beta * (norm * sign / np.linalg.norm(reference, axis=-1))[..., None]
+    return scaled
 
 
 def to_theta(beta: Array) -> Array:

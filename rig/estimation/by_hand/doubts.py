@@ -129,7 +129,7 @@ def _columns(fit: Fit, name: str, at: int) -> Array:
 
 
 def _leaning_from(fit: Fit, row: Factor, at: int) -> Array:
-    """(r, 2) of a row: how the table leans from rest `at` on, and by what the way there turned more.
+    """(r, 2) columns of a row: how the table leans from rest `at` on, and by what the way there turned more.
 
     Not so at the last rest: there, a side that does not lie flat looks like this.
     """

@@ -134,7 +134,7 @@ class Graph:
 
     @cached_property
     def missed_rad(self) -> Array:
-        """(N − 1, 3) by how much more the body turned in each move as the gyroscope says."""
+        """(N − 1, 3) rotation vectors by which the body turned more in each move, as the gyroscope says."""
         return _vectors(self.moved.rotations @ np.swapaxes(self.between, -1, -2))
 
     @cached_property
