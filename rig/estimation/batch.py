@@ -105,8 +105,8 @@ def _solve(matrices: Array, right: Array) -> Array:
         return answers
 
 
-def _solution(beta: Array, centre: Array, steps: NDArray[np.int64], found: NDArray[np.bool_]) -> BatchSolution:
+def _solution(beta: Array, centre: Array, steps: NDArray[np.int64], solved: NDArray[np.bool_]) -> BatchSolution:
     squares = beta[:, :3]
-    good = found & np.all(squares > 0, axis=1)
+    good = solved & np.all(squares > 0, axis=1)
     kept = np.where(good[:, None], beta, np.nan)
     return BatchSolution(np.sqrt(kept[:, :3]), kept[:, 3:] / (2 * kept[:, :3]) - centre, steps, good)

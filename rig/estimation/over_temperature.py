@@ -199,15 +199,15 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
     return replace(found, lines=(*lines, _gradient(found, gradient_k)))
 
 
-def settled(found: OverTemperature, values: Array, lines: tuple[Line, ...]) -> OverTemperature:
+def settled(polynomials: OverTemperature, values: Array, lines: tuple[Line, ...]) -> OverTemperature:
     """The polynomials with k and c (6,) at the reference as another solve tells them, of readings taken there by them.
 
     `lines` have the covariance (6, 6) of their means over all temperatures.
     """
-    scale, bias = found.scale * values[:3] / found.scale[0], found.bias.copy()
+    scale, bias = polynomials.scale * values[:3] / polynomials.scale[0], polynomials.bias.copy()
     bias[0] = values[3:]
-    ratio = np.concatenate([np.tile(values[:3] / found.scale[0], HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
-    kept = tuple(replace(line, covariance=np.outer(ratio, ratio) * line.covariance) for line in found.lines)
+    ratio = np.concatenate([np.tile(values[:3] / polynomials.scale[0], HIGHEST + 1), np.ones(COEFFICIENTS // 2)])
+    kept = tuple(replace(line, covariance=np.outer(ratio, ratio) * line.covariance) for line in polynomials.lines)
     first = np.r_[0:3, COEFFICIENTS // 2 : COEFFICIENTS // 2 + 3]
 
     def whole(line: Line) -> Line:
@@ -215,7 +215,7 @@ def settled(found: OverTemperature, values: Array, lines: tuple[Line, ...]) -> O
         covariance[np.ix_(first, first)] = line.covariance
         return replace(line, covariance=covariance)
 
-    return replace(found, scale=scale, bias=bias, lines=(*kept, *map(whole, lines)))
+    return replace(polynomials, scale=scale, bias=bias, lines=(*kept, *map(whole, lines)))
 
 
 def heating(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
@@ -330,11 +330,11 @@ class _Fits:
         aicc = square + 2 * free + 2 * free * (free + 1) / (self.count - free - 3 * loops - 2)
         return self._fit(orders, found, spread, fixed, aicc)
 
-    def _rows(self, axis: int, orders: tuple[int, int], found: Array) -> tuple[Array, Array]:
+    def _rows(self, axis: int, orders: tuple[int, int], values: Array) -> tuple[Array, Array]:
         """Derivatives of an axis' whitened readings, the lag's last, and what the model leaves of them."""
         of_scale, of_bias = orders
-        each = (len(found) - 1) // 3
-        own, lag_s = found[axis * each : (axis + 1) * each], found[-1]
+        each = (len(values) - 1) // 3
+        own, lag_s = values[axis * each : (axis + 1) * each], values[-1]
         share, added, loop = np.split(own, [of_scale, of_scale + of_bias])
         scales, biases = self.powers[:, 1 : of_scale + 1], self.powers[:, 1 : of_bias + 1]
         felt, relative = self.felt[:, axis], 1 + scales @ share
@@ -347,15 +347,15 @@ class _Fits:
         free = self.whitening[axis]
         return free @ design, free @ (self.left[:, axis] - model)
 
-    def _fit(self, orders: tuple[int, int], found: Array, spread: Array, fixed: Array, aicc: float) -> _Fit:
+    def _fit(self, orders: tuple[int, int], values: Array, spread: Array, fixed: Array, aicc: float) -> _Fit:
         of_scale, of_bias = orders
-        each = (len(found) - 1) // 3
-        own = found[:-1].reshape(3, each)
+        each = (len(values) - 1) // 3
+        own = values[:-1].reshape(3, each)
         relative, bias = np.zeros((2, HIGHEST, 3))
         size = self.span ** -np.arange(1.0, HIGHEST + 1)
         relative[:of_scale] = own[:, :of_scale].T * size[:of_scale, None]
         bias[:of_bias] = own[:, of_scale : of_scale + of_bias].T * size[:of_bias, None]
-        take = np.zeros((6 * HIGHEST, len(found)))
+        take = np.zeros((6 * HIGHEST, len(values)))
         for axis in range(3):
             for n in range(of_scale):
                 take[3 * n + axis, axis * each + n] = size[n]
@@ -367,7 +367,7 @@ class _Fits:
             loop = (own[:, -2:] * [-1.0, 1.0]).T.ravel(), stds.T.ravel()
         lag_std_s = float(np.sqrt(spread[-1, -1]))
         covariance, known_lag = take @ spread @ take.T, take @ fixed @ take.T
-        return _Fit(relative, bias, covariance, known_lag, aicc, float(found[-1]), lag_std_s, loop)
+        return _Fit(relative, bias, covariance, known_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: _Fit) -> Array:
         """(2, 3, 3) mean powers of T − reference, weighted as they tell k and c."""
@@ -419,16 +419,16 @@ def _of_loop(size: Array, std: Array) -> Array:
     return np.diag(found)
 
 
-def _gradient(found: OverTemperature, half_width_k: float) -> Line:
+def _gradient(polynomials: OverTemperature, half_width_k: float) -> Line:
     """What a sensor does that is so much warmer than its thermometer: all of it moves along the polynomials.
 
     By as much everywhere, and, apart from that, by as much one way at one end of the range as the other way at the
     other: a heater's power, and what flows off into the air, grow with the temperature.
     """
-    both = np.array([found.scale, found.bias])
+    both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, HIGHEST + 1)[:, None] * both[:, 1:]
-    low, high = found.range_c
-    middle_k, half_k = (low + high) / 2 - found.reference_c, (high - low) / 2
+    low, high = polynomials.range_c
+    middle_k, half_k = (low + high) / 2 - polynomials.reference_c, (high - low) / 2
     even, tilted = np.zeros((2, *both.shape))
     even[:, :-1] = steep
     tilted[:, 1:] = steep / half_k

@@ -18,20 +18,20 @@ from rig.estimation.vector_fit import Explained, Seen
 NOT_SQUARE = "angles between the axes"
 
 
-def six_observation_budget(explained: Explained, found: Solution, unknown: Unknown, axes_rad: float) -> Budget:
-    """The budget of `found`, which was solved from the sweeps alone of what is `explained`, weighted by their noise.
+def six_observation_budget(explained: Explained, own: Solution, unknown: Unknown, axes_rad: float) -> Budget:
+    """The budget of `own`, which was solved from the sweeps alone of what is `explained`, weighted by their noise.
 
     `axes_rad` is the half-width of the angles between the sensor's axes about 90°.
     """
     seen, solution = explained.seen, explained.solution
-    response = response_of(found, seen)
+    response = response_of(own, seen)
     by_speed = np.einsum("qni,ni->qn", response, _of_speeds(seen, solution.matrix))
     walking = _walking(explained.bias, response, seen.windows_s)
     noise = np.einsum("qni,ni,pni->qp", response, seen.variances_rad2_s2, response)
     instead = replace(
         solution,
-        scale=found.scale,
-        bias_rad_s=found.bias_rad_s,
+        scale=own.scale,
+        bias_rad_s=own.bias_rad_s,
         covariance=noise + by_speed @ by_speed.T + walking,
         response=response,
         g_sensitivity=None,
@@ -39,7 +39,7 @@ def six_observation_budget(explained: Explained, found: Solution, unknown: Unkno
     )
     of_readings = budget(replace(explained, solution=instead), unknown)
     effects = np.einsum(
-        "qni,kni->kq", response, _leaning(seen.turns_rad_s @ solution.mounting.T, found.scale, axes_rad) / np.sqrt(3)
+        "qni,kni->kq", response, _leaning(seen.turns_rad_s @ solution.mounting.T, own.scale, axes_rad) / np.sqrt(3)
     )
     half_width, source = float(np.degrees(axes_rad)), "what is known of the part"
     square = Contributor(NOT_SQUARE, "B", "rectangular", half_width, "°", source, np.inf, effects.T @ effects)
@@ -47,7 +47,7 @@ def six_observation_budget(explained: Explained, found: Solution, unknown: Unkno
     return replace(of_readings, contributors=(*known, square))
 
 
-def response_of(found: Solution, seen: Seen) -> Array:
+def response_of(solution: Solution, seen: Seen) -> Array:
     """(6, N, 3) derivative of scale and bias with respect to the mean readings; zero for rests, which do not count.
 
     To first order, as `Accumulator.solve` has the covariance: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e with
@@ -58,19 +58,19 @@ def response_of(found: Solution, seen: Seen) -> Array:
     speeds, stds = np.linalg.norm(seen.turns_rad_s[turning], axis=1), seen.speed_std_rad_s[turning]
     weights = 1 / (4 * speeds**2 * variances.mean(axis=1) + (2 * speeds * stds) ** 2)
     centre = means.mean(axis=0)
-    bias = found.bias_rad_s + centre
+    bias = solution.bias_rad_s + centre
     rows = np.array([design(mean - centre) for mean in means])
     weighted = rows.T * weights
     gamma_by_beta = np.concatenate([-(bias**2), bias])
     to_beta = np.linalg.inv(weighted @ rows + np.outer(weighted.sum(axis=1), gamma_by_beta))
     squares, linear = np.arange(3), np.arange(3, 6)
     to_parameters = np.zeros((6, 6))
-    to_parameters[squares, squares] = 1 / (2 * found.scale)
-    to_parameters[linear, squares] = -bias / found.scale**2
-    to_parameters[linear, linear] = 1 / (2 * found.scale**2)
+    to_parameters[squares, squares] = 1 / (2 * solution.scale)
+    to_parameters[linear, squares] = -bias / solution.scale**2
+    to_parameters[linear, linear] = 1 / (2 * solution.scale**2)
     gain = to_parameters @ to_beta @ weighted
     response = np.zeros((6, *seen.means_rad_s.shape))
-    response[:, turning] = gain[:, :, None] * (-2 * found.scale**2 * (means + found.bias_rad_s))
+    response[:, turning] = gain[:, :, None] * (-2 * solution.scale**2 * (means + solution.bias_rad_s))
     return response
 
 

@@ -50,11 +50,11 @@ def placements_on_arm(
 
 
 def _mean(
-    recording: ObservedRun, name: str, quantity: Quantity, each: Dwelt, thresholds: ObservationThresholds
+    recording: ObservedRun, name: str, quantity: Quantity, dwell: Dwelt, thresholds: ObservationThresholds
 ) -> Mean:
-    where = f"dwell {each.dwell.index} ({each.dwell.name}) of {name}"
+    where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"
     channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
-    inside = slice(*np.searchsorted(time_s, [each.window.start_s, each.window.end_s]).tolist())
+    inside = slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())
     samples = recording.run.samples[name][inside]
     check_complete(samples, where, thresholds)
     if channel.saturated(samples).any():

@@ -119,21 +119,21 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
     return solution_of(found, () if one is None else (f"{one.what}: for this one alone U is larger",))
 
 
-def solution_of(found: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
+def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
     """The solution of a graph that has come to rest, with what else was found to warn of."""
-    matrix, told = found.state.matrix, found.told
+    matrix, told = fit.state.matrix, fit.told
     axes = SensorAxes.of(matrix)
-    chosen = sought(found)
-    covariance = found.covariance[np.ix_(chosen, chosen)]
+    chosen = sought(fit)
+    covariance = fit.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(matrix, axes.scale)
     clock = np.zeros((6, 6))
     clock[:3, :3] = np.outer(axes.scale, axes.scale) * (1e-6 * told.clock_ppm) ** 2 / 3
     of_session = to_parameters @ covariance @ to_parameters.T + clock
-    design, _ = white(found.factors)
+    design, _ = white(fit.factors)
     conditioned = design / np.linalg.norm(design, axis=0)
     turned = TurnedSolution(
         scale=axes.scale,
-        bias_rad_s=-found.state.biases[-1],
+        bias_rad_s=-fit.state.biases[-1],
         covariance=of_session,
         matrix=matrix,
         matrix_covariance=covariance,
@@ -141,33 +141,33 @@ def solution_of(found: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
         mounting=axes.mounting,
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.zeros((0, 3)),
-        widened=max(1.0, found.sizes.repeat_rad / STATED.repeat_rad),
-        budget=_budget(found, to_parameters, clock),
-        observations=len(found.session.rests) + sum(move.tells for move in found.session.moves),
+        widened=max(1.0, fit.sizes.repeat_rad / STATED.repeat_rad),
+        budget=_budget(fit, to_parameters, clock),
+        observations=len(fit.session.rests) + sum(move.tells for move in fit.session.moves),
         rank=12,
         condition=float(np.sqrt(np.linalg.cond(conditioned[:, chosen].T @ conditioned[:, chosen]))),
-        iterations=found.iterations,
-        warnings=(*_warnings(found), *warnings),
+        iterations=fit.iterations,
+        warnings=(*_warnings(fit), *warnings),
         estimator="by_hand",
     )
     return HandSolution(
         turned=turned,
-        rests=tuple(RestFound(face, _pull(found, row)) for row, face in enumerate(found.faced.faces)),
-        moves=tuple(_move_found(found, row) for row in range(len(found.session.moves))),
+        rests=tuple(RestFound(face, _pull(fit, row)) for row, face in enumerate(fit.faced.faces)),
+        moves=tuple(_move_found(fit, row) for row in range(len(fit.session.moves))),
         sizes={
-            name: (getattr(found.sizes, name), getattr(STATED, name), getattr(LARGEST, name))
-            for name in found.sizes.__slots__
-            if name != "acceleration_m_s2" or found.session.acceleration is not None
+            name: (getattr(fit.sizes, name), getattr(STATED, name), getattr(LARGEST, name))
+            for name in fit.sizes.__slots__
+            if name != "acceleration_m_s2" or fit.session.acceleration is not None
         },
-        chi_square=found.chi_square,
-        freedom=found.freedom,
+        chi_square=fit.chi_square,
+        freedom=fit.freedom,
         expanded_scale=2 * np.sqrt(np.diag(of_session)[:3]),
     )
 
 
-def sought(found: Fit) -> NDArray[np.intp]:
+def sought(fit: Fit) -> NDArray[np.intp]:
     """(12,) the places of F and of the last rest's bias among all that is found."""
-    count = found.covariance.shape[0]
+    count = fit.covariance.shape[0]
     return np.asarray(np.r_[0:9, count - 3 : count])
 
 
@@ -204,14 +204,14 @@ def too_few(session: Handled, expanded: Array | None) -> Fault:
     )
 
 
-def _too_little(found: Fit) -> Fault | None:
-    expanded = 2 * np.sqrt(np.diag(found.covariance)[[0, 4, 8]])
-    return too_few(found.session, expanded) if expanded.max() > ENOUGH else None
+def _too_little(fit: Fit) -> Fault | None:
+    expanded = 2 * np.sqrt(np.diag(fit.covariance)[[0, 4, 8]])
+    return too_few(fit.session, expanded) if expanded.max() > ENOUGH else None
 
 
-def _looseness(found: Fit) -> float:
+def _looseness(fit: Fit) -> float:
     """How many times as large as stated what holds faces and moves together was found to be."""
-    sizes = found.sizes
+    sizes = fit.sizes
     return max(sizes.repeat_rad / STATED.repeat_rad, sizes.of_angle / STATED.of_angle)
 
 
@@ -234,55 +234,55 @@ def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None
     return None
 
 
-def _budget(found: Fit, to_parameters: Array, clock: Array) -> Budget:
-    chosen = sought(found)
+def _budget(fit: Fit, to_parameters: Array, clock: Array) -> Budget:
+    chosen = sought(fit)
     spread = {name: np.zeros((6, 6)) for name in LINES}
     line_of = {cause: name for name, (_, causes, _) in LINES.items() for cause in causes}
-    for row in found.factors:
-        gain = to_parameters @ found.covariance[chosen] @ (row.design / row.std[:, None] ** 2).T
+    for row in fit.factors:
+        gain = to_parameters @ fit.covariance[chosen] @ (row.design / row.std[:, None] ** 2).T
         for cause, std in row.causes.items():
             effect = gain * std
             spread[line_of[cause]] += effect @ effect.T
-    samples = float(sum(rest.samples for rest in found.session.rests))
-    freedom = {"noise": samples, "placement": found.freedom + SEEN, "bias from rest to rest": found.freedom + SEEN}
-    freedom["angles of the moves"] = found.freedom + SEEN
+    samples = float(sum(rest.samples for rest in fit.session.rests))
+    freedom = {"noise": samples, "placement": fit.freedom + SEEN, "bias from rest to rest": fit.freedom + SEEN}
+    freedom["angles of the moves"] = fit.freedom + SEEN
     lines = [
         Contributor(name, kind, "normal", None, "", source, freedom.get(name, np.inf), spread[name])
         for name, (kind, _, source) in LINES.items()
     ]
-    ppm, source = found.told.clock_ppm, found.told.clock_source
+    ppm, source = fit.told.clock_ppm, fit.told.clock_source
     lines.append(Contributor(CLOCK, "B", "rectangular", ppm, "ppm", source, np.inf, clock))
-    real = np.diag([*(REAL_HANDS * scale_of(found.state.matrix)) ** 2, 0.0, 0.0, 0.0])
+    real = np.diag([*(REAL_HANDS * scale_of(fit.state.matrix)) ** 2, 0.0, 0.0, 0.0])
     source = "by how much recordings of hands elsewhere disagree with themselves"
     lines.append(Contributor(RECORDED_HANDS, "B", "normal", None, "", source, np.inf, real))
     return Budget(tuple(lines))
 
 
-def _pull(found: Fit, at: int, kinds: Sequence[str] = ("flat", "acceleration")) -> float:
-    rows = [row for row in found.factors if row.at == at and row.kind in kinds]
-    return max((_pull_of(found, row) for row in rows), default=0.0)
+def _pull(fit: Fit, at: int, kinds: Sequence[str] = ("flat", "acceleration")) -> float:
+    rows = [row for row in fit.factors if row.at == at and row.kind in kinds]
+    return max((_pull_of(fit, row) for row in rows), default=0.0)
 
 
-def _pull_of(found: Fit, row: Factor) -> float:
-    return float(np.max(np.abs(row.missed) / (row.std * np.sqrt(np.maximum(found.freedom_of(row), 0.05)))))
+def _pull_of(fit: Fit, row: Factor) -> float:
+    return float(np.max(np.abs(row.missed) / (row.std * np.sqrt(np.maximum(fit.freedom_of(row), 0.05)))))
 
 
-def _move_found(found: Fit, row: int) -> MoveFound:
-    move, turns = found.session.moves[row], found.faced.turns[row]
-    closure = next((each for each in found.factors if each.kind == CLOSURE and each.at == row), None)
+def _move_found(fit: Fit, row: int) -> MoveFound:
+    move, turns = fit.session.moves[row], fit.faced.turns[row]
+    closure = next((each for each in fit.factors if each.kind == CLOSURE and each.at == row), None)
     return MoveFound(
         kind="left out" if not move.tells else "turn" if turns else "flip",
-        angle_rad=float(np.linalg.norm(np.linalg.solve(found.state.matrix, found.moved.swept_rad[row]))),
+        angle_rad=float(np.linalg.norm(np.linalg.solve(fit.state.matrix, fit.moved.swept_rad[row]))),
         turns=turns,
-        pull=_pull(found, row, (MOVE, CLOSURE)),
+        pull=_pull(fit, row, (MOVE, CLOSURE)),
         closure_rad=None if closure is None else float(closure.missed[0]),
     )
 
 
-def _warnings(found: Fit) -> tuple[str, ...]:
+def _warnings(fit: Fit) -> tuple[str, ...]:
     said = []
     for words, each in (("at the end of its range", "clipped"), ("with readings missing", "lost")):
-        if starts := [move.start_s for move in found.session.moves if getattr(move, each)]:
+        if starts := [move.start_s for move in fit.session.moves if getattr(move, each)]:
             at_s = ", ".join(f"{start_s:.1f}" for start_s in starts)
             said.append(f"moves left out, the gyroscope {words}: from {at_s} s")
     return tuple(said)
