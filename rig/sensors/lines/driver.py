@@ -4,7 +4,7 @@ Nothing is sent to the device. It says nothing of itself, so that it is what the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,19 +34,13 @@ OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 @dataclass(slots=True)
 class Counts:
-    """What came: samples, comments, lines before the first sample, lines that were none after it, and why not.
-
-    `wrong_sums` of the lines that were none had a wrong checksum, `odd` a time that cannot be.
-    """
+    """What came: samples, comments, lines before the first sample, lines that were none after it, the first of them."""
 
     samples: int = 0
     comments: int = 0
     before: int = 0
     damaged: int = 0
-    wrong_sums: int = 0
-    odd: int = 0
     first_other: bytes = b""
-    decimals: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, decoded: Decoded) -> None:
         """Count what one read brought."""
@@ -56,9 +50,7 @@ class Counts:
         self.damaged += len(decoded.before) - boot
         self.samples += len(decoded.values)
         self.comments += decoded.comments
-        self.wrong_sums += decoded.wrong_sums
         self.first_other = self.first_other or decoded.why
-        self.decimals = np.maximum(self.decimals, decoded.decimals) if len(self.decimals) else decoded.decimals
 
 
 class LinesDevice:
@@ -240,7 +232,6 @@ class LinesDevice:
             return
         kept, numbers, times_us = stamper.stamp(decoded.values, self._skipped, host_time_s)
         self._skipped = 0
-        self.counts.odd = stamper.odd
         if self._on_values is not None and len(numbers):
             self._on_values(decoded.values[kept], numbers, times_us, host_time_s)
 
