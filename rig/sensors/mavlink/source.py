@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.config.mavlink_section import MavlinkSection
 from rig.config.sensor_sections import SensorSection
-from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.data.channel import Channel, of_thermometer, stamped
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -21,11 +21,10 @@ from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
 from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
 from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
-FULL_SCALE_COUNTS = 1 << 30  # what a channel's range is divided into: far finer than what is sent
-DEGREES_PER_COUNT = 0.01
 RATE_LOOK = 40  # messages by which the rate is judged
 RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
@@ -54,16 +53,15 @@ class _Imu:
 
     def samples(self, taken: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
         """Samples of the readings, numbered from the number `first`."""
-        samples = np.zeros(len(taken), self.described.sample_dtype)
-        samples["sequence"] = [number - first for number, _, _ in taken]
-        samples["board_time_us"] = [time_us for _, time_us, _ in taken]
-        samples["host_time_s"] = host_time_s
-        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for _, _, each in taken]
-        rates = self.correction.raw_rate(np.array([each.rate_rad_s for _, _, each in taken]))
-        samples["counts"] = _counts(rates, self.described.channel(RATE))
+        numbers, times_us, readings = zip(*taken, strict=True)
+        samples = stamped(self.described.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
+        # Not filled like the others: `round` raises for what is no number, and a made-up temperature would be believed.
+        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for each in readings]
+        rates = self.correction.raw_rate(np.array([each.rate_rad_s for each in readings]))
+        self.described.channel(RATE).fill(samples, rates)
         if self.described.measures(ACCELERATION):
-            forces = self.correction.raw_force(np.array([each.force_m_s2 for _, _, each in taken]))
-            samples["acceleration_counts"] = _counts(forces, self.described.channel(ACCELERATION))
+            forces = self.correction.raw_force(np.array([each.force_m_s2 for each in readings]))
+            self.described.channel(ACCELERATION).fill(samples, forces)
         return samples
 
 
@@ -227,12 +225,8 @@ def line_of(section: SensorSection) -> MavlinkSection:
 
 def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Channel:
     """The channel of three axes; `sent` is the unit of the whole numbers that are sent, None where none are."""
-    per_count = end_of_scale / FULL_SCALE_COUNTS
-    widest = end_of_scale if sent is None else min(end_of_scale, WIDEST * INT16_MAX * sent)
-    channel = of_three_axes(quantity, per_count, round(widest / per_count), end_of_scale)
-    return channel if sent is None else replace(channel, step=CUT_STEPS * sent)
-
-
-def _counts(values: NDArray[np.float64], channel: Channel) -> NDArray[np.float64]:
-    limit = 2.0 * FULL_SCALE_COUNTS - 1
-    return np.clip(np.rint(values / channel.unit_per_count), -limit, limit)
+    channel = fine_axes(quantity, end_of_scale)
+    if sent is None:
+        return channel
+    widest = min(end_of_scale, WIDEST * INT16_MAX * sent)
+    return replace(channel, full_scale_counts=round(widest / channel.unit_per_count), step=CUT_STEPS * sent)
