@@ -17,6 +17,7 @@ from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.field import MESSAGES_EACH, FieldReader
 from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
+from rig.sensors.own_port import closed_on_failure
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
@@ -45,8 +46,7 @@ class Kvh1775Source:
         self._field_name, self._field = field_name(name), describe_field(name, section)
         self._field_reader = FieldReader(FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS)
         self._driver = Kvh1775(name, line.port, line.baud, self._take, patience=patience)
-        try:
-            self.serial_number = self._driver.serial_number
+        with closed_on_failure(self.close):
             for refusal in judge(self._driver, name, section):
                 raise refusal
             found = self._driver.settings
@@ -55,9 +55,6 @@ class Kvh1775Source:
             self._driver.correct(changes)
             self._driver.run()
             self._driver.test()
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -75,8 +72,8 @@ class Kvh1775Source:
         self._driver.start(self._wanted)
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the instrument, as of `SampleSource`. Raises SensorError as `Kvh1775.check`, and `kvh_axis_invalid`."""
-        self._driver.check(clock_s)
+        """Check the instrument, as of `SampleSource`. Raises SensorError as `OwnPort.check`, and `kvh_axis_invalid`."""
+        self._driver.own_port.check(clock_s)
 
     def close(self) -> None:
         """Ends the thread and closes the port."""

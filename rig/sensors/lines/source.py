@@ -68,8 +68,11 @@ class LinesSource:
         self._device.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the device, as of `SampleSource`. Raises SensorError as `LinesDevice.check`."""
-        self._device.check(clock_s)
+        """Check the device, as of `SampleSource`.
+
+        Raises SensorError as `OwnPort.check`, `lines_damaged`, `lines_time_jumped`.
+        """
+        self._device.own_port.check(clock_s)
 
     def close(self) -> None:
         """Ends the thread and closes the port."""

@@ -1,7 +1,7 @@
 """The configured IMUs of one autopilot as a source of samples: rates asked for, corrections undone."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from math import radians
 from typing import Any
@@ -21,6 +21,7 @@ from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
 from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
 from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.own_port import closed_on_failure
 from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
@@ -72,13 +73,13 @@ class MavlinkSource:
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
         """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
-        self._on_samples, self._started = on_samples, False
+        self._on_samples = on_samples
         self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
         self._first: dict[str, int] = {}
         (name, section), *_ = sections.items()
         line = line_of(section)
         self.link = Link(name, line.port, line.baud, self._take, patience=patience)
-        try:
+        with closed_on_failure(self.close):
             self.link.identify()
             for refusal in (*unfinished(self.link), *self._judge()):
                 raise refusal
@@ -86,9 +87,6 @@ class MavlinkSource:
             for message, imu in self._imus.items():
                 self.link.ask_for(message, imu.counter.interval_us)
             self._see_rates()
-        except BaseException:
-            self.link.close()
-            raise
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -102,12 +100,15 @@ class MavlinkSource:
 
     def start(self) -> None:
         """Start to hand samples on, as of `SampleSource`."""
-        self._started = True
-        self.link.start()
+        self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the autopilot, as of `SampleSource`. Raises SensorError as `Link.check`."""
-        self.link.check(clock_s)
+        """Check the autopilot, as of `SampleSource`. Raises SensorError as `OwnPort.check`, and `autopilot_armed`."""
+        self.link.own_port.check(clock_s)
+
+    def close(self) -> None:
+        """Ends the thread and closes the port."""
+        self.link.close()
 
     def _judge(self) -> Iterator[SensorError]:
         for imu in self._imus.values():
@@ -118,7 +119,7 @@ class MavlinkSource:
 
     def _see_rates(self) -> None:
         imus = self._imus.values()
-        self.link.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
+        self.link.own_port.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
         for imu in imus:
             asked_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
             came_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
@@ -136,7 +137,7 @@ class MavlinkSource:
         for message, whole in messages:
             kind = message.get_type()
             found = self._imus[kind].take(message, whole=whole)
-            if found is not None and self._started:
+            if found is not None and self.link.own_port.streams:
                 self._first.setdefault(kind, found[0])
                 taken.setdefault(kind, []).append(found)
         for kind, each in taken.items():
@@ -186,16 +187,11 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
     return recorded_as(section, *channels, clock=name)
 
 
-@contextmanager
 def mavlink(
     sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
-) -> Iterator[MavlinkSource]:
+) -> closing[MavlinkSource]:
     """The IMUs at one port for the length of the `with` block. Raises SensorError as `MavlinkSource`."""
-    source = MavlinkSource(sections, on_samples, patience=patience)
-    try:
-        yield source
-    finally:
-        source.link.close()
+    return closing(MavlinkSource(sections, on_samples, patience=patience))
 
 
 def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
