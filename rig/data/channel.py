@@ -76,6 +76,14 @@ class Channel:
         """The readings (n,) or (n, 3) in samples (n,), in the quantity's unit."""
         return self.in_unit(self.counts(samples))
 
+    def fill(self, samples: NDArray[Any], readings: Array) -> None:
+        """Write readings (n,) or (n, 3), in the quantity's unit, into samples (n,): the nearest number that fits."""
+        counts = (readings - self.offset) / self.unit_per_count
+        if self.type != "<f8":
+            most = np.iinfo(self.type).max
+            counts = np.clip(np.rint(counts), -most, most)
+        samples[self.column] = counts
+
     def mean(self, samples: NDArray[Any]) -> tuple[float, ...]:
         """The mean reading of samples (n,): one number, or one for each axis."""
         return tuple(self.in_unit(self.counts(samples).mean(axis=0)).reshape(-1).tolist())
@@ -107,3 +115,10 @@ def of_thermometer(c_per_count: float, offset_c: float) -> Channel:
 def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:
     """The type of samples of these channels. Raises ValueError where two of them, or a stamp, share a column."""
     return np.dtype([*STAMPS, *((each.column, each.type, each.measures.shape) for each in channels)])
+
+
+def stamped(dtype: np.dtype[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float) -> NDArray[Any]:
+    """Samples (n,) of these numbers (n,) and times (n,) on their own clock, which came at once; zero in all else."""
+    samples = np.zeros(len(numbers), dtype)
+    samples["sequence"], samples["board_time_us"], samples["host_time_s"] = numbers, times_us, host_time_s
+    return samples

@@ -28,7 +28,7 @@ USUAL = Patience()
 class Silence:
     """The reader says what came; whoever checks the link says what another instrument's clock shows, if there is one.
 
-    It is not locked: both hold the driver's own lock meanwhile.
+    It is not locked: both hold `OwnPort.news` meanwhile.
     """
 
     def __init__(self) -> None:
@@ -36,17 +36,11 @@ class Silence:
         self._clock_s: float | None = None  # what the other clock showed at the last check,
         self._clock_then_s: float | None = None  # … and when something came last
 
-    def heard(self) -> None:
-        """Something came."""
-        self._idle_reads, self._clock_then_s = 0, self._clock_s
-
-    def idle(self) -> None:
-        """A read brought nothing."""
+    def note(self, count: int) -> None:
+        """A read brought so many of what is waited for."""
         self._idle_reads += 1
-
-    def restart(self) -> None:
-        """Count reads from here on."""
-        self._idle_reads = 0
+        if count:
+            self._idle_reads, self._clock_then_s = 0, self._clock_s
 
     def seen_by(self, clock_s: float | None) -> float:
         """How long it lasts, s, now that the other clock shows `clock_s`."""

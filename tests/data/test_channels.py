@@ -11,8 +11,8 @@ import pytest
 from rich.console import Console
 from rich.live import Live
 
-from rig.data.channel import Channel
-from rig.data.quantity import PRESSURE, RATE
+from rig.data.channel import Channel, of_three_axes, stamped
+from rig.data.quantity import FIELD, PRESSURE, RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData, RunRecorder, read_run
 from rig.errors import Refused
@@ -32,6 +32,16 @@ BAROMETER = RecordedSensor(
     "toy_barometer", "B1", 10.0, (Channel(PRESSURE.name, "pressure", "<f8", 1.0),), clock="barometer"
 )
 IN_COUNTS = replace(BAROMETER, channels=(Channel(PRESSURE.name, "pressure_counts", "<i4", 0.5, 80_000.0, 40_000),))
+
+
+def test_readings_become_the_nearest_numbers_that_fit_and_nothing_else_is_written() -> None:
+    sensor = replace(BAROMETER, channels=(of_three_axes(FIELD, 0.5, 100, None), *BAROMETER.channels))
+    samples = stamped(sensor.sample_dtype, np.array([3, 5]), np.array([30, 50]), 7.0)
+    sensor.channel(FIELD).fill(samples, np.array([[0.2, 0.3, -1.0], [1e12, -1e12, 0.0]]))
+    assert samples["field_counts"].tolist() == [[0, 1, -2], [2**31 - 1, 1 - 2**31, 0]]
+    sensor.channel(PRESSURE).fill(samples, np.array([PRESSURE_PA, 0.25]))
+    assert samples["pressure"].tolist() == [PRESSURE_PA, 0.25], "what is no count is not rounded"
+    assert samples[["sequence", "board_time_us", "host_time_s"]].tolist() == [(3, 30, 7.0), (5, 50, 7.0)]
 
 
 def beside_a_gyroscope(barometer: RecordedSensor) -> RunData:

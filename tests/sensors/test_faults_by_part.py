@@ -15,6 +15,7 @@ from rig.sensors.kvh1775.source import kvh1775
 from rig.sensors.lines.source import lines
 from rig.sensors.mavlink.source import mavlink
 from rig.sensors.silence import USUAL, Patience
+from rig.sensors.source import OnSamples
 from rig.world.board.serial_line import misread
 from support import autopilot_on_a_wire as autopilots
 from support import kvh_on_a_wire as kvhs
@@ -34,12 +35,13 @@ unplugged             lines_link_lost        mavlink_link_lost     kvh_link_lost
 falls silent          lines_link_lost        mavlink_link_lost     kvh_link_lost
 turns into garbage    lines_damaged          mavlink_link_lost     kvh_link_lost
 begins anew           lines_time_jumped      mavlink_link_lost     kvh_restarted
+nobody takes it       lines_not_taken        mavlink_not_taken     kvh_not_taken
 """  # the rig sets the rate of a KVH 1775, and garbage is a wire or a rate to it, as it comes
-LATER = ("unplugged", "falls silent", "turns into garbage", "begins anew")
+LATER = ("unplugged", "falls silent", "turns into garbage", "begins anew", "nobody takes it")
 NO_PORT = "/dev/there-is-none"
 AT_ONCE = (  # seen in what comes; the others by waiting for what does not
     "lines_other_rate", "autopilot_rate", "lines_damaged", "lines_time_jumped", "kvh_restarted",
-    "kvh_other_serial_number",
+    "kvh_other_serial_number", "lines_not_taken", "mavlink_not_taken", "kvh_not_taken",
 )  # fmt: skip
 Bench = tuple[AbstractContextManager[Any], Callable[[], object]]  # a source that connects, and what goes wrong later
 
@@ -59,6 +61,15 @@ def printed(begin: int, step: int = 1) -> Iterator[bytes]:
         yield b"".join(islice(rows, 10))
 
 
+def taking(fault: str) -> OnSamples:
+    """Who takes the samples."""
+
+    def fail(*_: object) -> None:
+        raise ValueError("no room")
+
+    return fail if fault == "nobody takes it" else lambda *_: None
+
+
 @contextmanager
 def of_lines(fault: str, patience: Patience) -> Iterator[Bench]:
     """A device that prints lines."""
@@ -76,7 +87,7 @@ def of_lines(fault: str, patience: Patience) -> Iterator[Bench]:
     with pty_printing(streams.get(fault, printed(0))) as (port, unplugged):
         section = sensor_section(NO_PORT if fault == "no such port" else port)
         yield (
-            lines("imu", section, lambda *_: None, patience=patience),
+            lines("imu", section, taking(fault), patience=patience),
             (unplugged.set if fault == "unplugged" else lambda: None),
         )
 
@@ -101,7 +112,7 @@ def of_mavlink(fault: str, patience: Patience) -> Iterator[Bench]:
         port = NO_PORT if fault == "no such port" else wire.port
         changes: dict[str, Any] = {"baud": 57600, "rate_hz": 20} if fault == "wrong baud rate" else {}
         sections = {"imu": autopilots.section(port, **changes)}
-        yield mavlink(sections, lambda *_: None, patience=patience), spoil.get(fault, lambda: None)
+        yield mavlink(sections, taking(fault), patience=patience), spoil.get(fault, lambda: None)
 
 
 @contextmanager
@@ -117,7 +128,7 @@ def of_kvh(fault: str, patience: Patience) -> Iterator[Bench]:
         }
         specimen = "another" if fault == "other device" else kvhs.SERIAL_NUMBER
         section = kvhs.section(NO_PORT if fault == "no such port" else wire.port, serial_number=specimen)
-        yield kvh1775("kvh", section, lambda *_: None, patience=patience), spoil.get(fault, lambda: None)
+        yield kvh1775("kvh", section, taking(fault), patience=patience), spoil.get(fault, lambda: None)
 
 
 BENCHES = {"lines": of_lines, "mavlink": of_mavlink, "kvh1775": of_kvh}

@@ -14,7 +14,7 @@ FOUR = ("time", "gx", "gy", "gz")
 
 def stamped(values: np.ndarray, rate_hz: float = 100, **section: Any) -> tuple[Stamper, np.ndarray, np.ndarray]:
     """Numbers and times of `values` that come ten at a time."""
-    stamper = Stamper(lines_section(acceleration=None, **section), rate_hz)
+    stamper = Stamper(lines_section(acceleration=None, **section), rate_hz, "sensors.imu")
     found = [stamper.stamp(values[at : at + 10], 0, 0.1 * at / 10) for at in range(0, len(values), 10)]
     _, numbers, times_us = (np.concatenate([each[place] for each in found]) for place in (0, 1, 2))
     return stamper, numbers, times_us
@@ -81,7 +81,7 @@ def test_arrival_times_are_made_even() -> None:
     """Bytes come in heaps, 0 to 16 ms late, as from an adapter that collects."""
     rng = np.random.default_rng(4)
     section = lines_section(acceleration=None, time=None, columns=("gx", "gy", "gz"), clock="arrival")
-    stamper = Stamper(section, 200.0)
+    stamper = Stamper(section, 200.0, "sensors.imu")
     arrived = np.arange(12_000) / 200 + rng.uniform(0, 0.016, 12_000)
     heaps = np.split(np.arange(12_000), np.sort(rng.choice(12_000, 4000, replace=False)))
     came = [(len(heap), 50.0 + float(arrived[heap].max())) for heap in heaps if len(heap)]

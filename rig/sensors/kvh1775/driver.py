@@ -5,17 +5,15 @@ The same driver talks to the instrument over RS-422 and to the simulated one: by
 
 import re
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import SerialPort
-from rig.sensors.errors import SensorError, no_port
+from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
 from rig.sensors.kvh1775.settings import NAMES, Wanted, same
-from rig.sensors.port_reader import PortReader
+from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
 from rig.sensors.silence import ATTEMPTS, USUAL, Patience
 
 KEPT_BYTES = 4096  # of what came while an answer was awaited
@@ -44,7 +42,8 @@ class Kvh1775:
 
         Raises SensorError: no_port, no_kvh, kvh_wrong_baud_rate, kvh_does_not_hear, kvh_command_refused.
         """
-        self._sensor, self._port, self._baud = sensor, port, baud
+        self._sensor, self.port, self._baud = sensor, port, baud
+        self._where = f"sensors.{sensor}: the KVH 1775 on {port}"
         self._on_messages, self._patience = on_messages, patience
         self._messages = MessageReader()
         self._bytes_seen = self._messages_seen = 0
@@ -52,24 +51,19 @@ class Kvh1775:
         self._counter: MessageCounter | None = None  # while it streams
         self._format = b""
         self._heard = bytearray()
-        try:
-            self._serial = SerialPort(port, baud)
-        except OSError as error:
-            raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
-        self._reader = PortReader(f"kvh1775 {port}", self._serial.read, self._take, self._failed)
-        self._reader.start()
-        try:
+        no_message = f"sensors.{sensor}: no whole message from the KVH 1775 on {port}"
+        faults = Faults(
+            closed=SensorError("kvh_link_lost", f"sensors.{sensor}: the port {port} closed", _CABLE),
+            silent=SensorError("kvh_link_lost", no_message, _CABLE),
+            not_taken=SensorError("kvh_not_taken", f"sensors.{sensor}", "See the run's log"),
+        )
+        serial = opened(port, baud, where=f"sensors.{sensor}: ", named_by="serial.port")
+        self.own_port = OwnPort(serial, port, faults, self._take, patience=patience, farewell=self._to_normal_mode)
+        self.own_port.begin()
+        with closed_on_failure(self.close):
             self._configure()
             self.serial_number = self._ask("?IS", "IS")
             self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
-        except BaseException:
-            self.close()
-            raise
-
-    @property
-    def port(self) -> str:
-        """The port that the instrument is at."""
-        return self._port
 
     def correct(self, settings: dict[str, str]) -> None:
         """Changes settings in its memory, and reads every one back. Raises SensorError, also `kvh_setting_not_kept`."""
@@ -90,12 +84,12 @@ class Kvh1775:
         seen = self._messages_seen
         period_s = 1.0 / float(self.settings["DR"])
         for wait_s in self._patience.attempts(ATTEMPTS * period_s):
-            self._write("=CONFIG,0")  # which is not answered
-            if self._reader.wait(lambda: self._messages_seen > seen, wait_s):
+            self._to_normal_mode()
+            if self.own_port.wait(lambda: self._messages_seen > seen, wait_s):
                 return
         raise SensorError(
             "kvh_silent",
-            f"sensors.{self._sensor}: no message came from the KVH 1775 on {self._port} in normal mode",
+            f"sensors.{self._sensor}: no message came from the KVH 1775 on {self.port} in normal mode",
             "Look at its MSYNC: an instrument that waits for an external one sends nothing by itself",
         )
 
@@ -105,7 +99,7 @@ class Kvh1775:
         period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
         for wait_s in self._patience.attempts(ATTEMPTS * period_s):
             self._write("?BIT")  # ?BIT,2 has bytes that the ICD does not print as 7f when all is well
-            if self._reader.wait(lambda: bool(self._tests), wait_s):
+            if self.own_port.wait(lambda: bool(self._tests), wait_s):
                 found = self._tests[0]
                 if not found.passed:
                     raise SensorError(
@@ -117,51 +111,29 @@ class Kvh1775:
                 return found
         raise SensorError(
             "kvh_no_test",
-            f"sensors.{self._sensor}: the KVH 1775 on {self._port} sends no result of its built-in test",
+            f"{self._where} sends no result of its built-in test",
             "Switch it off and on, then try again",
         )
 
     def start(self, wanted: Wanted) -> None:
         """Start to hand everything to `on_messages`, from the next message on."""
-        with self._reader.news:
+        with self.own_port.news:
             self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
             self._format = wanted.message.encode()
-            self._reader.silence.restart()
+            self.own_port.stream(2 / wanted.rate_hz)
 
     @property
     def lost(self) -> int:
         """Messages lost in the stream."""
         return 0 if self._counter is None else self._counter.lost
 
-    def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile: `kvh_link_lost`, and what a message could not be used for.
-
-        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
-        """
-        silent_s = self._reader.silent_s(clock_s)
-        if self._counter is not None and silent_s > self._patience.silent_s + 2e-6 * self._counter.interval_us:
-            raise SensorError(
-                "kvh_link_lost",
-                f"sensors.{self._sensor}: no whole message from the KVH 1775 on {self._port} for {silent_s:.1f} s",
-                _CABLE,
-            )
-
     def listen(self, duration_s: float) -> None:
         """Waits so long while it streams. Raises what goes wrong meanwhile."""
-        self._reader.wait(lambda: False, duration_s)
-
-    def fail(self, error: SensorError) -> None:
-        """Makes `error` what `check` raises, unless there is one already."""
-        self._reader.fail(error)
+        self.own_port.wait(lambda: False, duration_s)
 
     def close(self) -> None:
         """Leaves it in normal mode, as after switching on, and closes the port. May be called twice."""
-        if self._reader.closed:
-            return
-        with suppress(SensorError):
-            self._write("=CONFIG,0")
-        self._reader.close()
-        self._serial.close()
+        self.own_port.close()
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def _configure(self) -> None:
@@ -169,34 +141,31 @@ class Kvh1775:
         try:
             self._ask("=CONFIG,1", "CONFIG")
         except SensorError as error:
-            if error.name != "kvh_link_lost" or self._reader.fault is not None:
+            if error.name != "kvh_link_lost" or self.own_port.fault is not None:
                 raise
             raise self._why_no_answer() from error
 
     def _why_no_answer(self) -> SensorError:
-        where = f"sensors.{self._sensor}: the KVH 1775 on {self._port}"
         if self._messages_seen:
-            return SensorError(
-                "kvh_does_not_hear",
-                f"{where} sends, but does not answer",
-                "Check the pair of wires to its receiver",
-            )
+            does_not_hear = f"{self._where} sends, but does not answer"
+            return SensorError("kvh_does_not_hear", does_not_hear, "Check the pair of wires to its receiver")
         if self._bytes_seen:
+            came = f"{self._bytes_seen} bytes came from {self._where} at {self._baud} Bd"
             return SensorError(
                 "kvh_wrong_baud_rate",
-                f"{self._bytes_seen} bytes came from {where} at {self._baud} Bd, and no message or answer in them",
+                f"{came}, and no message or answer in them",
                 "Set serial.baud to what the instrument is set to; it is delivered with 921600",
             )
-        return SensorError("no_kvh", f"{where}: nothing came within {self._patience.first_s:g} s", _CABLE)
+        return SensorError("no_kvh", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE)
 
     def _ask(self, command: str, name: str) -> str:
         """What stands behind `name` in the answer. Raises SensorError `kvh_command_refused`, `kvh_link_lost`."""
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
         for wait_s in self._patience.attempts():
-            with self._reader.news:
+            with self.own_port.news:
                 self._heard.clear()
             self._write(command)
-            self._reader.wait(lambda: answer.search(self._heard) is not None, wait_s)
+            self.own_port.wait(lambda: answer.search(self._heard) is not None, wait_s)
             if (found := answer.search(self._heard)) is not None:
                 return found.group(1).decode("ascii", "replace").strip()
             # Only now: what it finds invalid may have been half a command of somebody else's, or the empty line before.
@@ -209,36 +178,23 @@ class Kvh1775:
                 )
         raise SensorError(
             "kvh_link_lost",
-            f"sensors.{self._sensor}: the KVH 1775 on {self._port} did not answer {command} within "
-            f"{self._patience.first_s:g} s",
+            f"{self._where} did not answer {command} within {self._patience.first_s:g} s",
             _CABLE,
         )
 
+    def _to_normal_mode(self) -> None:
+        self._write("=CONFIG,0")  # which is not answered
+
     def _write(self, command: str) -> None:
         """The leading line end finishes whatever half a command it may have heard before."""
-        try:
-            self._serial.write(b"\r\n" + command.encode("ascii") + b"\r\n")
-        except OSError as error:
-            raise self._failed(error) from error
+        self.own_port.write(b"\r\n" + command.encode("ascii") + b"\r\n")
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _failed(self, error: Exception) -> SensorError:
-        """The fault that an error of the port or of a consumer is."""
-        if isinstance(error, SensorError):
-            return error
-        if isinstance(error, OSError):
-            closed = f"sensors.{self._sensor}: the port {self._port} closed: {error}"
-            return SensorError("kvh_link_lost", closed, _CABLE)
-        return SensorError("kvh_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
-
     def _take(self, data: bytes, host_time_s: float) -> None:
         decoded = self._messages.feed(data)
-        with self._reader.news:
-            silent_s = self._reader.silence.lasts_s
-            if len(decoded.messages):
-                self._reader.silence.heard()
-            else:
-                self._reader.silence.idle()
+        with self.own_port.news:
+            silent_s = self.own_port.silence.lasts_s
+            self.own_port.silence.note(len(decoded.messages))
             if not data:
                 return
             self._bytes_seen += len(data)
@@ -246,20 +202,19 @@ class Kvh1775:
             self._heard = (self._heard + data)[-KEPT_BYTES:]
             self._tests += decoded.tests
             counter = self._counter
-            self._reader.news.notify_all()
+            self.own_port.news.notify_all()
         if counter is None or not len(decoded.messages):
             return
         if decoded.tests:
             raise SensorError(
                 "kvh_restarted",
-                f"sensors.{self._sensor}: the KVH 1775 on {self._port} told of its built-in test while it streamed: it "
-                "was switched off and on",
+                f"{self._where} told of its built-in test while it streamed: it was switched off and on",
                 "Check its supply, then run again",
             )
         if (decoded.messages["format"] != self._format).any():
             raise SensorError(
                 "kvh_other_format",
-                f"sensors.{self._sensor}: the KVH 1775 on {self._port} sends another format than it was set to",
+                f"{self._where} sends another format than it was set to",
                 "See that no other program talks to it, then run again",
             )
         numbers, times_us = counter.count(decoded.messages, silent_s)

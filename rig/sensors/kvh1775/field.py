@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
+from rig.data.channel import stamped
 
 MESSAGES_EACH = 4  # temperature, x, y, z: by the sequence number, whose 128 are a multiple of it
 GAUSS_T = 1e-4
@@ -31,10 +32,9 @@ class FieldReader:
         place = messages["sequence"].astype(np.int64) % MESSAGES_EACH
         gauss = messages["fourth"].astype(np.float64)
         some = (place > 0) & np.isfinite(gauss)
-        rows = np.zeros(int(some.sum()), FIELD_SAMPLE_DTYPE)
         # Numbers go on across the wrap of the sequence: all four messages of a reading give the same.
-        rows["sequence"] = (numbers[some] - place[some]) // MESSAGES_EACH + 1
-        rows["board_time_us"], rows["host_time_s"] = times_us[some], host_time_s
+        readings = (numbers[some] - place[some]) // MESSAGES_EACH + 1
+        rows = stamped(FIELD_SAMPLE_DTYPE, readings, times_us[some], host_time_s)
         counts = np.rint(gauss[some] / self._gauss_per_count)
         rows["field_counts"] = np.clip(counts, -self._limit, self._limit)[:, None]
         rows, axes = np.concatenate([self._held, rows]), np.concatenate([self._axes, place[some] - 1])

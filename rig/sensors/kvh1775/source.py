@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
-from rig.data.channel import of_thermometer, of_three_axes
+from rig.data.channel import of_thermometer, stamped
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -17,16 +17,13 @@ from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.field import MESSAGES_EACH, FieldReader
 from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
+from rig.sensors.own_port import closed_on_failure
+from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
-# The instrument sends single-precision floats; a sample holds whole numbers. This many stand for its full scale: far
-# finer than a float near it, and half of what 32 bits hold.
-FULL_SCALE_COUNTS = 1 << 30
 GYROSCOPE_VALID, ACCELEROMETER_VALID = 0x07, 0x70
 INVALID_S = 1.0  # of messages in a row that say of themselves they are wrong
-DEGREES_PER_COUNT = 0.01
-FIELD_FULL_SCALE_T = 1e-3  # as far as samples reach; the ICD says nothing of the magnetometer's own range
 _UNKNOWN = 1 << 40  # temperature that nothing has told yet
 
 
@@ -49,8 +46,7 @@ class Kvh1775Source:
         self._field_name, self._field = field_name(name), describe_field(name, section)
         self._field_reader = FieldReader(FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS)
         self._driver = Kvh1775(name, line.port, line.baud, self._take, patience=patience)
-        try:
-            self.serial_number = self._driver.serial_number
+        with closed_on_failure(self.close):
             for refusal in judge(self._driver, name, section):
                 raise refusal
             found = self._driver.settings
@@ -59,9 +55,6 @@ class Kvh1775Source:
             self._driver.correct(changes)
             self._driver.run()
             self._driver.test()
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -79,8 +72,8 @@ class Kvh1775Source:
         self._driver.start(self._wanted)
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the instrument, as of `SampleSource`. Raises SensorError as `Kvh1775.check`, and `kvh_axis_invalid`."""
-        self._driver.check(clock_s)
+        """Check the instrument, as of `SampleSource`. Raises SensorError as `OwnPort.check`, and `kvh_axis_invalid`."""
+        self._driver.own_port.check(clock_s)
 
     def close(self) -> None:
         """Ends the thread and closes the port."""
@@ -99,20 +92,18 @@ class Kvh1775Source:
         valid &= temperature_counts != _UNKNOWN
         if not valid.any():
             return
-        samples = np.zeros(int(valid.sum()), self._described.sample_dtype)
+        described = self._described
         if self._first is None:
             self._first = int(numbers[valid][0])
-        samples["sequence"] = numbers[valid] - self._first
-        samples["board_time_us"] = times_us[valid]
-        samples["host_time_s"] = host_time_s
+        samples = stamped(described.sample_dtype, numbers[valid] - self._first, times_us[valid], host_time_s)
         samples["temperature_counts"] = temperature_counts[valid]
         rate_rad_s = messages["rotation"][valid].astype(np.float64)
         if self._wanted.rotation == "delta":
             rate_rad_s *= self._wanted.rate_hz  # its own seconds, in which it counts its intervals
-        samples["counts"] = _counts(rate_rad_s, self._described.channel(RATE).unit_per_count)
-        if self._described.measures(ACCELERATION):
+        described.channel(RATE).fill(samples, rate_rad_s)
+        if described.measures(ACCELERATION):
             force_m_s2 = messages["acceleration_g"][valid].astype(np.float64) * STANDARD_GRAVITY_M_S2
-            samples["acceleration_counts"] = _counts(force_m_s2, self._described.channel(ACCELERATION).unit_per_count)
+            described.channel(ACCELERATION).fill(samples, force_m_s2)
         self._on_samples(self._name, samples)
 
     def _watch(self, messages: NDArray[Any], valid: NDArray[np.bool_]) -> None:
@@ -159,14 +150,9 @@ def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[Sensor
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:
     """What a reader of its samples must know."""
-    range_rad_s = radians(section.range_deg_s)
-    channels = [
-        of_three_axes(RATE, range_rad_s / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, range_rad_s),
-        of_thermometer(DEGREES_PER_COUNT, 0.0),
-    ]
+    channels = [fine_axes(RATE, radians(section.range_deg_s)), of_thermometer(DEGREES_PER_COUNT, 0.0)]
     if section.acceleration is not None:
-        most_m_s2 = range_m_s2(section.acceleration)
-        channels.append(of_three_axes(ACCELERATION, most_m_s2 / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, most_m_s2))
+        channels.append(fine_axes(ACCELERATION, range_m_s2(section.acceleration)))
     return recorded_as(section, *channels, clock=name)
 
 
@@ -174,8 +160,7 @@ def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
     """How a recording describes the instrument's magnetometer; None where its messages have no field."""
     if _line_of(section).message != "C":
         return None
-    t_per_count = FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS
-    field = of_three_axes(FIELD, t_per_count, FULL_SCALE_COUNTS, FIELD_FULL_SCALE_T)
+    field = fine_axes(FIELD, FIELD_FULL_SCALE_T)  # the ICD says nothing of its own range
     part, rate_hz = "kvh1775_magnetometer", section.rate_hz / MESSAGES_EACH
     return recorded_as(section, field, part=part, rate_hz=rate_hz, clock=name)
 
@@ -197,11 +182,6 @@ def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
         yield from judge(driver, name, section)
         driver.run()
         yield f"built-in test: {driver.test().values.hex(' ')}"
-
-
-def _counts(values: NDArray[np.float64], per_count: float) -> NDArray[np.float64]:
-    limit = 2.0 * FULL_SCALE_COUNTS - 1
-    return np.clip(np.rint(values / per_count), -limit, limit)
 
 
 def _line_of(section: SensorSection) -> OwnPortSection:

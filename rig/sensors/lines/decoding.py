@@ -33,16 +33,13 @@ class Decoded:
     """What bytes held: `values` (n, columns) of the samples, as printed, and how many lines were none.
 
     `before` (m,) says of each line that was no sample, and no comment, how many samples of these stood before it;
-    `why` is how the first of them begins. `wrong_sums` counts those that had everything but the right checksum.
-    `decimals` (columns,) are the most digits after the point that each column had.
+    `why` is how the first of them begins.
     """
 
     values: Array
     before: NDArray[np.int64]
     comments: int
-    wrong_sums: int
     why: bytes
-    decimals: Array
 
 
 class LineReader:
@@ -72,12 +69,11 @@ class LineReader:
         if not self._begun and end:
             self._begun, data = True, data[data.find(b"\n") + 1 :]
         if not data:
-            return self._nothing(0, b"")
+            return self._nothing(0)
         return self._decode(data)
 
-    def _nothing(self, comments: int, why: bytes, rejected: int = 0) -> Decoded:
-        none = np.zeros((0, self._columns))
-        return Decoded(none, np.zeros(rejected, np.int64), comments, 0, why, np.zeros(self._columns))
+    def _nothing(self, comments: int) -> Decoded:
+        return Decoded(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
     def _decode(self, data: bytes) -> Decoded:
         raw = np.frombuffer(data, np.uint8)
@@ -91,7 +87,7 @@ class LineReader:
             line_starts, line_ends = line_starts[~commented], line_ends[~commented]
         comments = int(np.count_nonzero(commented))
         if not len(line_starts):
-            return self._nothing(comments, b"")
+            return self._nothing(comments)
         text = raw.copy()
         good = np.ones(len(line_starts), np.bool_)
         if self._prefix:
@@ -103,16 +99,14 @@ class LineReader:
             text = self._keys_marked(text)
         classes = self._classes[text]
         good &= _hold_nothing_else(classes, line_starts, line_ends)
-        values, decimals = self._values(text, classes, (line_starts, line_ends), good, right)
-        wrong_sums = int(np.count_nonzero(good & ~right))
+        values = self._values(text, classes, (line_starts, line_ends), good, right)
         taken = good & right
         before = np.cumsum(taken, dtype=np.int64)[~taken]
         why = b""
         if len(before):
             place = int(np.argmin(taken))
             why = bytes(data[line_starts[place] : min(line_ends[place], line_starts[place] + KEPT_TEXT)])
-        most = decimals.max(axis=0) if len(decimals) else np.zeros(self._columns)
-        return Decoded(values, before, comments, wrong_sums, why, most)
+        return Decoded(values, before, comments, why)
 
     @staticmethod
     def _begin_with(raw: NDArray[np.uint8], starts: NDArray[np.intp], text: bytes) -> NDArray[np.bool_]:
@@ -153,7 +147,7 @@ class LineReader:
         lines: tuple[NDArray[np.intp], NDArray[np.intp]],
         good: NDArray[np.bool_],
         right: NDArray[np.bool_],
-    ) -> tuple[Array, Array]:
+    ) -> Array:
         """The numbers of lines that hold as many as there are columns, in order; `good` says afterwards which do."""
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
@@ -178,10 +172,10 @@ class LineReader:
             starts, ends = starts[ordered], ends[ordered]
         summed = right[good]
         starts, ends = starts[summed], ends[summed]
-        values, decimals = (each.reshape(-1, self._columns) for each in numbers_at(text, starts.ravel(), ends.ravel()))
+        values = numbers_at(text, starts.ravel(), ends.ravel()).reshape(-1, self._columns)
         numbers = np.isfinite(values).all(axis=1)
         good[np.flatnonzero(good & right)[~numbers]] = False
-        return values[numbers], decimals[numbers]
+        return values[numbers]
 
 
 def _hold_nothing_else(

@@ -4,20 +4,19 @@ Nothing is sent to the device. It says nothing of itself, so that it is what the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import SerialPort
 from rig.config.lines_section import SECONDS, LinesSection
 from rig.config.sensor_sections import OwnPortSection
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
-from rig.sensors.errors import SensorError, no_port
+from rig.sensors.errors import SensorError
 from rig.sensors.lines.decoding import Decoded, LineReader
 from rig.sensors.lines.stamping import Stamper
-from rig.sensors.port_reader import PortReader
+from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
 from rig.sensors.silence import USUAL, Patience
 
 LOOK_SAMPLES, LOOK_S = 50, 0.5  # of samples, of the device's time, until its rate is judged
@@ -34,19 +33,13 @@ OnValues = Callable[[Array, NDArray[np.int64], NDArray[np.int64], float], None]
 
 @dataclass(slots=True)
 class Counts:
-    """What came: samples, comments, lines before the first sample, lines that were none after it, and why not.
-
-    `wrong_sums` of the lines that were none had a wrong checksum, `odd` a time that cannot be.
-    """
+    """What came: samples, comments, lines before the first sample, lines that were none after it, the first of them."""
 
     samples: int = 0
     comments: int = 0
     before: int = 0
     damaged: int = 0
-    wrong_sums: int = 0
-    odd: int = 0
     first_other: bytes = b""
-    decimals: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, decoded: Decoded) -> None:
         """Count what one read brought."""
@@ -56,9 +49,7 @@ class Counts:
         self.damaged += len(decoded.before) - boot
         self.samples += len(decoded.values)
         self.comments += decoded.comments
-        self.wrong_sums += decoded.wrong_sums
         self.first_other = self.first_other or decoded.why
-        self.decimals = np.maximum(self.decimals, decoded.decimals) if len(self.decimals) else decoded.decimals
 
 
 class LinesDevice:
@@ -82,23 +73,22 @@ class LinesDevice:
         Raises SensorError: no_port, lines_silent, lines_wrong_baud_rate, lines_other_format, lines_other_rate.
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
-        self._on_values, self._patience = on_values, patience
+        self._on_values = on_values
         self._lines = LineReader(section)
         self.counts = Counts()
         self._stamper: Stamper | None = None  # while it streams
         self._skipped = 0  # lines that were no samples since the last that was
         self._seen: list[Array] = []  # until it is known what comes
-        try:
-            self._serial = SerialPort(line.port, line.baud)
-        except OSError as error:
-            raise no_port(line.port, error, where=f"sensors.{sensor}: ", named_by="serial.port") from error
-        self._reader = PortReader(f"lines {line.port}", self._serial.read, self._take, self._failed)
-        self._reader.start()
-        try:
+        faults = Faults(
+            closed=SensorError("lines_link_lost", f"{self.where}: the port closed", _CABLE),
+            silent=SensorError("lines_link_lost", f"{self.where} has sent no sample", _CABLE),
+            not_taken=SensorError("lines_not_taken", self.where, "See the run's log"),
+        )
+        serial = opened(line.port, line.baud, where=f"sensors.{sensor}: ", named_by="serial.port")
+        self.own_port = OwnPort(serial, line.port, faults, self._take, patience=patience)
+        self.own_port.begin()
+        with closed_on_failure(self.close):
             self.rate_hz = self._look(patience.first_s)
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def where(self) -> str:
@@ -112,41 +102,20 @@ class LinesDevice:
 
     def start(self) -> None:
         """Start to hand everything to `on_values`, from the next line on."""
-        with self._reader.news:
-            self._stamper = Stamper(self._section, self._rate_hz)
+        with self.own_port.news:
+            self._stamper = Stamper(self._section, self._rate_hz, self.where)
             self._skipped = 0
-            self._reader.silence.restart()
-
-    @property
-    def lost(self) -> int:
-        """Samples lost in the stream."""
-        return 0 if self._stamper is None else self._stamper.lost
-
-    def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile: `lines_link_lost`, `lines_damaged`, `lines_time_jumped`.
-
-        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
-        """
-        silent_s = self._reader.silent_s(clock_s)
-        if self._stamper is not None and silent_s > self._patience.silent_s + 2 / self._rate_hz:
-            raise SensorError("lines_link_lost", f"{self.where} has sent no sample for {silent_s:.1f} s", _CABLE)
-
-    def fail(self, error: SensorError) -> None:
-        """Makes `error` what `check` raises, unless there is one already."""
-        self._reader.fail(error)
+            self.own_port.stream(2 / self._rate_hz)
 
     def close(self) -> None:
         """Ends the thread and closes the port. May be called twice."""
-        if self._reader.closed:
-            return
-        self._reader.close()
-        self._serial.close()
+        self.own_port.close()
 
     # -- what comes at all -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
         """The rate of its samples by its own time, NaN where it has none. Raises as the constructor does."""
         enough = LOOK_SAMPLES if self._section.time is not None else 3
-        came = self._reader.wait(lambda: self.counts.samples >= enough or self._lasted(), timeout_s)
+        came = self.own_port.wait(lambda: self.counts.samples >= enough or self._lasted(), timeout_s)
         if not came and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
         rate_hz = self._measured_hz()
@@ -210,28 +179,17 @@ class LinesDevice:
         )
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _failed(self, error: Exception) -> SensorError:
-        """The fault that an error of the port, of the lines or of a consumer is."""
-        if isinstance(error, OSError):
-            return SensorError("lines_link_lost", f"{self.where}: the port closed: {error}", _CABLE)
-        if isinstance(error, SensorError):
-            return SensorError(error.name, f"{self.where}: {error.what}", error.remedy)
-        return SensorError("lines_not_taken", f"{self.where}: {error!r}", "See the run's log")
-
     def _take(self, data: bytes, host_time_s: float) -> None:
         decoded = self._lines.feed(data)
-        with self._reader.news:
-            if len(decoded.values):
-                self._reader.silence.heard()
-            else:
-                self._reader.silence.idle()
+        with self.own_port.news:
+            self.own_port.silence.note(len(decoded.values))
             if not data:
                 return
             self.counts.add(decoded)
             stamper = self._stamper
             if stamper is None and len(decoded.values):
                 self._seen.append(decoded.values)
-            self._reader.news.notify_all()
+            self.own_port.news.notify_all()
         if stamper is None:
             return
         self._refuse_damage()
@@ -240,7 +198,6 @@ class LinesDevice:
             return
         kept, numbers, times_us = stamper.stamp(decoded.values, self._skipped, host_time_s)
         self._skipped = 0
-        self.counts.odd = stamper.odd
         if self._on_values is not None and len(numbers):
             self._on_values(decoded.values[kept], numbers, times_us, host_time_s)
 
@@ -249,7 +206,7 @@ class LinesDevice:
         if counts.damaged > DAMAGED_LINES and counts.damaged > DAMAGED * (counts.samples + counts.damaged):
             raise SensorError(
                 "lines_damaged",
-                f"{counts.damaged} of {counts.samples + counts.damaged} lines are no samples, such as "
+                f"{self.where}: {counts.damaged} of {counts.samples + counts.damaged} lines are no samples, such as "
                 f"{quote(counts.first_other[:SHOWN].decode('ascii', 'replace'))}",
                 "Check the cable and the speed of the line; see that nothing else prints there",
             )

@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable
 
-from firmware_host.serial_port import SerialPort
-from rig.sensors.errors import SensorError, no_port
+from rig.sensors.errors import SensorError
 from rig.sensors.lines.shape import Line
+from rig.sensors.own_port import opened
 
 USUAL = (115200, 921600, 460800, 230400, 57600, 38400, 19200, 9600, 500000, 1000000, 250000, 2000000)
 TRIED_S = 1.2  # at each speed
@@ -23,10 +23,7 @@ def listen(
     found = baud or _speed(port, tell)
     still_s, turned_s = seconds
     tell(f"lay it down and leave it alone for {still_s:g} s")
-    try:
-        serial = SerialPort(port, found)
-    except OSError as error:
-        raise no_port(port, error) from error
+    serial = opened(port, found)
     lines: list[Line] = []
     rest, began_s, told = b"", time.monotonic(), False
     try:
@@ -70,10 +67,7 @@ def _speed(port: str, tell: Callable[[str], None]) -> int:
 
 
 def _heard(port: str, baud: int) -> bytes:
-    try:
-        serial = SerialPort(port, baud)
-    except OSError as error:
-        raise no_port(port, error) from error
+    serial = opened(port, baud)
     try:
         serial.read()  # what stands there was read at another speed
         heard, until_s = b"", time.monotonic() + TRIED_S

@@ -17,13 +17,10 @@ _ZERO, _POINT, _PLUS, _MINUS = (ord(each) for each in "0.+-")
 _POWERS = 10.0 ** np.arange(MOST_DECIMALS + 1)
 
 
-def numbers_at(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> tuple[Array, Array]:
-    """The numbers (n,) that stand in `text` from `starts` to before `ends`, NaN for what is none, and their decimals.
-
-    Decimals (n,) are the digits after the point; of a number with an exponent, 0.
-    """
+def numbers_at(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
+    """The numbers (n,) that stand in `text` from `starts` to before `ends`, NaN for what is none."""
     if not len(starts):
-        return np.empty(0), np.empty(0)
+        return np.empty(0)
     whole, digits = _digits(text, starts, ends)
     signs = text[starts]
     signed = (signs == _MINUS) | (signs == _PLUS)
@@ -40,12 +37,12 @@ def numbers_at(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[
     found = whole / _POWERS[np.minimum(decimals, MOST_DECIMALS)]
     found = np.where(signs == _MINUS, -found, found)
     for odd in np.flatnonzero(~plain):
-        found[odd], decimals[odd] = np.nan, 0
+        found[odd] = np.nan
         if ends[odd] - starts[odd] <= LONGEST:
             with suppress(ValueError):
                 found[odd] = float(text[starts[odd] : ends[odd]].tobytes())
     found[np.isinf(found)] = np.nan
-    return found, decimals.astype(np.float64)
+    return found
 
 
 def _digits(

@@ -20,7 +20,7 @@ from rig.config.lines_section import (
     LinesSection,
 )
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
-from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.data.channel import Channel, of_thermometer, of_three_axes, stamped
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
@@ -28,6 +28,7 @@ from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.driver import LinesDevice
 from rig.sensors.lines.stamping import COARSE
+from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
@@ -36,10 +37,7 @@ UNITS = {
     "m/s2": 1.0, "g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 * 1e-3,
     "T": 1.0, "uT": 1e-6, "nT": 1e-9, "gauss": 1e-4, "mgauss": 1e-7,
 }  # fmt: skip
-FULL_SCALE_COUNTS = 1 << 30  # of numbers whose resolution nobody states: half of what 32 bits hold
 AT_THE_END = 1 - 1e-4  # of the range, where readings count as saturated: a count of 16 bits below it is none
-FIELD_FULL_SCALE_T = 1e-3
-DEGREES_PER_COUNT = 0.01
 LookedAt = str | SensorError
 AXES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
 _OfTriad = LineRateSection | LineAccelerationSection | LineFieldSection
@@ -70,8 +68,11 @@ class LinesSource:
         self._device.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the device, as of `SampleSource`. Raises SensorError as `LinesDevice.check`."""
-        self._device.check(clock_s)
+        """Check the device, as of `SampleSource`.
+
+        Raises SensorError as `OwnPort.check`, `lines_damaged`, `lines_time_jumped`.
+        """
+        self._device.own_port.check(clock_s)
 
     def close(self) -> None:
         """Ends the thread and closes the port."""
@@ -80,12 +81,10 @@ class LinesSource:
     def _take(self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float) -> None:
         """Hand over the lines' numbers as samples, on the reader's thread."""
         for name, (sensor, columns) in self._read.items():
-            samples = np.zeros(len(values), sensor.sample_dtype)
-            samples["sequence"], samples["board_time_us"] = numbers, times_us
-            samples["host_time_s"] = host_time_s
+            samples = stamped(sensor.sample_dtype, numbers, times_us, host_time_s)
             for channel, printed in zip(sensor.channels, columns, strict=True):
                 if printed.places:  # what is stated of a temperature has none: its counts stay zero
-                    samples[channel.column] = printed.counts(values, channel)
+                    channel.fill(samples, printed.readings(values, channel))
             self._on_samples(name, samples)
 
 
@@ -97,14 +96,9 @@ class _Printed:
     size: float = 1.0
     zero: float = 0.0
 
-    def counts(self, values: Array, channel: Channel) -> Array:
-        """The channel's numbers (n,) or (n, 3) of printed `values` (n, columns)."""
-        read = values[:, self.places].reshape(len(values), *channel.measures.shape) * self.size + self.zero
-        counts: Array = (read - channel.offset) / channel.unit_per_count
-        if channel.type == "<f8":
-            return counts
-        most = np.iinfo(channel.type).max
-        return np.clip(np.rint(counts), -most, most)
+    def readings(self, values: Array, channel: Channel) -> Array:
+        """The channel's readings (n,) or (n, 3) of printed `values` (n, columns)."""
+        return values[:, self.places].reshape(len(values), *channel.measures.shape) * self.size + self.zero
 
 
 def describe(name: str, section: SensorSection) -> RecordedSensor:

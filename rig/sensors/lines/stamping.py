@@ -26,6 +26,7 @@ class Stamper:
 
     section: LinesSection
     rate_hz: float
+    where: str  # the device as messages name it
     lost: int = 0
     odd: int = 0
     _number: int = -1
@@ -125,7 +126,7 @@ class Stamper:
                 self.odd += 1
                 self._odd_in_a_row += 1
                 if self._odd_in_a_row >= ODD_ONES:
-                    raise SensorError("lines_time_jumped", self._jump(row), _RESTARTED)
+                    raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", _RESTARTED)
         finally:
             self._last_time, self._last_sequence = last
         return kept

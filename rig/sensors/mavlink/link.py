@@ -6,17 +6,16 @@ The same link talks to an autopilot over a cable and to the simulated one: bytes
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from rig.sensors.errors import SensorError, no_port
+from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.counting import LinkCounter
 from rig.sensors.mavlink.dialect import ARMED, FIRMWARES, dialect
 from rig.sensors.mavlink.parameters import Parameter, field_as_number, payload_field
 from rig.sensors.mavlink.port import open_port
-from rig.sensors.port_reader import PortReader
-from rig.sensors.silence import USUAL, Patience, Silence
+from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
+from rig.sensors.silence import USUAL, Patience
 
 HEARTBEAT_S = 1.0
 OURS = (255, 190)  # system and component of a ground station (mavlink.io, MAV_COMP_ID_MISSIONPLANNER)
@@ -79,20 +78,18 @@ class Link:
         self._parameters: dict[str, Parameter] = {}
         self._answers: dict[int, int] = {}
         self._version: Any = None
-        self._streaming = False
         self._sending = threading.Lock()
         self._beaten_s = 0.0
-        try:
-            self._port = open_port(port, baud)
-        except OSError as error:
-            raise no_port(port, error, where=f"sensors.{sensor}: ", named_by="mavlink.port") from error
-        self._reader = PortReader(f"mavlink {port}", self._read, self._take, self._failed)
-        self._reader.start()
-        try:
+        faults = Faults(
+            closed=SensorError("mavlink_link_lost", f"{self._where}: the port closed", _CABLE),
+            silent=SensorError("mavlink_link_lost", f"{self._where} has sent no reading", _CABLE),
+            not_taken=SensorError("mavlink_not_taken", f"sensors.{sensor}", "See the run's log"),
+        )
+        line = opened(port, baud, open_port, where=f"sensors.{sensor}: ", named_by="mavlink.port")
+        self.own_port = OwnPort(line, port, faults, self._take, patience=patience, farewell=self._as_before)
+        self.own_port.begin()
+        with closed_on_failure(self.close):
             self._find()
-        except BaseException:
-            self.close()
-            raise
 
     @property
     def known(self) -> Autopilot:
@@ -108,13 +105,13 @@ class Link:
         """
         needed = set(needed)
         names = needed | set(others)
-        with self._reader.news:
+        with self.own_port.news:
             for name in names:
                 self._parameters.pop(name, None)
         for wait_s in self._patience.attempts():
             for name in sorted(names - self._parameters.keys()):
                 self._send(self._mavlink.MAVLink_param_request_read_message(*self._address, name.encode(), -1))
-            self._reader.wait(lambda: names <= self._parameters.keys(), wait_s)
+            self.own_port.wait(lambda: names <= self._parameters.keys(), wait_s)
             if needed <= self._parameters.keys() and wait_s > 2 * self._patience.attempts()[0]:
                 break
         found = {name: self._parameters[name] for name in names & self._parameters.keys()}
@@ -128,13 +125,13 @@ class Link:
 
     def set_parameter(self, parameter: Parameter) -> Parameter:
         """Set it to those four bytes, and what the autopilot answers. Raises SensorError `autopilot_not_set`."""
-        with self._reader.news:
+        with self.own_port.news:
             self._parameters.pop(parameter.name, None)
         value = field_as_number(parameter.field)
         for wait_s in self._patience.attempts():
             name = parameter.name.encode()
             self._send(self._mavlink.MAVLink_param_set_message(*self._address, name, value, parameter.type))
-            if self._reader.wait(lambda: parameter.name in self._parameters, wait_s):
+            if self.own_port.wait(lambda: parameter.name in self._parameters, wait_s):
                 return self._parameters[parameter.name]
         raise SensorError(
             "autopilot_not_set",
@@ -158,7 +155,7 @@ class Link:
         """Ask for its version and its own number, which some do not tell."""
         for wait_s in self._patience.attempts()[:2]:
             self._send(self._command_message(REQUEST_MESSAGE, AUTOPILOT_VERSION, 0.0))
-            if self._reader.wait(lambda: self._version is not None, wait_s):
+            if self.own_port.wait(lambda: self._version is not None, wait_s):
                 break
         if self._version is not None:
             version = self._version.flight_sw_version
@@ -167,34 +164,9 @@ class Link:
             known = self.known
             self.autopilot = Autopilot(known.system, known.component, known.firmware, said, uid)
 
-    def start(self) -> None:
-        """Start to take the stream's silence for a fault."""
-        with self._reader.news:
-            self._streaming, self._reader.silence = True, Silence()
-
-    def check(self, clock_s: float | None = None) -> None:
-        """Raises what went wrong meanwhile: `mavlink_link_lost`, `autopilot_armed`, what a consumer raised.
-
-        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
-        """
-        silent_s = self._reader.silent_s(clock_s)
-        if self._streaming and silent_s > self._patience.silent_s:
-            raise SensorError("mavlink_link_lost", f"{self._where} has sent no reading for {silent_s:.1f} s", _CABLE)
-
-    def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether it was so in time. Raises what went wrong meanwhile."""
-        return self._reader.wait(until, timeout_s)
-
     def close(self) -> None:
         """Lets messages come as often as they did before, and closes the port. May be called twice."""
-        if self._reader.closed:
-            return
-        with suppress(SensorError):
-            for message in self.wanted if self.autopilot is not None else ():
-                number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
-                self._send(self._command_message(SET_INTERVAL, number, 0.0))
-        self._reader.close()
-        self._port.close()
+        self.own_port.close()
 
     # -- inside ----------------------------------------------------------------------------------------------------
     @property
@@ -206,7 +178,7 @@ class Link:
         return self.known.system, self.known.component
 
     def _find(self) -> None:
-        if not self._reader.wait(lambda: self.autopilot is not None, self._patience.first_s):
+        if not self.own_port.wait(lambda: self.autopilot is not None, self._patience.first_s):
             if self._others_seen:
                 raise SensorError(
                     "mavlink_other_device",
@@ -234,11 +206,11 @@ class Link:
         )
 
     def _command(self, command: int, first: float, second: float) -> int | None:
-        with self._reader.news:
+        with self.own_port.news:
             self._answers.pop(command, None)
         for wait_s in self._patience.attempts():
             self._send(self._command_message(command, first, second))
-            if self._reader.wait(lambda: command in self._answers, wait_s):
+            if self.own_port.wait(lambda: command in self._answers, wait_s):
                 return self._answers[command]
         return None
 
@@ -246,32 +218,26 @@ class Link:
         return self._mavlink.MAVLink_command_long_message(*self._address, command, 0, first, second, 0, 0, 0, 0, 0)
 
     def _send(self, message: Any) -> None:
-        try:
-            with self._sending:
-                self._port.write(message.pack(self._parser))
-                self._parser.seq = (self._parser.seq + 1) % 256
-        except OSError as error:
-            raise self._failed(error) from error
+        with self._sending:
+            self.own_port.write(message.pack(self._parser))
+            self._parser.seq = (self._parser.seq + 1) % 256
+
+    def _as_before(self) -> None:
+        for message in self.wanted if self.autopilot is not None else ():
+            number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
+            self._send(self._command_message(SET_INTERVAL, number, 0.0))
 
     # -- the reader's thread ---------------------------------------------------------------------------------------
-    def _read(self) -> bytes:
-        """What the port brings; the autopilot is told every second that somebody listens."""
+    def _beat(self) -> None:
+        """Tell the autopilot every second that somebody listens."""
         if time.monotonic() - self._beaten_s > HEARTBEAT_S:
             self._beaten_s = time.monotonic()
             self._send(self._mavlink.MAVLink_heartbeat_message(GROUND_STATION, NO_AUTOPILOT, 0, 0, 4, 3))
-        return self._port.read()
-
-    def _failed(self, error: Exception) -> SensorError:
-        """The fault that an error of the port or of a consumer is."""
-        if isinstance(error, SensorError):
-            return error
-        if isinstance(error, OSError):
-            return SensorError("mavlink_link_lost", f"{self._where}: the port closed: {error}", _CABLE)
-        return SensorError("mavlink_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log")
 
     def _take(self, data: bytes, host_time_s: float) -> None:
+        self._beat()
         found: list[tuple[Any, bool]] = []
-        with self._reader.news:
+        with self.own_port.news:
             self._bytes_seen += len(data)
             heard = False
             for message in (self._parser.parse_buffer(data) or []) if data else []:
@@ -284,18 +250,15 @@ class Link:
                 if message.get_type() in self.wanted:
                     found.append((message, self.counter.lost == lost))
             # An autopilot that has restarted sends heartbeats, and nothing that it was asked for before.
-            if found if self._streaming else heard:
-                self._reader.silence.heard()
-            else:
-                self._reader.silence.idle()
-            if self.armed and self._streaming:
+            self.own_port.silence.note(len(found) if self.own_port.streams else heard)
+            if self.armed and self.own_port.streams:
                 raise self._armed()
             if data:
-                self._reader.news.notify_all()
+                self.own_port.news.notify_all()
         if found and self._on_messages is not None:
             self._on_messages(found, host_time_s)
-            with self._reader.news:
-                self._reader.news.notify_all()
+            with self.own_port.news:
+                self.own_port.news.notify_all()
 
     def _is_its(self, message: Any) -> bool:
         """Whether the autopilot sent it; the first heartbeat of one says which it is."""

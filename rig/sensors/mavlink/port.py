@@ -3,19 +3,11 @@
 import socket
 import time
 from contextlib import suppress
-from typing import Protocol
 
 from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
+from rig.sensors.own_port import Port
 
 DATAGRAM_BYTES = 65536
-
-
-class Port(Protocol):
-    """An open port; `read` returns what came within `READ_TIMEOUT_S`. OSError for all that goes wrong."""
-
-    def read(self) -> bytes: ...
-    def write(self, data: bytes) -> None: ...
-    def close(self) -> None: ...
 
 
 def open_port(port: str, baud: int) -> Port:

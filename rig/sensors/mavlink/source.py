@@ -1,7 +1,7 @@
 """The configured IMUs of one autopilot as a source of samples: rates asked for, corrections undone."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from math import radians
 from typing import Any
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rig.config.mavlink_section import MavlinkSection
 from rig.config.sensor_sections import SensorSection
-from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.data.channel import Channel, of_thermometer, stamped
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -21,11 +21,11 @@ from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
 from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
 from rig.sensors.mavlink.writing import unfinished
+from rig.sensors.own_port import closed_on_failure
+from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
-FULL_SCALE_COUNTS = 1 << 30  # what a channel's range is divided into: far finer than what is sent
-DEGREES_PER_COUNT = 0.01
 RATE_LOOK = 40  # messages by which the rate is judged
 RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
@@ -54,16 +54,15 @@ class _Imu:
 
     def samples(self, taken: list[tuple[int, int, Reading]], first: int, host_time_s: float) -> NDArray[Any]:
         """Samples of the readings, numbered from the number `first`."""
-        samples = np.zeros(len(taken), self.described.sample_dtype)
-        samples["sequence"] = [number - first for number, _, _ in taken]
-        samples["board_time_us"] = [time_us for _, time_us, _ in taken]
-        samples["host_time_s"] = host_time_s
-        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for _, _, each in taken]
-        rates = self.correction.raw_rate(np.array([each.rate_rad_s for _, _, each in taken]))
-        samples["counts"] = _counts(rates, self.described.channel(RATE))
+        numbers, times_us, readings = zip(*taken, strict=True)
+        samples = stamped(self.described.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
+        # Not filled like the others: `round` raises for what is no number, and a made-up temperature would be believed.
+        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for each in readings]
+        rates = self.correction.raw_rate(np.array([each.rate_rad_s for each in readings]))
+        self.described.channel(RATE).fill(samples, rates)
         if self.described.measures(ACCELERATION):
-            forces = self.correction.raw_force(np.array([each.force_m_s2 for _, _, each in taken]))
-            samples["acceleration_counts"] = _counts(forces, self.described.channel(ACCELERATION))
+            forces = self.correction.raw_force(np.array([each.force_m_s2 for each in readings]))
+            self.described.channel(ACCELERATION).fill(samples, forces)
         return samples
 
 
@@ -74,13 +73,13 @@ class MavlinkSource:
         self, sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
     ) -> None:
         """Raises SensorError as `Link` and `refusals`; autopilot_other_uid, autopilot_several_imus, autopilot_rate."""
-        self._on_samples, self._started = on_samples, False
+        self._on_samples = on_samples
         self._imus: dict[str, _Imu] = {line_of(section).imu: _Imu(name, section) for name, section in sections.items()}
         self._first: dict[str, int] = {}
         (name, section), *_ = sections.items()
         line = line_of(section)
         self.link = Link(name, line.port, line.baud, self._take, patience=patience)
-        try:
+        with closed_on_failure(self.close):
             self.link.identify()
             for refusal in (*unfinished(self.link), *self._judge()):
                 raise refusal
@@ -88,9 +87,6 @@ class MavlinkSource:
             for message, imu in self._imus.items():
                 self.link.ask_for(message, imu.counter.interval_us)
             self._see_rates()
-        except BaseException:
-            self.link.close()
-            raise
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -104,12 +100,15 @@ class MavlinkSource:
 
     def start(self) -> None:
         """Start to hand samples on, as of `SampleSource`."""
-        self._started = True
-        self.link.start()
+        self.link.own_port.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Check the autopilot, as of `SampleSource`. Raises SensorError as `Link.check`."""
-        self.link.check(clock_s)
+        """Check the autopilot, as of `SampleSource`. Raises SensorError as `OwnPort.check`, and `autopilot_armed`."""
+        self.link.own_port.check(clock_s)
+
+    def close(self) -> None:
+        """Ends the thread and closes the port."""
+        self.link.close()
 
     def _judge(self) -> Iterator[SensorError]:
         for imu in self._imus.values():
@@ -120,7 +119,7 @@ class MavlinkSource:
 
     def _see_rates(self) -> None:
         imus = self._imus.values()
-        self.link.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
+        self.link.own_port.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
         for imu in imus:
             asked_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
             came_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
@@ -138,7 +137,7 @@ class MavlinkSource:
         for message, whole in messages:
             kind = message.get_type()
             found = self._imus[kind].take(message, whole=whole)
-            if found is not None and self._started:
+            if found is not None and self.link.own_port.streams:
                 self._first.setdefault(kind, found[0])
                 taken.setdefault(kind, []).append(found)
         for kind, each in taken.items():
@@ -188,16 +187,11 @@ def describe(name: str, section: SensorSection) -> RecordedSensor:
     return recorded_as(section, *channels, clock=name)
 
 
-@contextmanager
 def mavlink(
     sections: Mapping[str, SensorSection], on_samples: OnSamples, *, patience: Patience = USUAL
-) -> Iterator[MavlinkSource]:
+) -> closing[MavlinkSource]:
     """The IMUs at one port for the length of the `with` block. Raises SensorError as `MavlinkSource`."""
-    source = MavlinkSource(sections, on_samples, patience=patience)
-    try:
-        yield source
-    finally:
-        source.link.close()
+    return closing(MavlinkSource(sections, on_samples, patience=patience))
 
 
 def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
@@ -227,12 +221,8 @@ def line_of(section: SensorSection) -> MavlinkSection:
 
 def _channel(quantity: Quantity, end_of_scale: float, sent: float | None) -> Channel:
     """The channel of three axes; `sent` is the unit of the whole numbers that are sent, None where none are."""
-    per_count = end_of_scale / FULL_SCALE_COUNTS
-    widest = end_of_scale if sent is None else min(end_of_scale, WIDEST * INT16_MAX * sent)
-    channel = of_three_axes(quantity, per_count, round(widest / per_count), end_of_scale)
-    return channel if sent is None else replace(channel, step=CUT_STEPS * sent)
-
-
-def _counts(values: NDArray[np.float64], channel: Channel) -> NDArray[np.float64]:
-    limit = 2.0 * FULL_SCALE_COUNTS - 1
-    return np.clip(np.rint(values / channel.unit_per_count), -limit, limit)
+    channel = fine_axes(quantity, end_of_scale)
+    if sent is None:
+        return channel
+    widest = min(end_of_scale, WIDEST * INT16_MAX * sent)
+    return replace(channel, full_scale_counts=round(widest / channel.unit_per_count), step=CUT_STEPS * sent)
