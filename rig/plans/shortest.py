@@ -174,26 +174,23 @@ class _Swept:
 
     def candidates(self) -> Sequence[Candidate]:
         found = []
-        least_s = [RESTS_S[0]] * len(self.waits)
+        least_s = dict.fromkeys(self.waits, RESTS_S[0])
         for family, turned, keys in self.motions(self.config):
-            least = self._waiting(self.config.procedure, least_s)
-            once, twice = (_changed(least, **keys, repeats=repeats) for repeats in (1, 2))
+            once, twice = (_changed(self.config.procedure, **keys, **least_s, repeats=repeats) for repeats in (1, 2))
             plan = plan_of(self.config, once)
             if kind_of(self.config.turner).problems([plan], self.config.turner, None):
                 continue
-            again_s = plan_of(self.config, twice).duration_s - plan.duration_s
+            counts, again_s = self._counts(plan), plan_of(self.config, twice).duration_s - plan.duration_s
             some = [each for each in REPEATS if each * len(plan.sweeps or plan.dwells) <= MOST or each == 1]
             if any(twice.problems(self.config)):
                 some = [1]
-            counts = self._counts(plan)
-            for repeats, waits_s in product(some, product(RESTS_S, repeat=len(self.waits))):
-                longer_s = _longer_s(counts, least_s, waits_s)
-                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * longer_s
-                rests_s, dwells_s = (
-                    tuple(wait_s for key, wait_s in zip(self.waits, waits_s, strict=True) if key == of)
-                    for of in ("rest_s", "dwell_s")  # of which longer dwells tell more
+            for repeats, *values_s in product(some, *[RESTS_S] * len(self.waits)):
+                waits_s = dict(zip(self.waits, values_s, strict=True))
+                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * _longer_s(counts, least_s, waits_s)
+                rests_s, dwells_s = (  # of which longer dwells tell more
+                    tuple(wait_s for key, wait_s in waits_s.items() if key == of) for of in ("rest_s", "dwell_s")
                 )
-                procedure = self._waiting(once, waits_s, repeats=repeats)
+                procedure = once.model_copy(update={**waits_s, "repeats": repeats})  # too many to validate each
                 found.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
         return found
 
@@ -211,27 +208,20 @@ class _Swept:
 
         By so little that those which stand still longer are taken to tell more.
         """
-        waits_s = [float(getattr(best.procedure, key)) for key in self.waits]
-        counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
-        return [
-            Candidate(
-                self._waiting(best.procedure, shorter_s),
-                best.family,
-                (*best.sizes, *shorter_s),
-                best.duration_s + _longer_s(counts, waits_s, shorter_s),
-            )
-            for shorter_s in product(*map(_down_from, waits_s))
-        ]
+        waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
+        counts, found = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
+        for values_s in product(*map(_down_from, waits_s.values())):
+            shorter_s = dict(zip(waits_s, values_s, strict=True))
+            procedure = best.procedure.model_copy(update=shorter_s)  # too many to validate each
+            lasting_s = best.duration_s + _longer_s(counts, waits_s, shorter_s)
+            found.append(Candidate(procedure, best.family, (*best.sizes, *values_s), lasting_s))
+        return found
 
-    def _counts(self, plan: Plan) -> list[int]:
+    def _counts(self, plan: Plan) -> Mapping[str, int]:
         """How many waits of each key a plan has."""
         # By their names: a field test is a Rest as well, and how long it lasts is another key.
         rests = sum(step.name.startswith("rest") for step in plan.steps)
-        return [{"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits]
-
-    def _waiting(self, procedure: ProcedureSection, waits_s: Sequence[float], **keys: int) -> ProcedureSection:
-        """The procedure with other waits; not validated, for there are thousands, and every file may say these."""
-        return procedure.model_copy(update={**keys, **dict(zip(self.waits, waits_s, strict=True))})
+        return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}
 
     def duration_s(self, procedure: ProcedureSection) -> float:
         return plan_of(self.config, procedure).duration_s
@@ -253,9 +243,9 @@ class _Swept:
         return {key: size for key, size in sizes.items() if size < inf}
 
 
-def _longer_s(counts: Sequence[int], waits_s: Sequence[float], others_s: Sequence[float]) -> float:
+def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
     """How much longer so many waits take when they are the others."""
-    return sum(count * (other_s - wait_s) for count, wait_s, other_s in zip(counts, waits_s, others_s, strict=True))
+    return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
 def _down_from(wait_s: float) -> list[float]:
