@@ -480,6 +480,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
             )
 
 
+# By the names of the procedures, which say their sections too but lie above: a file is read without them.
 STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
     {
         "six_observation": SixObservationSection,

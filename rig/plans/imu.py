@@ -1,7 +1,6 @@
 """Sweeps and attitudes in one run: what calibrates a gyroscope and the accelerometer beside it."""
 
 from collections.abc import Collection
-from dataclasses import replace
 
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import ImuSection
@@ -9,6 +8,7 @@ from rig.motion.state import Joints
 from rig.motion.steps import Plan
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import dwells
+from rig.plans.ways import followed
 
 
 def plan_imu(
@@ -24,4 +24,4 @@ def plan_imu(
     """
     sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
     first = len(plan_six_observation(arm, procedure).sweeps)
-    return replace(sweeps, steps=(*sweeps.steps, *dwells(arm, procedure, done, first)))
+    return followed(sweeps, dwells(arm, procedure, procedure.repeats, done, first))

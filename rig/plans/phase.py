@@ -41,7 +41,7 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:
-        turner = _turner_for(procedure, config)
+        turner = turner_for(procedure, config)
         with script_errors(f"the procedure {procedure.name} cannot be planned"):
             made = procedure.plan(turner, config.procedure, start_q_rad, done)
             if not isinstance(made, Plan):
@@ -57,7 +57,7 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
     return Phase(procedure, plan, follows=follows)
 
 
-def _turner_for(procedure: AnyProcedure, config: RigConfig) -> TurnerSection:
+def turner_for(procedure: AnyProcedure, config: RigConfig) -> TurnerSection:
     """The turner's section, which the procedure has to know."""
     if not isinstance(config.turner, procedure.turner):
         raise Refused(

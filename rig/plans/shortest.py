@@ -4,13 +4,16 @@ What the file asks for beside the uncertainty stays: order, directions, stages, 
 attitudes where magnetometers need theirs.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from math import inf
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
+from pydantic import ValidationError
 
 from rig.analysis.predicted import predicted
 from rig.analysis.predicted_accelerations import predicted_accelerations
@@ -18,26 +21,21 @@ from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
 from rig.analysis.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedure_sections import (
-    ImuSection,
-    SixObservationSection,
-    StaticAttitudesSection,
-)
-from rig.config.servo_procedure import ServoSixObservationSection
+from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
+from rig.config.section import Section
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.solution import REAL_HANDS
-from rig.motion.state import Made
+from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
-from rig.plans.imu import plan_imu
-from rig.plans.servo_sweeps import plan_servo_six_observation
+from rig.plans.phase import turner_for
+from rig.plans.registry import installed
 from rig.plans.shortest_motions import Motion, of_arm, of_attitudes, of_imu, of_servo
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.static_attitudes import plan_static_attitudes
 from rig.turners.registry import kind_of
 
+SectionT = TypeVar("SectionT", bound=Section)
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16)
 MOST = 100  # sweeps of one plan
 RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
@@ -49,15 +47,18 @@ REST_STEP_S = 0.1  # of the last, fine search
 
 
 class Tried(Protocol):
-    """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run."""
+    """The runs of a procedure that are tried: which there are, and what each is predicted to reach.
+
+    `predict` is None of what cannot be run; of an `endless` run nothing is left that comes anew each time.
+    `ending` are the keys that let a run end before, when what is wanted is reached.
+    """
 
     def candidates(self) -> Sequence[Candidate]: ...
     def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
-    def predict(self, candidate: Candidate) -> Budgets | None: ...
-    def endless(self, candidate: Candidate) -> Budgets | None: ...
-    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None: ...
-    def directions(self, procedure: ProcedureSection) -> Array | None: ...
+    def duration_s(self, procedure: ProcedureSection) -> float: ...
+    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None: ...
+    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]: ...
 
 
 def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
@@ -68,32 +69,32 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     what = tried(config)
     _refuse_others(wanted, config)
     candidates = what.candidates()
-    floors = [
-        (each.family, floor) for each in what.made_endless(candidates) if (floor := what.endless(each)) is not None
-    ]
+    endless = [(each.family, what.predict(each, endless=True)) for each in what.made_endless(candidates)]
+    floors = [(family, floor) for family, floor in endless if floor is not None]
     able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
     least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
     hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
     found = shortest(hopeful, what.predict, wanted)
-    endless = [floor for _, floor in floors]
-    cannot_be_had = not any(wanted.met_by(each.reached) for each in (*endless, *found.looked))
+    looked = [*(floor for _, floor in floors), *found.looked]
+    cannot_be_had = not any(wanted.met_by(each.reached) for each in looked)
     if found.best is None and cannot_be_had and able and wanted.at_most_s < inf:
         cannot_be_had = shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
     fine = shortest(what.finer(found.best.candidate), what.predict, wanted) if found.best else Searched()
-    best = what.final(fine.best or found.best, wanted)
+    best = fine.best or found.best
+    best = best and _ending(best, what.ending(best.candidate.procedure, wanted))
     shown = best or found.nearest
-    before = Candidate(config.procedure, (), (), 0.0)
+    before = Candidate(config.procedure, (), (), what.duration_s(config.procedure))
     own = what.predict(before)
     return Shortest(
         wanted,
-        None if own is None else Planned(replace(before, duration_s=_duration_s(config)), own),
+        None if own is None else Planned(before, own),
         best,
         found.nearest,
-        [*endless, *found.looked],
+        looked,
         cannot_be_had,
         len(found.looked) + len(fine.looked),
         len(candidates),
-        None if shown is None else what.directions(shown.candidate.procedure),
+        None if shown is None else _directions(plan_of(config, shown.candidate.procedure)),
     )
 
 
@@ -102,18 +103,9 @@ def tried(config: RigConfig) -> Tried:
     procedure = config.procedure
     if not config.to_calibrate:
         raise _not_foretold("nothing is to be calibrated")
-    if isinstance(procedure, ByHandSection):
-        return _ByHand(config, procedure)
-    made = kind_of(config.turner).meant(config.turner)
-    if isinstance(procedure, ServoSixObservationSection):
-        return _Swept(config, made, of_servo)
-    if type(procedure) is StaticAttitudesSection:
-        return _Swept(config, made, of_attitudes, ("dwell_s",))
-    if type(procedure) is ImuSection and not procedure.finds_earth_rate:
-        return _Swept(config, made, of_imu, ("rest_s", "dwell_s"))
-    if type(procedure) is SixObservationSection and not procedure.finds_earth_rate:
-        return _Swept(config, made, of_arm)
-    raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
+    if procedure.name not in TRIED or procedure.finds_earth_rate:
+        raise _not_foretold(f"the uncertainty of the procedure {procedure.name} is not predicted")
+    return TRIED[procedure.name](config)
 
 
 def _not_foretold(what: str) -> Refused:
@@ -137,23 +129,29 @@ def _refuse_others(wanted: Wanted, config: RigConfig) -> None:
 
 
 def plan_of(config: RigConfig, procedure: ProcedureSection) -> Plan:
-    """The motions of a procedure; none by hand."""
-    if isinstance(procedure, ServoSixObservationSection):
-        return plan_servo_six_observation(config.turner, procedure)  # type: ignore[arg-type]
-    if isinstance(procedure, ImuSection):
-        return plan_imu(config.arm, procedure)
-    if isinstance(procedure, StaticAttitudesSection):
-        return plan_static_attitudes(config.arm, procedure)
-    if isinstance(procedure, SixObservationSection):
-        return plan_six_observation(config.arm, procedure)
-    return Plan((), (), ())
+    """The motions of a procedure; none by hand. Raises Refused `other_turner`."""
+    known = installed()[procedure.name]
+    return known.plan(turner_for(known, config), procedure)
 
 
-def _duration_s(config: RigConfig) -> float:
-    procedure = config.procedure
-    if isinstance(procedure, ByHandSection):
-        return duration_s(list(listed(Asked(procedure.flips, procedure.turns))), procedure.rest_s)
-    return plan_of(config, procedure).duration_s
+def _changed(section: SectionT, **keys: object) -> SectionT:
+    """The section with other values of these keys. Raises ValidationError where no file may say them."""
+    return type(section).model_validate({**dict(section), **keys})
+
+
+def _ending(planned: Planned, keys: Mapping[str, float]) -> Planned:
+    """The run that also ends before, by these keys of its procedure."""
+    procedure = planned.candidate.procedure
+    with suppress(ValidationError):  # so loose a wish that no file may say it
+        procedure = _changed(procedure, **keys)
+    return replace(planned, candidate=replace(planned.candidate, procedure=procedure))
+
+
+def _directions(plan: Plan) -> Array | None:
+    """(N, 3) the axes of the sweeps in the item's frame; None without sweeps."""
+    mounts = {index: stage.mount for stage in plan.stages for index in stage.indices}
+    axes = [np.array(mounts.get(sweep.index, np.eye(3))) @ sweep.axis_flange for sweep in plan.sweeps]
+    return np.array(axes) if axes else None
 
 
 def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
@@ -170,30 +168,29 @@ class _Swept:
     stood still: after a sweep, in an attitude.
     """
 
-    config: RigConfig
-    made: Made
     motions: Callable[[RigConfig], Iterator[Motion]]
-    waits: tuple[str, ...] = ("rest_s",)
+    waits: tuple[str, ...]
+    config: RigConfig
 
     def candidates(self) -> Sequence[Candidate]:
         found = []
-        shortest_s = dict.fromkeys(self.waits, RESTS_S[0])
+        least_s = dict.fromkeys(self.waits, RESTS_S[0])
         for family, turned, keys in self.motions(self.config):
-            once, twice = (self._procedure(**keys, repeats=repeats, **shortest_s) for repeats in (1, 2))
+            once, twice = (_changed(self.config.procedure, **keys, **least_s, repeats=repeats) for repeats in (1, 2))
             plan = plan_of(self.config, once)
             if kind_of(self.config.turner).problems([plan], self.config.turner, None):
                 continue
-            again_s = plan_of(self.config, twice).duration_s - plan.duration_s
+            counts, again_s = self._counts(plan), plan_of(self.config, twice).duration_s - plan.duration_s
             some = [each for each in REPEATS if each * len(plan.sweeps or plan.dwells) <= MOST or each == 1]
             if any(twice.problems(self.config)):
                 some = [1]
-            for repeats, waits_s in product(some, product(RESTS_S, repeat=len(self.waits))):
-                longer_s = sum(
-                    count * (wait_s - RESTS_S[0]) for count, wait_s in zip(self._counts(plan), waits_s, strict=True)
+            for repeats, *values_s in product(some, *[RESTS_S] * len(self.waits)):
+                waits_s = dict(zip(self.waits, values_s, strict=True))
+                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * _longer_s(counts, least_s, waits_s)
+                rests_s, dwells_s = (  # of which longer dwells tell more
+                    tuple(wait_s for key, wait_s in waits_s.items() if key == of) for of in ("rest_s", "dwell_s")
                 )
-                lasting_s = plan.duration_s + (repeats - 1) * again_s + repeats * longer_s
-                procedure = self._procedure(**keys, repeats=repeats, **dict(zip(self.waits, waits_s, strict=True)))
-                rests_s, dwells_s = self._apart(waits_s)
+                procedure = once.model_copy(update={**waits_s, "repeats": repeats})  # too many to validate each
                 found.append(Candidate(procedure, family, (turned, repeats, *dwells_s), lasting_s, rests_s))
         return found
 
@@ -211,69 +208,44 @@ class _Swept:
 
         By so little that those which stand still longer are taken to tell more.
         """
-        waits_s = [float(getattr(best.procedure, key)) for key in self.waits]
-        counts = self._counts(plan_of(self.config, best.procedure))  # of all repeats
-        found = []
-        for shorter_s in product(*map(_down_from, waits_s)):
-            less_s = sum(
-                count * (wait_s - each_s) for count, wait_s, each_s in zip(counts, waits_s, shorter_s, strict=True)
-            )
-            procedure = best.procedure.model_copy(update=dict(zip(self.waits, shorter_s, strict=True)))
-            sizes, lasting_s = (*best.sizes, *shorter_s), best.duration_s - less_s
-            found.append(Candidate(procedure, best.family, sizes, lasting_s))
+        waits_s = {key: float(getattr(best.procedure, key)) for key in self.waits}
+        counts, found = self._counts(plan_of(self.config, best.procedure)), []  # of all repeats
+        for values_s in product(*map(_down_from, waits_s.values())):
+            shorter_s = dict(zip(waits_s, values_s, strict=True))
+            procedure = best.procedure.model_copy(update=shorter_s)  # too many to validate each
+            lasting_s = best.duration_s + _longer_s(counts, waits_s, shorter_s)
+            found.append(Candidate(procedure, best.family, (*best.sizes, *values_s), lasting_s))
         return found
 
-    def _apart(self, waits_s: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The rests among waits, and the dwells, of which longer ones tell more."""
-        rests_s, dwells_s = (
-            tuple(each for key, each in zip(self.waits, waits_s, strict=True) if (key == "dwell_s") == dwells)
-            for dwells in (False, True)
-        )
-        return rests_s, dwells_s
-
-    def _counts(self, plan: Plan) -> list[int]:
+    def _counts(self, plan: Plan) -> Mapping[str, int]:
         """How many waits of each key a plan has."""
-        rests = sum(1 for step in plan.steps if step.name.startswith("rest"))
-        return [{"rest_s": rests, "dwell_s": len(plan.dwells)}[each] for each in self.waits]
+        # By their names: a field test is a Rest as well, and how long it lasts is another key.
+        rests = sum(step.name.startswith("rest") for step in plan.steps)
+        return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}
 
-    def predict(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=False)
+    def duration_s(self, procedure: ProcedureSection) -> float:
+        return plan_of(self.config, procedure).duration_s
 
-    def endless(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=True)
-
-    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
-        """The run that also ends after an earlier repeat, when U is reached."""
-        procedure = None if best is None else best.candidate.procedure
-        if best is None or not isinstance(procedure, SixObservationSection) or procedure.repeats == 1:
-            return best
-        if procedure.stages:
-            return best
-        sizes = ("wanted_scale_u", wanted.scale), ("wanted_bias_u_rad_s", wanted.bias_rad_s)
-        ending = procedure.model_copy(update={key: size for key, size in sizes if size < inf})
-        return replace(best, candidate=replace(best.candidate, procedure=ending))
-
-    def directions(self, procedure: ProcedureSection) -> Array | None:
-        plan = plan_of(self.config, procedure)
-        if not plan.sweeps:
-            return None
-        turned = [np.array(sweep.axis_flange) for sweep in plan.sweeps]
-        for stage in plan.stages:
-            for each in (each for each in plan.sweeps if each.index in stage.indices):
-                turned[each.index] = np.array(stage.mount) @ np.array(each.axis_flange)
-        return np.array(turned)
-
-    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
-        config = self.config.model_copy(update={"procedure": candidate.procedure})
-        plan = plan_of(config, candidate.procedure)
+    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None:
+        config = _changed(self.config, procedure=candidate.procedure)
+        plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).meant(config.turner)
         try:
-            rates = predicted(config, plan, self.made, endless=endless) if plan.sweeps else {}
-            return Budgets(rates, predicted_accelerations(config, plan, self.made.kinematics, endless=endless))
+            rates = predicted(config, plan, made, endless=endless) if plan.sweeps else {}
+            return Budgets(rates, predicted_accelerations(config, plan, made.kinematics, endless=endless))
         except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
             return None
 
-    def _procedure(self, **keys: object) -> ProcedureSection:
-        return self.config.procedure.model_copy(update=keys)
+    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]:
+        """The wish, after an earlier repeat."""
+        if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
+            return {}
+        sizes = {"wanted_scale_u": wanted.scale, "wanted_bias_u_rad_s": wanted.bias_rad_s}
+        return {key: size for key, size in sizes.items() if size < inf}
+
+
+def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
+    """How much longer so many waits take when they are the others."""
+    return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
 def _down_from(wait_s: float) -> list[float]:
@@ -287,7 +259,6 @@ class _ByHand:
     """A session by hand of so many flips and turns."""
 
     config: RigConfig
-    section: ByHandSection
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
@@ -302,32 +273,37 @@ class _ByHand:
         below = max((each for each in FLIPS if each < flips), default=int(flips))
         return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
 
-    def predict(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=False)
+    def duration_s(self, procedure: ProcedureSection) -> float:
+        _, moves, rest_s = _session(procedure)
+        return duration_s(moves, rest_s)
 
-    def endless(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=True)
-
-    def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
-        """The session that also ends before its list, when U is reached: beside what no session shows of hands."""
-        own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
-        if best is None or not 0 < own < inf:
-            return best
-        procedure = best.candidate.procedure.model_copy(update={"wanted_scale_u": round(own**0.5, 7)})
-        return replace(best, candidate=replace(best.candidate, procedure=procedure))
-
-    def directions(self, procedure: ProcedureSection) -> Array | None:
-        return None
-
-    def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
-        procedure = self.section.model_copy(update={"flips": flips, "turns": turns, "rest_s": rest_s})
-        lasting_s = duration_s(list(listed(Asked(flips, turns))), rest_s)
-        return Candidate(procedure, (), (flips, turns, rest_s), lasting_s)
-
-    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
-        flips, turns, rest_s = candidate.sizes
+    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None:
         try:
-            moves = list(listed(Asked(int(flips), int(turns))))
-            return Budgets(predicted_by_hand(self.config, self.section, moves, rest_s, endless=endless))
+            return Budgets(predicted_by_hand(self.config, *_session(candidate.procedure), endless=endless))
         except Fault:
             return None
+
+    def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]:
+        """The wish, before the list is done: beside what no session shows of hands."""
+        own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
+        return {"wanted_scale_u": round(own**0.5, 7)} if 0 < own < inf else {}
+
+    def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
+        procedure = _changed(self.config.procedure, flips=flips, turns=turns, rest_s=rest_s)
+        return Candidate(procedure, (), (flips, turns, rest_s), self.duration_s(procedure))
+
+
+def _session(procedure: ProcedureSection) -> tuple[ByHandSection, Sequence[Instruction], float]:
+    """The section of a session by hand, what is asked for in it, and how long the item rests between."""
+    assert isinstance(procedure, ByHandSection)
+    return procedure, list(listed(Asked(procedure.flips, procedure.turns))), procedure.rest_s
+
+
+# What is tried of a procedure, by its name.
+TRIED: Mapping[str, Callable[[RigConfig], Tried]] = {
+    "six_observation": partial(_Swept, of_arm, ("rest_s",)),
+    "servo_six_observation": partial(_Swept, of_servo, ("rest_s",)),
+    "static_attitudes": partial(_Swept, of_attitudes, ("dwell_s",)),
+    "imu": partial(_Swept, of_imu, ("rest_s", "dwell_s")),
+    "by_hand": _ByHand,
+}

@@ -47,9 +47,7 @@ def of_attitudes(config: RigConfig) -> Iterator[Motion]:
 
 def of_imu(config: RigConfig) -> Iterator[Motion]:
     """Sweeps and attitudes: whole turns at one speed, once round, for an accelerometer's wave is that of one."""
-    once_round = (each for each in of_arm(config) if each[1] == TURNS_DEG[0])
-    own = config.procedure.speeds_deg_s  # type: ignore[attr-defined]
-    turns = [each for each in once_round if each[2].get("speeds_deg_s", own) == own]
+    turns = [each for each in of_arm(config) if each[1] == TURNS_DEG[0] and not each[2].get("speeds_deg_s")]
     for (family, turned, keys), (attitudes, _, stood) in product(turns, of_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}
 

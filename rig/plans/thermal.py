@@ -8,8 +8,9 @@ from rig.config.procedure_sections import ThermalSection
 from rig.motion.model import home_of
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
-from rig.plans.six_sweeps import approach_home, sets_of_sweeps
+from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import dwells
+from rig.plans.ways import approach, followed, pace_of
 
 LEAST_WAIT_S = 1.0
 
@@ -25,34 +26,25 @@ def plan_thermal(
     Before each the arm rests at home until the temperature is right. A set that is not whole in `done` is made anew:
     its sweeps belong to one temperature. Raises Refused `axes_do_not_span`.
     """
-    home = home_of(arm)
-    start = home if start_q_rad is None else start_q_rad
-    steps: list[Step] = list(approach_home(arm, procedure, start))
+    plan = approach(start_q_rad, home_of(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     for each in _sets(arm, procedure):
-        if not set(_indices(each)) <= set(done):
-            steps += [Rest("wait for the next temperature", _wait_s(procedure, each), for_temperature=True), *each]
-    return Plan(tuple(steps), start_q_rad=start, home_q_rad=home)
+        if not {step.index for step in each if isinstance(step, (Sweep, Dwell))} <= set(done):
+            wait = Rest("wait for the next temperature", _wait_s(procedure, each), for_temperature=True)
+            plan = followed(plan, (wait, *each))
+    return plan
 
 
 def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
-    """The steps of each set, whose sweeps and dwells are counted through."""
-    first = 0
-    once = procedure.model_copy(update={"repeats": 1})
-    for swept in sets_of_sweeps(arm, procedure):
-        steps = _counted(swept, first)
-        if procedure.with_attitudes:
-            steps += dwells(arm, once, first=first + len(_indices(steps)))
-        first += len(_indices(steps))
+    """The steps of each set: one repeat of the sweeps, and the attitudes, whose indices come between."""
+    sweeps = len(plan_six_observation(arm, procedure).sweeps)
+    in_each, attitudes = sweeps // procedure.repeats, len(procedure.attitudes) if procedure.with_attitudes else 0
+    for number in range(procedure.repeats):
+        own, between = range(number * in_each, (number + 1) * in_each), number * attitudes
+        swept = plan_six_observation(arm, procedure, None, {*range(sweeps)} - {*own}).steps
+        steps = [replace(step, index=step.index + between) if isinstance(step, Sweep) else step for step in swept]
+        if attitudes:
+            steps += dwells(arm, procedure, 1, first=own.stop + between)
         yield steps
-
-
-def _counted(steps: list[Step], first: int) -> list[Step]:
-    places = iter(range(first, first + len(steps)))
-    return [replace(step, index=next(places)) if isinstance(step, Sweep) else step for step in steps]
-
-
-def _indices(steps: list[Step]) -> list[int]:
-    return [step.index for step in steps if isinstance(step, (Sweep, Dwell))]
 
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:

@@ -2,27 +2,48 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 from rig.motion.state import Joints
-from rig.motion.steps import SAME_PLACE_RAD, Transfer, trapezoid_duration, travel
+from rig.motion.steps import SAME_PLACE_RAD, Plan, Step, Transfer, trapezoid_duration, travel
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """The speed and the acceleration of a motion, of the joint that travels farthest."""
+
+    speed_rad_s: float
+    acceleration_rad_s2: float
+
+
+def pace_of(speed_deg_s: float, acceleration_deg_s2: float) -> Pace:
+    """The pace that a file gives in degrees."""
+    return Pace(math.radians(speed_deg_s), math.radians(acceleration_deg_s2))
+
 
 # The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
-APPROACH_SPEED_RAD_S = math.radians(30)
-APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
+LEISURE = pace_of(30, 60)
 
 
-def approach(start: Joints, home: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> Iterable[Transfer]:
-    """The first motion, home, at leisure; none if the arm is there."""
-    leisure = min(speed_rad_s, APPROACH_SPEED_RAD_S), min(acceleration_rad_s2, APPROACH_ACCELERATION_RAD_S2)
-    return transfer("approach home", start, home, *leisure)
+def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
+    """The first motion, home from where the turner stands, at leisure; none if that is home, or None."""
+    start = home if start_q_rad is None else start_q_rad
+    speed_rad_s = min(pace.speed_rad_s, LEISURE.speed_rad_s)
+    acceleration_rad_s2 = min(pace.acceleration_rad_s2, LEISURE.acceleration_rad_s2)
+    steps = tuple(transfer("approach home", start, home, Pace(speed_rad_s, acceleration_rad_s2)))
+    return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
-def transfer(
-    name: str, start: Joints, target: Joints, speed_rad_s: float, acceleration_rad_s2: float
-) -> Iterable[Transfer]:
+def followed(plan: Plan, steps: Iterable[Step]) -> Plan:
+    """The plan with more steps at its end."""
+    return replace(plan, steps=(*plan.steps, *steps))
+
+
+def transfer(name: str, start: Joints, target: Joints, pace: Pace) -> Iterable[Transfer]:
     """The way from `start` to `target`; none if they are the same place."""
     distance_rad = max(map(abs, travel(start, target)))
     if distance_rad > SAME_PLACE_RAD:
+        speed_rad_s, acceleration_rad_s2 = pace.speed_rad_s, pace.acceleration_rad_s2
         duration_s = trapezoid_duration(distance_rad, speed_rad_s, acceleration_rad_s2)
         yield Transfer(name, start, target, speed_rad_s, acceleration_rad_s2, duration_s)
 

@@ -322,6 +322,16 @@ def test_arcs_are_tried_where_the_encoders_are_known() -> None:
     assert not {each.sizes[0] for each in tried(demo()).candidates()} & set(ARCS_DEG)
 
 
+def test_a_candidate_lasts_as_long_as_its_plan() -> None:
+    """Where the order of the sweeps is said; and though a field test is a rest as well, it does not become shorter."""
+    said = ["procedure.rest_s=2", "procedure.dwell_s=2", "procedure.field_test_s=30"]
+    said += ["procedure.order=[wrist_3, wrist_1, wrist_2]", "procedure.directions=[cw, ccw]"]
+    config = load(CONFIGS / "imu.yaml", said, sections(installed()), turners.sections()).config
+    whole = Candidate(config.procedure, (), (), plan_of(config, config.procedure).duration_s)
+    for each in tried(config).finer(whole)[::40]:
+        assert each.duration_s == pytest.approx(plan_of(config, each.procedure).duration_s)
+
+
 def test_a_procedure_that_is_not_predicted_is_refused() -> None:
     config = load(CONFIGS / "bias_drift.yaml", (), sections(installed()), turners.sections()).config
     with pytest.raises(Refused, match="not predicted"):
@@ -353,3 +363,6 @@ def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys:
     assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=9e-4"]) == 1
     assert "recordings of real hands" in " ".join(capsys.readouterr().out.split())
     assert main(["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=often"]) == 2
+    loose = tmp_path / "loose.yaml"  # no section may say so, and nothing has to end before
+    assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=0.2", "--write", str(loose)]) == 0
+    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.wanted_scale_u is None  # type: ignore[attr-defined]
