@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.calibration import or_fault
+from rig.analysis.triad import known_gravity
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
@@ -159,14 +160,13 @@ def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second
     Raises Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
     means, variances, attitudes = _stacked(repeats)
-    up = np.array(site.up)
 
     def solve(repeat: int) -> TriaxialSolution:
         return solve_triaxial(
             means[repeat],
             attitudes[repeat],
             variances[repeat],
-            KnownNorm(site.gravity_m_s2, up),
+            known_gravity(site),
             second_order=second_order,
             method="attitude_weighted",
         )

@@ -29,6 +29,20 @@ class Mean:
     cycles: Array = field(default_factory=partial(np.zeros, 0))
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A mean `reading` of what was held still: in a dwell of the procedure, by its `index`, or a placement of a file.
+
+    `attitude` (3, 3) is the rotation from the arm's base frame into the flange's, or from the table's into the body's.
+    """
+
+    index: int
+    name: str
+    reading: Mean
+    attitude: Array
+    window: Window
+
+
 def mean_of(
     readings: Array,
     count: float | Array,
