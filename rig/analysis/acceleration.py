@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.accelerometer_errors import mean_temperature_c, pieces_of, sheet_of, with_errors
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
-from rig.analysis.triad import Triad, check_mounted, check_seen, known_gravity, noise_freedom, seen_in
+from rig.analysis.triad import BESIDE, Triad, check_mounted, check_seen, known_gravity, seen_in
 from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
@@ -25,10 +25,10 @@ from rig.estimation.reference_model import F
 from rig.estimation.triads import Alignment, alignment
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.acceleration import DwellReading
+from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
 from rig.observation.swept_acceleration import SweptAcceleration
 
-BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
 NOT_SEEN = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
 
@@ -174,7 +174,7 @@ def _calibrated(
     check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
-    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE[1:]}
+    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE}
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
@@ -247,7 +247,8 @@ def _swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccelerati
 
 def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
     """(3 N + 9 M,) degrees of freedom of the readings of dwells, then of the harmonics of sweeps."""
-    return np.concatenate([noise_freedom(dwells), *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
+    still = by_axis(dwell.reading.freedom for dwell in dwells).ravel()
+    return np.concatenate([still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
 
 
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:

@@ -23,6 +23,7 @@ from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_model import BIAS, KnownNorm
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
+from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import dwelt
 
@@ -227,7 +228,7 @@ def _drift(
 
 def _noise_freedom(repeat: Sequence[Stand]) -> Array:
     """(3,) degrees of freedom of a repeat's mean over its attitudes."""
-    return effective_freedom([each.variance for each in repeat], [np.broadcast_to(each.freedom, 3) for each in repeat])
+    return effective_freedom([each.variance for each in repeat], by_axis(each.freedom for each in repeat))
 
 
 def _anew(solve: Callable[[int], TriaxialSolution], repeat: int) -> Anew:

@@ -34,6 +34,7 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.attitude_import import placed_by
 from rig.observation.csv_import import ExternalData, averaged
 from rig.observation.csv_samples import Samples, samples_in
+from rig.observation.mean import by_axis
 from rig.observation.timebase import TimeBase
 from rig.observation.turns import TurnedData
 
@@ -182,7 +183,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
 def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
     """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    freedom = np.array([np.broadcast_to(each.freedom, 3) for each in averages])
+    freedom = by_axis(each.freedom for each in averages)
     if not isinstance(solution, VectorSolution):
         return float(freedom.min())
     variances = np.array([each.variance_rad2_s2 for each in averages])

@@ -13,7 +13,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
-from rig.analysis.triad import Triad, check_mounted, known_field, noise_freedom, seen_in
+from rig.analysis.triad import BESIDE, Triad, check_mounted, known_field, seen_in
 from rig.data.quantity import FIELD
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings
@@ -23,11 +23,10 @@ from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
 from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
 from rig.observation.field import beside, field_readings, field_tests
-from rig.observation.mean import Held
+from rig.observation.mean import Held, by_axis
 from rig.observation.observed_run import ObservedRun
 
 ESTIMATOR: Method = "attitude_weighted"
-BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")
 ELSEWHERE = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
 
 
@@ -109,7 +108,7 @@ def _calibrated(
             (alike, drift),
             site,
             field_t=known.norm,
-            noise_freedom=noise_freedom(dwells) if settings.counts_freedom else None,
+            noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel() if settings.counts_freedom else None,
         ),
         beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,

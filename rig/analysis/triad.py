@@ -14,10 +14,11 @@ from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F, KnownNorm
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
-from rig.estimation.triaxial import TriaxialSolution
+from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.acceleration import DwellReading
 from rig.observation.mean import Held
 
+BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # whose solutions stand beside the chosen one
 SEEN = 3.0  # standard deviations that the largest second-order term must have
 
 
@@ -72,11 +73,6 @@ def seen_in(dwells: Sequence[DwellReading | Held], mounting: Array) -> Dwells:
         np.array([dwell.reading.variance for dwell in dwells]),
         np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells]),
     )
-
-
-def noise_freedom(dwells: Sequence[DwellReading | Held]) -> Array:
-    """(3 N,) degrees of freedom of the readings' variances."""
-    return np.concatenate([np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells])
 
 
 def check_mounted(matrix: Array) -> None:

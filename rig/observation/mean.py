@@ -1,6 +1,6 @@
 """Means of readings in any unit, with the variance of the mean: where something passes, where the arm shakes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -41,6 +41,11 @@ class Held:
     reading: Mean
     attitude: Array
     window: Window
+
+
+def by_axis(freedom: Iterable[Array | float]) -> Array:
+    """(N, 3) degrees of freedom of N means' variances, of which some are known for all axes alike."""
+    return np.array([np.broadcast_to(each, 3) for each in freedom])
 
 
 def mean_of(

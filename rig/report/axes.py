@@ -1,4 +1,4 @@
-"""What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
+"""What tables of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence

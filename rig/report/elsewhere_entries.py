@@ -22,7 +22,7 @@ from rig.estimation.known_increments import EarthSeen
 from rig.estimation.reference_model import REFERENCE, SECOND
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.entry import entry
-from rig.report.triad_entry import ACCELEROMETER, MAGNETOMETER, attitudes_entry
+from rig.report.triad_entry import OF_ACCELEROMETERS, OF_MAGNETOMETERS, attitudes_entry
 
 ORDER = (
     *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
@@ -33,7 +33,7 @@ ORDER = (
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     """The accelerometers that were calibrated in attitudes of a file."""
     return {
-        name: attitudes_entry(ACCELEROMETER, result, item,
+        name: attitudes_entry(OF_ACCELEROMETERS, result, item,
             role="calibrate",
             model=accelerometer.MODEL,
             gravity_m_s2=site.gravity_m_s2,
@@ -52,7 +52,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
     """The magnetometers that were calibrated in attitudes of a file."""
     return {
-        name: attitudes_entry(MAGNETOMETER, result, item,
+        name: attitudes_entry(OF_MAGNETOMETERS, result, item,
             model=magnetometer.MODEL,
             arm_field_in_bias=False,
             field_t=site.magnetic_field_t,

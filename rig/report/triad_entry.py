@@ -36,8 +36,8 @@ class Models(Generic[EntryT]):
     beside: type[Entry]
 
 
-ACCELEROMETER = Models(ACCELERATION, AccelerometerEntry, DwellEntry, InAttitudesEntry)
-MAGNETOMETER = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSolutionEntry)
+OF_ACCELEROMETERS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, InAttitudesEntry)
+OF_MAGNETOMETERS = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSolutionEntry)
 
 
 def triad_entry(

@@ -1,7 +1,6 @@
 """Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (TRIAX, section III-B)."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -28,29 +27,21 @@ from rig.report.kinds.followed import Further
 from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
-from rig.report.triad_entry import ACCELEROMETER as MODELS
-from rig.report.triad_entry import triad_entry
+from rig.report.triad_entry import OF_ACCELEROMETERS, triad_entry
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
-    return accelerometers_elsewhere(outcome) | {
-        name: accelerometer_entry(
-            result,
-            found_at=when_entry(of_accelerometer(outcome.recordings, name, (dwell.index for dwell in result.dwells))),
-            **told_from(outcome.told_from_in_reference.get(name, ())),
-        )
-        for name, result in outcome.accelerometers.items()
-    }
+    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
+    return accelerometers_elsewhere(outcome) | on_arm
 
 
-def accelerometer_entry(result: AccelerometerResult, **more: Any) -> AccelerometerEntry:
-    """Scale, bias and covariance; beside them the other methods from the attitudes alone, and what `more` there is."""
+def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> AccelerometerEntry:
     solution = result.solution
     std = np.sqrt(np.diag(solution.covariance))
     return triad_entry(
-        MODELS, result, result.sensor,
+        OF_ACCELEROMETERS, result, result.sensor,
         (solution.dwell_residuals_m_s2, dwell_residual_std_m_s2(solution, result.movement)),
         role="calibrate",
         range_m_s2=result.sensor.channel(ACCELERATION).range,
@@ -62,7 +53,8 @@ def accelerometer_entry(result: AccelerometerResult, **more: Any) -> Acceleromet
         non_orthogonality_freedom=counted(of_acceleration_angles(result)),
         second_order_freedom=counted(of_second_order(result)),
         held_out=None if result.held_out is None else _held_out(result.held_out),
-        **more,
+        found_at=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 

@@ -1,7 +1,6 @@
 """Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -24,8 +23,7 @@ from rig.report.kinds.followed import Further
 from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
-from rig.report.triad_entry import MAGNETOMETER as MODELS
-from rig.report.triad_entry import attitudes_entry
+from rig.report.triad_entry import OF_MAGNETOMETERS, attitudes_entry
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
@@ -33,22 +31,15 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
-    return magnetometers_elsewhere(outcome) | {
-        name: ErrorEntry(error=str(result))
-        if isinstance(result, Fault)
-        else magnetometer_entry(
-            result,
-            found_at=when_entry(of_magnetometer(outcome.recordings, (dwell.index for dwell in result.dwells))),
-            **told_from(outcome.told_from_in_reference.get(name, ())),
-        )
-        for name, result in outcome.magnetometers.items()
-    }
+    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.magnetometers.items()}
+    return magnetometers_elsewhere(outcome) | on_arm
 
 
-def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
-    """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
+def _entry(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
+    if isinstance(result, Fault):
+        return ErrorEntry(error=str(result))
     return attitudes_entry(
-        MODELS, result, result.sensor,
+        OF_MAGNETOMETERS, result, result.sensor,
         model=MODEL,
         range_t=result.sensor.channel(FIELD).range,
         arm_field_in_bias=True,
@@ -57,7 +48,8 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
         hard_iron_t=hard_iron(result.solution),
         field_base_t=result.solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
-        **more,
+        found_at=when_entry(of_magnetometer(outcome.recordings, [dwell.index for dwell in result.dwells])),
+        **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 
