@@ -8,30 +8,27 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.analysis.accelerometer_errors import mean_temperature_c, pieces_of, sheet_of, with_errors
-from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
+from rig.analysis.triad import BESIDE, Triad, check_mounted, check_seen, known_gravity, seen_in
 from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
 from rig.errors import Fault
-from rig.estimation.accelerometer import solve_accelerometer, specific_force
-from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
+from rig.estimation.accelerometer import specific_force
+from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Movement, Sweeps
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu import ImuSolution, solve_imu
-from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
-from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.estimation.triads import Alignment, alignment
-from rig.estimation.triaxial import Method, TriaxialSolution
+from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.acceleration import DwellReading
+from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
 from rig.observation.swept_acceleration import SweptAcceleration
 
-BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
 NOT_SEEN = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
 
@@ -61,21 +58,18 @@ class AccelerometerResult:
 
     The `movement` is all that the solution was found from.
 
-    `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias by the solution alone; the `budget` has
-    all that is known of their uncertainty, None for recordings that say nothing of it. Beside it stand the solutions
-    from the attitudes alone, by method, or the Fault each ends in. `held_out`: when the attitudes were repeated.
-    `temperature_c` is the mean of all readings, in recordings of before that of the dwells.
+    The `triad` has scale and axes by the solution alone, the `budget` all that is known of the uncertainty of scale and
+    bias, None for recordings that say nothing of it. Beside it stand the solutions from the attitudes alone, by method,
+    or the Fault each ends in. `held_out`: when the attitudes were repeated. `temperature_c` is the mean of all
+    readings, in recordings of before that of the dwells.
     """
 
     sensor: RecordedSensor
     gravity_m_s2: float
     movement: Movement
     solution: ImuSolution
-    scale: Array
-    covariance: Array
+    triad: Triad
     budget: Budget | None
-    non_orthogonality_rad: Array
-    non_orthogonality_std_rad: Array
     alignment: Alignment | None
     beside: Mapping[Method, TriaxialSolution | Fault]
     dwells: tuple[DwellReading, ...]
@@ -90,7 +84,7 @@ class AccelerometerResult:
         In the right-angled frame nearest to the gyroscope's axes, where that is known: corrected rates and
         accelerations are in one frame then. Else in that nearest to the accelerometer's own.
         """
-        matrix = SensorAxes.of(self.solution.matrix).correction_matrix
+        matrix = self.triad.correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix
 
     @property
@@ -142,14 +136,14 @@ def _calibrated(
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
     used, left_out = _apart(dwells, _wanted(dwells, settings))
     mounting = np.array(sensor.mounting)
-    seen, sweeps = _dwells(used, mounting), _sweeps(name, recordings, mounting)
+    seen, swept = seen_in(used, mounting), _swept(name, recordings)
+    sweeps = _sweeps(swept, mounting)
     solve = partial(
-        solve_accelerometer,
+        solve_triaxial,
         seen.readings_m_s2,
         seen.attitudes,
         seen.variances_m2_s4,
-        gravity_m_s2=site.gravity_m_s2,
-        down=-np.array(site.up),
+        known_gravity(site),
         second_order=settings.second_order,
     )
     known, sheet = settings.uncertainty, None
@@ -163,7 +157,7 @@ def _calibrated(
         movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
     weighted = or_fault(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
-        check_axes(SensorAxes.of(weighted.matrix).axes, np.eye(3))
+        check_mounted(weighted.matrix)
     elif movement.own is None:
         raise weighted  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
     solution = solve_imu(
@@ -177,18 +171,16 @@ def _calibrated(
         arm_turns=movement.arm_turns,
         own_shares=OWN_SHARES if settings.finds_own_share else (movement.own_share,),
     )
-    axes = SensorAxes.of(solution.matrix)
-    check_axes(axes.axes, np.eye(3))
+    check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
-    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE[1:]}
+    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE}
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
         movement=movement,
         solution=solution,
-        scale=axes.scale,
-        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
+        triad=Triad.of(solution),
         budget=None
         if known is None
         else accelerometer_budget(
@@ -197,10 +189,8 @@ def _calibrated(
             site,
             1e-3 * known.acceleration_lag_ms,
             sheet=sheet,
-            noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
+            noise_freedom=_noise_freedom(used, swept) if settings.counts_freedom else None,
         ),
-        non_orthogonality_rad=axes.non_orthogonality_rad,
-        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
         beside={"attitude_weighted": weighted, **others},
         dwells=used,
@@ -234,29 +224,19 @@ def _apart(
     return used, tuple(dwell for dwell in dwells if last > 0 and repeat[dwell.index] == last)
 
 
-def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
-    """The dwells in the nominal mounting's axes; the mean of rotations that hardly differ shrinks by encoder steps."""
-    return Dwells(
-        readings_m_s2=np.array([dwell.reading.mean for dwell in dwells]),
-        variances_m2_s4=np.array([dwell.reading.variance for dwell in dwells]),
-        attitudes=np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells]),
-    )
-
-
-def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sweeps:
+def _sweeps(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
     """All that was swept, in the axes of the sensor as it is nominally mounted."""
-    found = _swept(name, recordings)
-    if not found:
+    if not swept:
         return NO_SWEEPS
-    stations = list(dict.fromkeys(each.station for each in found))
+    stations = list(dict.fromkeys(each.station for each in swept))
     return Sweeps(
-        harmonics_m_s2=np.array([each.harmonic.harmonic_m_s2 for each in found]),
-        covariances_m2_s4=np.array([each.harmonic.covariance_m2_s4 for each in found]),
-        axes_flange=np.array([each.axis_flange for each in found]) @ mounting.T,
-        speeds_rad_s=np.array([each.harmonic.speed_rad_s for each in found]),
-        attitudes=np.array([(mounting @ each.attitude).T for each in found]),
-        arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
-        stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
+        harmonics_m_s2=np.array([each.harmonic.harmonic_m_s2 for each in swept]),
+        covariances_m2_s4=np.array([each.harmonic.covariance_m2_s4 for each in swept]),
+        axes_flange=np.array([each.axis_flange for each in swept]) @ mounting.T,
+        speeds_rad_s=np.array([each.harmonic.speed_rad_s for each in swept]),
+        attitudes=np.array([(mounting @ each.attitude).T for each in swept]),
+        arms_m=np.array([each.arm_m for each in swept]) @ mounting.T,
+        stations=np.array([stations.index(each.station) for each in swept], dtype=np.intp),
     )
 
 
@@ -267,8 +247,8 @@ def _swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccelerati
 
 def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
     """(3 N + 9 M,) degrees of freedom of the readings of dwells, then of the harmonics of sweeps."""
-    still = [np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells]
-    return np.concatenate([*still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
+    still = by_axis(dwell.reading.freedom for dwell in dwells).ravel()
+    return np.concatenate([still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
 
 
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:

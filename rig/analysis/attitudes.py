@@ -13,57 +13,29 @@ from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.of_kinds import OfKind
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
+from rig.analysis.triad import Triad, check_mounted, check_seen, known_field, known_gravity
 from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.settings import Elsewhere, Site
 from rig.errors import Fault
 from rig.estimation.accelerometer_model import Dwells
-from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
 from rig.estimation.placement import NOISE, LaidDown, laid_down
-from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
-from rig.estimation.refusals import check_axes
+from rig.estimation.reference_model import BIAS, REFERENCE, SECOND, F
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
 from rig.observation.csv_windows import check_reads
 from rig.observation.fixes import Turning
-from rig.observation.mean import Mean
+from rig.observation.mean import Held
 from rig.observation.placements import Placements
-from rig.observation.windows import Window
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
-SEEN = 3.0  # standard deviations that the largest second-order term must have
 TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
 NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
 ROUNDING = 1e-9  # of a mean: all readings of it were the same
-
-
-def known_size(site: Site, quantity: Quantity) -> KnownNorm:
-    """What is known of gravity or the field at a place. Raises Fault `field_strength_unknown`."""
-    up = np.array(site.up)
-    if quantity == ACCELERATION:
-        return KnownNorm(site.gravity_m_s2, up)
-    if site.magnetic_field_t is None:
-        raise Fault(
-            "field_strength_unknown",
-            "the size of the magnetic field is not given, and the scale of a magnetometer is relative to it",
-            "Give --field-t, in tesla, as a reference magnetometer measured it where the sensor was",
-        )
-    return KnownNorm(site.magnetic_field_t, up if site.magnetic_field_upwards else -up)
-
-
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """A placement, by its `index`: the mean `reading`; `attitude` (3, 3) takes a vector of the table into the body."""
-
-    index: int
-    name: str
-    reading: Mean
-    attitude: Array
-    window: Window
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,19 +44,20 @@ class InAttitudes:
 
     `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it. Of a body that
     was laid down, `laid` is how its placements differ, told by `elsewhere` rests without an attitude too, and `moving`
-    how many rows were left out for its movement; `dwells` are the placements, `seen` what was read in them.
-    `budget` is what the uncertainty of the chosen method is made of.
+    how many rows were left out for its movement; `dwells` are the placements. `seen` is what was read in attitudes.
+    `budget` is what the uncertainty of the chosen method is made of, the `triad` its scale and axes.
     """
 
     solution: TriaxialSolution
+    triad: Triad
     beside: Mapping[Method, TriaxialSolution | Fault]
     budget: Budget
+    seen: Dwells
     reference_fault: Fault | None = None
     laid: LaidDown | None = None
     elsewhere: int = 0
     moving: int = 0
-    dwells: tuple[Placement, ...] = ()
-    seen: Dwells | None = None
+    dwells: tuple[Held, ...] = ()
 
 
 Result = InAttitudes | InIncrements
@@ -115,7 +88,7 @@ def solve_placed(
         if quantity in solvers and not isinstance(placements, Fault):
             of_kind: OfKind = solvers[quantity](name, placements, site)
             return of_kind
-        known = known_size(site, quantity)
+        known = known_gravity(site) if quantity == ACCELERATION else known_field(site, "--field-t, in tesla")
         if isinstance(placements, Fault):
             raise placements
         chosen = "attitude_weighted" if method is None or method == "increments" else method
@@ -152,9 +125,11 @@ def known_method(name: str | None) -> Chosen | None:
 
 def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
     solution = equations.solve(method)
-    _check_mounting(solution.matrix, any_mounting=any_mounting)
+    if not any_mounting:
+        check_mounted(solution.matrix)
     budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
-    return InAttitudes(solution, equations.beside(method, *get_args(EqualWeights)), budget, _not_the_earth(solution))
+    beside = equations.beside(method, *get_args(EqualWeights))
+    return InAttitudes(solution, Triad.of(solution), beside, budget, equations.seen, _not_the_earth(solution))
 
 
 def _of_placements(
@@ -172,26 +147,28 @@ def _of_placements(
         )
         solution = _as_laid_down(solution, laid)
     if solution.second_order is not None:
-        check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[15:18]), NOT_SEEN)
-    _check_mounting(solution.matrix, any_mounting=any_mounting)
+        check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+    if not any_mounting:
+        check_mounted(solution.matrix)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
     budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
     return InAttitudes(
         solution,
+        Triad.of(solution),
         equations.beside(method, *METHODS),
         budget,
+        equations.seen,
         laid=laid,
         elsewhere=len(elsewhere.windows),
         moving=moving,
         dwells=tuple(_dwells(placements, quantity)),
-        seen=Dwells(equations.means, equations.variances, equations.attitudes),
     )
 
 
-def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Placement]:
+def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Held]:
     read = placements.read
     for number, (attitude, window) in enumerate(zip(placements.attitudes, read.windows, strict=True)):
-        yield Placement(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
+        yield Held(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
 
 
 def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSolution:
@@ -218,11 +195,6 @@ def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolutio
     )
 
 
-def _check_mounting(matrix: Array, *, any_mounting: bool) -> None:
-    if not any_mounting:
-        check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))
-
-
 def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
     """Why what a gyroscope's rates leave over is not the Earth's rate: as in a run, it must be seen to a tenth."""
     try:
@@ -230,12 +202,3 @@ def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
     except Fault as fault:
         return fault
     return None
-
-
-def check_seen(second_order: Array, std: Array, remedy: str) -> None:
-    """Whether any of the terms φ (3,) that were asked for is told. Raises Fault `second_order_not_seen`."""
-    largest = float(np.max(np.abs(second_order) / std))
-    if largest < SEEN:
-        raise Fault(
-            "second_order_not_seen", f"no second-order term is beyond {largest:.1f} of its standard deviations", remedy
-        )

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.calibration import or_fault
+from rig.analysis.triad import known_gravity
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
@@ -22,6 +23,7 @@ from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_model import BIAS, KnownNorm
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
+from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import dwelt
 
@@ -159,14 +161,13 @@ def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second
     Raises Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
     means, variances, attitudes = _stacked(repeats)
-    up = np.array(site.up)
 
     def solve(repeat: int) -> TriaxialSolution:
         return solve_triaxial(
             means[repeat],
             attitudes[repeat],
             variances[repeat],
-            KnownNorm(site.gravity_m_s2, up),
+            known_gravity(site),
             second_order=second_order,
             method="attitude_weighted",
         )
@@ -227,7 +228,7 @@ def _drift(
 
 def _noise_freedom(repeat: Sequence[Stand]) -> Array:
     """(3,) degrees of freedom of a repeat's mean over its attitudes."""
-    return effective_freedom([each.variance for each in repeat], [np.broadcast_to(each.freedom, 3) for each in repeat])
+    return effective_freedom([each.variance for each in repeat], by_axis(each.freedom for each in repeat))
 
 
 def _anew(solve: Callable[[int], TriaxialSolution], repeat: int) -> Anew:

@@ -21,13 +21,11 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings
 from rig.errors import Fault, Refused
 from rig.estimation import known_turns, triaxial
-from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
-from rig.estimation.coverage import effective_freedom
 from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
 from rig.estimation.over_temperature import OverTemperature
-from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.estimation.reference_budget import fewest_freedom, scale_and_bias_covariance
 from rig.estimation.reference_model import BIAS as OFFSET
 from rig.estimation.reference_model import F
 from rig.estimation.sensor_axes import SensorAxes
@@ -36,6 +34,7 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.attitude_import import placed_by
 from rig.observation.csv_import import ExternalData, averaged
 from rig.observation.csv_samples import Samples, samples_in
+from rig.observation.mean import by_axis
 from rig.observation.timebase import TimeBase
 from rig.observation.turns import TurnedData
 
@@ -184,11 +183,11 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
 def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
     """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    freedom = np.array([np.broadcast_to(each.freedom, 3) for each in averages])
+    freedom = by_axis(each.freedom for each in averages)
     if not isinstance(solution, VectorSolution):
         return float(freedom.min())
-    parts: Array = solution.response**2 * np.array([each.variance_rad2_s2 for each in averages])
-    return float(effective_freedom(parts.reshape(6, -1).T, freedom.reshape(-1, 1)).min())
+    variances = np.array([each.variance_rad2_s2 for each in averages])
+    return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
 
 
 def _vector(data: ExternalData) -> VectorSolution:

@@ -12,7 +12,6 @@ from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.reversal import MagnetometerReversal
 from rig.estimation.accelerometer_model import SECOND
 from rig.estimation.arrays import Array
-from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOISE, WANDERING, Budget
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_budget import ATTITUDES, response_in_attitudes
@@ -49,8 +48,7 @@ def of_sensitivity(result: SensorResult) -> Array | None:
 
 def of_acceleration_angles(result: AccelerometerResult) -> Array | None:
     """(3,) degrees of freedom of an accelerometer's non-orthogonality; None where nobody counts."""
-    turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9)
-    return _of_accelerometer(result, turned @ result.solution.response[F], result.non_orthogonality_std_rad)
+    return _of_axes(result, result.solution.response, result.movement.noise())
 
 
 def of_second_order(result: AccelerometerResult) -> Array | None:
@@ -58,19 +56,13 @@ def of_second_order(result: AccelerometerResult) -> Array | None:
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
-    return _of_accelerometer(result, result.solution.response[SECOND], std)
+    return _in_attitudes(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
 
 
 def of_field_angles(result: MagnetometerResult) -> Array | None:
     """(3,) degrees of freedom of a magnetometer's non-orthogonality; None where nobody counts."""
-    if not result.budget.by_freedom:
-        return None
-    solution, seen = result.solution, result.seen
-    error = solution.attitude_error or AttitudeError(0.0, 0.0)
-    response = response_in_attitudes(solution.theta, seen.attitudes, seen.variances_m2_s4, error.std_rad)[F]
-    noise = (_to_angles(solution.matrix)[:3].reshape(3, 9) @ response) ** 2 @ seen.variances_m2_s4.ravel()
-    whole = result.non_orthogonality_std_rad**2
-    return _split(whole, {NOISE: noise, ATTITUDES: whole - noise}, result.budget)
+    response = response_in_attitudes(result.solution, result.seen)
+    return _of_axes(result, response, np.diag(result.seen.variances_m2_s4.ravel()))
 
 
 def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
@@ -88,12 +80,18 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
     return scale, np.full(6, min(float(budget.freedom[3:].min()) for budget in budgets))
 
 
-def _of_accelerometer(result: AccelerometerResult, response: Array, std: Array) -> Array | None:
-    """Degrees of freedom of an accelerometer's parameters, from their `response` (…, n) to the readings."""
-    if result.budget is None or not result.budget.by_freedom:
+def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array | None:
+    """Degrees of freedom of the angles between the axes, from the `response` (p, n) of all that was found."""
+    turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
+    return _in_attitudes(result.budget, turned, noise, result.triad.non_orthogonality_std_rad)
+
+
+def _in_attitudes(budget: Budget | None, response: Array, noise: Array, std: Array) -> Array | None:
+    """Degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
+    if budget is None or not budget.by_freedom:
         return None
-    noise = np.einsum("qn,nm,qm->q", response, result.movement.noise(), response)
-    return _split(std**2, {NOISE: noise, ATTITUDES: std**2 - noise}, result.budget)
+    by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
+    return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 
 
 def _of_readings(noise: Array, walk: Array, explained: Explained) -> dict[str, Array]:

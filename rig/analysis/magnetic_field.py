@@ -13,30 +13,20 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
+from rig.analysis.triad import BESIDE, Triad, check_mounted, known_field, seen_in
 from rig.data.quantity import FIELD
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.settings import RunSettings, Site
+from rig.data.settings import RunSettings
 from rig.errors import Fault
 from rig.estimation.accelerometer_model import Dwells
-from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.magnetometer import (
-    FieldDrift,
-    Uniformity,
-    field_drift,
-    solve_magnetometer,
-    uniformity,
-)
-from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import F
-from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
-from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution
-from rig.observation.field import FieldReading, beside, field_readings, field_tests
+from rig.estimation.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
+from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
+from rig.observation.field import beside, field_readings, field_tests
+from rig.observation.mean import Held, by_axis
 from rig.observation.observed_run import ObservedRun
 
 ESTIMATOR: Method = "attitude_weighted"
-BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")
 ELSEWHERE = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
 
 
@@ -44,8 +34,8 @@ ELSEWHERE = "Take iron and currents away, or measure farther from them; set the 
 class MagnetometerResult:
     """One magnetometer's calibration m = F B + b in the axes of its nominal mounting, and what it rests on.
 
-    `scale` (3,) is 1/‖row of F‖, relative to the field's size `field_t`; `covariance` (6, 6) that of scale and bias by
-    the solution alone, the `budget` all that is known of their uncertainty.
+    The `triad` has scale, relative to the field's size `field_t`, and axes by the solution alone, the `budget` all that
+    is known of the uncertainty of scale and bias.
     `extension_m` (3,) is where it sits on the flange, `drift` how the field changed between tests at home, None where
     there were fewer than two. `seen` is what it was found from, in tesla. `beside` are the other methods' solutions, or
     the Fault each ends in.
@@ -57,19 +47,11 @@ class MagnetometerResult:
     solution: TriaxialSolution
     uniformity: Uniformity
     drift: FieldDrift | None
-    scale: Array
-    covariance: Array
+    triad: Triad
     budget: Budget
-    non_orthogonality_rad: Array
-    non_orthogonality_std_rad: Array
     beside: Mapping[Method, TriaxialSolution | Fault]
-    dwells: tuple[FieldReading, ...]
+    dwells: tuple[Held, ...]
     seen: Dwells
-
-    @property
-    def correction_matrix(self) -> Array:
-        """(3, 3) M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes."""
-        return SensorAxes.of(self.solution.matrix).correction_matrix
 
 
 def calibrate_magnetometers(
@@ -94,71 +76,44 @@ def _calibrated(
     settings: RunSettings,
     accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
-    site, field_t = _known_field(settings)
-    upwards = (1.0 if site.magnetic_field_upwards else -1.0) * np.array(site.up)
-    dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
-    drift = _drift(name, recordings, settings)
-    mounting = np.array(sensor.mounting)
-    attitudes = np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells])
-    means = np.array([dwell.reading.mean for dwell in dwells])
-    variances = np.array([dwell.reading.variance for dwell in dwells])
-    solve = partial(solve_magnetometer, means, attitudes, variances, field_t=field_t, side=upwards)
-    solution = _solved(solve)
-    axes = SensorAxes.of(solution.matrix)
-    check_axes(axes.axes, np.eye(3))
-    alike = uniformity(solution, means, attitudes, variances, _attitude_error_rad(name, recordings, accelerometers))
-    if not alike.uniform:
-        raise Fault("field_not_uniform", _not_alike(alike, solution), ELSEWHERE)
-    return MagnetometerResult(
-        sensor=sensor,
-        field_t=field_t,
-        extension_m=settings.extension_m,
-        solution=solution,
-        uniformity=alike,
-        drift=drift,
-        scale=axes.scale,
-        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
-        budget=magnetometer_budget(
-            solution,
-            attitudes,
-            variances,
-            (alike, drift),
-            site,
-            field_t=field_t,
-            noise_freedom=_noise_freedom(dwells) if settings.counts_freedom else None,
-        ),
-        non_orthogonality_rad=axes.non_orthogonality_rad,
-        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
-        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
-        dwells=dwells,
-        seen=Dwells(means, variances, attitudes),
-    )
-
-
-def _noise_freedom(dwells: Sequence[FieldReading]) -> Array:
-    """(3 N,) degrees of freedom of the readings' variances."""
-    return np.concatenate([np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells])
-
-
-def _known_field(settings: RunSettings) -> tuple[Site, float]:
-    """The place, and the size of its field.
-
-    Raises Fault `no_attitudes`, `field_strength_unknown`.
-    """
     site = settings.site
-    if not settings.planned_dwells:
+    if not settings.planned_dwells or site is None:
         raise Fault(
             "no_attitudes",
             "recorded only: sweeps do not calibrate a magnetometer",
             "Use the procedure static_attitudes or imu, which hold attitudes",
         )
-    if site is None or site.magnetic_field_t is None:
-        raise Fault(
-            "field_strength_unknown",
-            "recorded only: the size of the field is not given, and the scale of a magnetometer is relative to it",
-            "Give site.magnetic_field_ut, as a reference magnetometer measured it where the sensor stands",
-        )
-    return site, site.magnetic_field_t
+    known = known_field(site, "site.magnetic_field_ut")
+    dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
+    drift = _drift(name, recordings, settings)
+    seen = seen_in(dwells, np.array(sensor.mounting))
+    read = seen.readings_m_s2, seen.attitudes, seen.variances_m2_s4
+    solve = partial(solve_triaxial, *read, known)
+    solution = _solved(solve)
+    check_mounted(solution.matrix)
+    alike = uniformity(solution, *read, _attitude_error_rad(name, recordings, accelerometers))
+    if not alike.uniform:
+        raise Fault("field_not_uniform", _not_alike(alike, solution), ELSEWHERE)
+    return MagnetometerResult(
+        sensor=sensor,
+        field_t=known.norm,
+        extension_m=settings.extension_m,
+        solution=solution,
+        uniformity=alike,
+        drift=drift,
+        triad=Triad.of(solution),
+        budget=magnetometer_budget(
+            solution,
+            seen,
+            (alike, drift),
+            site,
+            field_t=known.norm,
+            noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel() if settings.counts_freedom else None,
+        ),
+        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
+        dwells=dwells,
+        seen=seen,
+    )
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:

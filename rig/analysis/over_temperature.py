@@ -104,7 +104,7 @@ def with_acceleration_polynomials(
     result: AccelerometerResult, found: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
     """An accelerometer's, as a gyroscope's."""
-    budget, whole = _together(found, np.r_[result.scale, result.bias_m_s2], result.budget, np.eye(6))
+    budget, whole = _together(found, np.r_[result.triad.scale, result.bias_m_s2], result.budget, np.eye(6))
     return replace(result, budget=budget), whole
 
 

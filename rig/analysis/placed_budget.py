@@ -10,8 +10,12 @@ from rig.data.budget_entries import IN_U
 from rig.estimation import known_increments, placement
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
-from rig.estimation.coverage import effective_freedom
-from rig.estimation.reference_budget import response_in_attitudes, scale_and_bias, scale_and_bias_covariance
+from rig.estimation.reference_budget import (
+    fewest_freedom,
+    response_in_attitudes,
+    scale_and_bias,
+    scale_and_bias_covariance,
+)
 from rig.estimation.triaxial import TriaxialSolution
 
 SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
@@ -26,13 +30,9 @@ SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
     """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by how the readings weigh."""
-    theta = np.concatenate([solution.matrix.ravel(), solution.reference, solution.bias])
-    error = solution.attitude_error
-    off_rad = 0.0 if error is None else error.std_rad
-    response = response_in_attitudes(theta, equations.attitudes, equations.variances, off_rad)
-    told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(theta)) @ response
-    parts = (told**2 * equations.variances.ravel()).T
-    return float(effective_freedom(parts, equations.freedom.reshape(-1, 1)).min())
+    response = response_in_attitudes(solution, equations.seen)
+    told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
+    return fewest_freedom(told, equations.variances.ravel(), equations.freedom.ravel())
 
 
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:

@@ -9,6 +9,7 @@ from rig.analysis.calibration import or_fault
 from rig.analysis.inverted import solved_in
 from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Fault
+from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import Placed
 from rig.estimation.reference_model import Known, KnownNorm, KnownVector
@@ -64,6 +65,11 @@ class Equations:
             placements.read.freedom[quantity],
             second_order and quantity == ACCELERATION,
         )
+
+    @property
+    def seen(self) -> Dwells:
+        """What was read in which attitude."""
+        return Dwells(self.means, self.variances, self.attitudes)
 
     @property
     def placed(self) -> Placed:

@@ -8,7 +8,7 @@ import numpy as np
 from rig.analysis.accelerometer_errors import Sheet, of_its_own
 from rig.data.quantity import FIELD
 from rig.data.settings import Site
-from rig.estimation.accelerometer_model import Movement
+from rig.estimation.accelerometer_model import Dwells, Movement
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
@@ -74,28 +74,24 @@ def accelerometer_lines(
 
 def magnetometer_budget(
     solution: TriaxialSolution,
-    attitudes: Array,
-    variances_t2: Array,
+    seen: Dwells,
     tested: tuple[Uniformity, FieldDrift | None],
     site: Site,
     *,
     field_t: float,
     noise_freedom: Array | None = None,
 ) -> Budget:
-    """The budget of a solution found in attitudes (N, 3, 3), flange to base, with variances (N, 3) of the means."""
+    """The budget of a solution found from what was `seen`, in tesla."""
     alike, drift = tested
-    error = solution.attitude_error or AttitudeError(0.0, 0.0)
-    response = response_in_attitudes(solution.theta, attitudes, variances_t2, error.std_rad)
-    left = alike.chi_square, alike.degrees_of_freedom
     spread = _spread(
         solution,
-        response,
-        np.diag(variances_t2.ravel()),
-        error,
-        left,
+        response_in_attitudes(solution, seen),
+        np.diag(seen.variances_m2_s4.ravel()),
+        solution.attitude_error or AttitudeError(0.0, 0.0),
+        (alike.chi_square, alike.degrees_of_freedom),
         noise_freedom=noise_freedom,
     )
-    return reference_budget(spread, _field(site, field_t), [_drifting(spread, solution.matrix, attitudes, drift)])
+    return reference_budget(spread, _field(site, field_t), [_drifting(spread, solution.matrix, seen.attitudes, drift)])
 
 
 def _spread(

@@ -122,8 +122,8 @@ def of_magnetometer(
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = solution.theta
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
-    off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
-    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
+    mounting = np.array(result.sensor.mounting)
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, mounting, solution.attitude_std_rad)
     of_arm = arm_patterns(theta, movement, [Stood(each.q_rad) for each in dwells], arm)
     return ReadInReference(
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],

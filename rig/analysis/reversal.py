@@ -74,9 +74,9 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
     return MagnetometerReversal(
         tuple(runs),
         found,
-        np.mean([each.scale for each in results], axis=0),
+        np.mean([each.triad.scale for each in results], axis=0),
         _scale_std(results),
-        np.mean([each.correction_matrix for each in results], axis=0),
+        np.mean([each.triad.correction_matrix for each in results], axis=0),
     )
 
 

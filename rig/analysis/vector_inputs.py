@@ -19,6 +19,7 @@ from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_fit import Seen
 from rig.motion.geometry import AXIS_ERRORS
 from rig.observation.average import Average
+from rig.observation.mean import by_axis
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 
@@ -90,7 +91,7 @@ def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
-        noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
+        noise_freedom=by_axis(average.freedom for average in averages) if surroundings.counts_freedom else np.inf,
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
     )
 
@@ -127,11 +128,6 @@ def arms_of(turns: Sequence[Observation], settings: RunSettings, mount: Array | 
     extension_m = np.array(settings.extension_m) if mount is None else mount @ np.array(settings.extension_m)
     known = [turn.arm_m + extension_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
     return np.reshape(known, (-1, 3)) * settings.knows_own_motion
-
-
-def _noise_freedom(averages: Sequence[Average]) -> Array:
-    """(N, 3) degrees of freedom of the averages' variances."""
-    return np.array([np.broadcast_to(average.freedom, 3) for average in averages])
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:

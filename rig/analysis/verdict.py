@@ -143,10 +143,10 @@ def acceleration_checks(
 
     With a budget its combined uncertainties are judged; else the solution's, relative to the stated gravity.
     """
-    std = np.sqrt(np.diag(result.covariance)) if result.budget is None else result.budget.std
+    std = np.sqrt(np.diag(result.triad.covariance)) if result.budget is None else result.budget.std
     spreads = (_twice(std[:3]), _twice(std[3:])) if result.budget is None else _spreads(result.budget)
     held = _Held(sensor, "acceleration", limits, rule)
-    checks = held.calibration(result.scale, result.bias_m_s2, std, spreads)
+    checks = held.calibration(result.triad.scale, result.bias_m_s2, std, spreads)
     return checks if result.held_out is None else (*checks, held.check("verification", result.held_out.rms_m_s2))
 
 

@@ -14,30 +14,13 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import effects, whitening_with
-from rig.estimation.reference_model import KnownNorm, most_likely, predicted, whitened
+from rig.estimation.reference_model import most_likely, predicted, whitened
 from rig.estimation.refusals import converging
-from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
+from rig.estimation.triaxial import TriaxialSolution
 
 MODEL = "m_m = F Rᵀ m + b"
 FREE = 14  # F and b, and the field's direction: its size is given
 FALSE_ALARM = 1e-3  # in which a steady, uniform field is refused for one of the two
-
-
-def solve_magnetometer(
-    readings_t: ArrayLike,
-    attitudes: ArrayLike,
-    variances_t2: ArrayLike,
-    *,
-    field_t: float,
-    side: ArrayLike = (0.0, 0.0, 1.0),
-    method: Method = "as_published",
-) -> TriaxialSolution:
-    """Calibrate from mean readings (N, 3) with their variances (N, 3) in attitudes R (N, 3, 3), body to table.
-
-    `field_t` is the known size of the field; `side` (3,) a table vector with which it makes less than a right angle
-    (down, in the northern hemisphere). Needs 5 attitudes (rank 14). Raises what `solve_triaxial` raises.
-    """
-    return solve_triaxial(readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method)
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:

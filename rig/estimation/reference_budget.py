@@ -11,12 +11,14 @@ from typing import Literal
 
 import numpy as np
 
+from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError, effects, whitening_with
 from rig.estimation.budget import NOISE, Budget, Contributor
 from rig.estimation.coverage import COVERAGE_FACTOR, effective_freedom
-from rig.estimation.reference_model import BIAS, F, covariance_bound, jacobian
+from rig.estimation.reference_model import BIAS, SECOND, F, covariance_bound, jacobian
 from rig.estimation.sensor_axes import parameter_jacobian
+from rig.estimation.triaxial import TriaxialSolution
 
 ATTITUDES = "arm's attitudes"
 
@@ -47,8 +49,7 @@ class Spread:
         """Degrees of freedom of the noise's part in scale and bias, the fewest of the six."""
         if self.noise_freedom is None:
             return np.inf
-        parts = (self.response**2 * np.diag(self.noise)).T
-        return float(effective_freedom(parts, self.noise_freedom[:, None]).min())
+        return fewest_freedom(self.response, np.diag(self.noise), self.noise_freedom)
 
     def of(self, patterns: Array) -> Array:
         """(6, 6) covariance of independent patterns (k, n) of errors in readings, one standard uncertainty each."""
@@ -89,12 +90,21 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
     return found
 
 
-def response_in_attitudes(theta: Array, attitudes: Array, variances: Array, attitude_std_rad: float) -> Array:
-    """(p, 3 N): how θ (p,) changes with readings (N, 3) in attitudes off by so much, ‖v_ref‖ given."""
-    v_bar = np.zeros_like(variances)
-    white = whitening_with(variances, effects(theta, attitudes, v_bar), np.full(len(variances), attitude_std_rad))
-    bound = covariance_bound(theta, attitudes, v_bar, white, norm_known=True)
-    weighted = np.swapaxes(white, -1, -2) @ white @ jacobian(theta, attitudes, v_bar)
+def fewest_freedom(response: Array, variances: Array, freedom: Array) -> float:
+    """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by their `response` (6, n).
+
+    The readings' `variances` (n,) are known with `freedom` (n,).
+    """
+    return float(effective_freedom((response**2 * variances).T, freedom[:, None]).min())
+
+
+def response_in_attitudes(solution: TriaxialSolution, seen: Dwells) -> Array:
+    """(15, 3 N): how F, v_ref, its size given, and b change with the readings `seen`, in attitudes off as found."""
+    theta, v_bar = solution.theta[: SECOND.start], np.zeros_like(seen.variances_m2_s4)
+    std_rad = np.full(len(v_bar), solution.attitude_std_rad)
+    white = whitening_with(seen.variances_m2_s4, effects(theta, seen.attitudes, v_bar), std_rad)
+    bound = covariance_bound(theta, seen.attitudes, v_bar, white, norm_known=True)
+    weighted = np.swapaxes(white, -1, -2) @ white @ jacobian(theta, seen.attitudes, v_bar)
     response: Array = bound @ weighted.reshape(-1, len(theta)).T
     return response
 

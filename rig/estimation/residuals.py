@@ -40,13 +40,11 @@ def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
 
 def attitude_residual_std(solution: TriaxialSolution, seen: Dwells) -> Array:
     """(N, 3) standard deviations of what is left in attitudes alone, as `seen`, in the readings' unit."""
-    theta = np.concatenate([solution.matrix.ravel(), solution.reference, solution.bias])
-    v_bar = np.zeros_like(seen.readings_m_s2)
-    off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
-    turned = off_rad * attitude_error.effects(theta, seen.attitudes, v_bar)
+    theta, v_bar = solution.theta[: reference_model.SECOND.start], np.zeros_like(seen.readings_m_s2)
+    turned = solution.attitude_std_rad * attitude_error.effects(theta, seen.attitudes, v_bar)
     own = np.eye(3) * seen.variances_m2_s4[:, :, None] + turned @ np.swapaxes(turned, -1, -2)
     slopes = reference_model.jacobian(theta, seen.attitudes, v_bar).reshape(-1, len(theta))
-    fit = slopes @ response_in_attitudes(theta, seen.attitudes, seen.variances_m2_s4, off_rad)
+    fit = slopes @ response_in_attitudes(solution, seen)
     return _left(fit, _along_diagonal(own))
 
 

@@ -83,6 +83,11 @@ class TriaxialSolution:
         second_order = () if self.second_order is None else self.second_order
         return np.concatenate([np.ravel(self.matrix), self.reference, self.bias, second_order])
 
+    @property
+    def attitude_std_rad(self) -> float:
+        """How far the attitudes were found to be off about each axis; zero by a method that holds them."""
+        return 0.0 if self.attitude_error is None else self.attitude_error.std_rad
+
 
 def solve_triaxial(
     readings: ArrayLike,

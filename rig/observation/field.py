@@ -1,7 +1,6 @@
 """What a magnetometer read at rest: its means in dwells, each with the attitude the arm stood in, and at home. Pure."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,23 +13,12 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading, check_complete
-from rig.observation.mean import Mean, even_mean
+from rig.observation.mean import Held, Mean, even_mean
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
 SETTLING_S = 0.2  # kept away from either end of a rest
-
-
-@dataclass(frozen=True, slots=True)
-class FieldReading:
-    """A dwell of the procedure, by its `index`: the mean reading in tesla; the rest as of a `DwellReading`."""
-
-    index: int
-    name: str
-    reading: Mean
-    attitude: Array
-    window: Window
 
 
 def beside(recording: ObservedRun, name: str) -> str | None:
@@ -42,7 +30,7 @@ def beside(recording: ObservedRun, name: str) -> str | None:
     return next((sensor for sensor in dwelt if recording.one_clock(sensor, name)), None)
 
 
-def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[FieldReading, ...]:
+def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[Held, ...]:
     """What a magnetometer read in the dwells of the recording that an accelerometer was read in.
 
     One clock stamps the samples of both, so the gyroscope's time base serves; how late the magnetometer is beside that
@@ -53,7 +41,7 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
         return ()
     channel, inside = recording.run.sensors[name].channel(FIELD), partial(_inside, recording, name, other)
     return tuple(
-        FieldReading(
+        Held(
             dwell.index,
             dwell.name,
             _mean(channel, inside(dwell.window), f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds),

@@ -1,6 +1,6 @@
 """Means of readings in any unit, with the variance of the mean: where something passes, where the arm shakes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -27,6 +27,25 @@ class Mean:
     samples: int
     freedom: Array | float = np.inf
     cycles: Array = field(default_factory=partial(np.zeros, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A mean `reading` of what was held still: in a dwell of the procedure, by its `index`, or a placement of a file.
+
+    `attitude` (3, 3) is the rotation from the arm's base frame into the flange's, or from the table's into the body's.
+    """
+
+    index: int
+    name: str
+    reading: Mean
+    attitude: Array
+    window: Window
+
+
+def by_axis(freedom: Iterable[Array | float]) -> Array:
+    """(N, 3) degrees of freedom of N means' variances, of which some are known for all axes alike."""
+    return np.array([np.broadcast_to(each, 3) for each in freedom])
 
 
 def mean_of(

@@ -4,20 +4,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.attitudes import InAttitudes
-from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.result_file import ResultDocument
-from rig.errors import Fault
+from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.estimation.residuals import attitude_residual_std, dwell_residual_std_m_s2
 from rig.report.figures import Picture, write_pictures
+from rig.report.kinds.finding import Finding
+from rig.report.kinds.unexplained import of_attitudes
 from rig.station.events import RunEvent
 
 if TYPE_CHECKING:
@@ -49,7 +47,7 @@ def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: P
                 (10.0, 4.6),
                 partial(draw, held=held),
             )
-            for sensor, held in _held_still(outcome)
+            for sensor, held in _held_still(outcome, document)
         ],
         folder,
     )
@@ -62,51 +60,27 @@ def draw(figure: "Figure", held: HeldStill) -> None:
     _draw_sphere(sphere, held)
 
 
-def of_accelerometer(result: AccelerometerResult) -> HeldStill:
-    """What an accelerometer's plots are made of."""
-    solution = result.solution
-    expected = dwell_residual_std_m_s2(solution, result.movement)
-    return _held(ACCELERATION, result, solution.dwell_residuals_m_s2, expected, solution.reference_m_s2)
+def held_still(finding: Finding[Any], mounting: Array) -> HeldStill:
+    """What the plots of a sensor are made of; `mounting` (3, 3) leads from the frame of its attitudes to its axes."""
+    entry, quantity, left = finding.entry, finding.quantity, of_attitudes(finding)
+    noise = np.array([getattr(dwell, quantity.named("mean_std")) for dwell in entry.dwells])
+    reference = entry.reference_m_s2 if quantity == ACCELERATION else entry.field_base_t
+    towards = np.array([np.array(dwell.attitude) @ reference for dwell in entry.dwells]) @ mounting.T
+    return HeldStill(quantity, left.values, left.stds, noise, towards)
 
 
-def of_magnetometer(result: MagnetometerResult) -> HeldStill:
-    """What a magnetometer's plots are made of."""
-    fit = result.solution
-    return _held(FIELD, result, fit.residuals, attitude_residual_std(fit, result.seen), fit.reference)
+def _held_still(outcome: Outcome, document: ResultDocument) -> Iterator[tuple[str, HeldStill]]:
+    for quantity, entries in ((ACCELERATION, document.accelerometers), (FIELD, document.magnetometers)):
+        for name, entry in entries.items():
+            if not isinstance(entry, ErrorEntry):
+                yield name, held_still(Finding(name, quantity, entry), _mounting(outcome, name))
 
 
-def of_file(quantity: Quantity, result: InAttitudes) -> HeldStill:
-    """What the plots of a sensor in attitudes of a file are made of."""
-    solution = result.solution
-    expected = (
-        np.zeros_like(solution.residuals) if result.seen is None else attitude_residual_std(solution, result.seen)
-    )
-    towards = np.array([dwell.attitude @ solution.reference for dwell in result.dwells])
-    noise = np.sqrt([dwell.reading.variance for dwell in result.dwells])
-    return HeldStill(quantity, solution.residuals, expected, noise, towards)
-
-
-def _held(
-    quantity: Quantity,
-    result: AccelerometerResult | MagnetometerResult,
-    residuals: Array,
-    expected: Array,
-    reference: Array,
-) -> HeldStill:
-    """The dwells of a result beside what its model leaves; `reference` (3,) is in the base's frame."""
-    towards = np.array([dwell.attitude @ reference for dwell in result.dwells]) @ np.array(result.sensor.mounting).T
-    return HeldStill(
-        quantity, residuals, expected, np.sqrt([dwell.reading.variance for dwell in result.dwells]), towards
-    )
-
-
-def _held_still(outcome: Outcome) -> Iterator[tuple[str, HeldStill]]:
-    yield from ((name, of_accelerometer(result)) for name, result in outcome.accelerometers.items())
-    for name, found in outcome.magnetometers.items():
-        if not isinstance(found, Fault):
-            yield name, of_magnetometer(found)
-    for name, sensor in outcome.elsewhere.items():
-        yield from ((name, of_file(quantity, result)) for quantity, result in sensor.at_rest.items())
+def _mounting(outcome: Outcome, sensor: str) -> Array:
+    """From the flange to the sensor's nominal axes; attitudes of a file are those of the sensor."""
+    if sensor in outcome.elsewhere:
+        return np.eye(3)
+    return np.array(outcome.recordings[0].run.sensors[sensor].mounting)
 
 
 def _draw_residuals(axes: "Axes", held: HeldStill) -> None:

@@ -1,21 +1,16 @@
-"""What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
+"""What tables of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
 from rich.table import Table
 
 from rig.data.quantity import Quantity
-from rig.data.result_types import ErrorEntry, Freedom
-from rig.errors import Fault
-from rig.estimation.arrays import Array, scale_of
+from rig.data.result_types import Freedom
+from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import SensorAxes
-from rig.estimation.triaxial import Method, TriaxialSolution
-from rig.observation.mean import Mean
-from rig.observation.windows import Window
-from rig.report.entry import EntryT, entry
 from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
 
@@ -27,15 +22,6 @@ class Skewed(Protocol):
     def non_orthogonality_std_rad(self) -> Sequence[float]: ...
     @property
     def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
-
-
-class Dwelled(Protocol):
-    """What was read in an attitude."""
-
-    @property
-    def reading(self) -> Mean: ...
-    @property
-    def window(self) -> Window: ...
 
 
 FEWEST_DECIMALS = 5
@@ -102,33 +88,3 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     angles = zip(1e3 * axes.non_orthogonality_rad, 1e3 * factor * stds, strict=True)
     told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
     yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
-
-
-def beside_entries(
-    kind: type[EntryT], quantity: Quantity, beside: Mapping[Method, TriaxialSolution | Fault]
-) -> dict[str, EntryT | ErrorEntry]:
-    """The other methods' solutions as entries whose bias ends with its unit, or why a method has none."""
-    return {
-        method: ErrorEntry(error=str(found))
-        if isinstance(found, Fault)
-        else entry(kind, found, scale=scale_of(found.matrix), **{quantity.named("bias"): found.bias})
-        for method, found in beside.items()
-    }
-
-
-def dwell_entry(kind: type[EntryT], quantity: Quantity, dwell: Dwelled, residual: Array, residual_std: Array) -> EntryT:
-    """A dwell as an entry whose names end with the unit of its readings.
-
-    `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave.
-    """
-    return entry(
-        kind, dwell, dwell.reading,
-        duration_s=dwell.window.end_s - dwell.window.start_s,
-        **{
-            quantity.named("mean"): dwell.reading.mean,
-            quantity.named("mean_std"): np.sqrt(dwell.reading.variance),
-            quantity.named("noise"): dwell.reading.noise,
-            quantity.named("residual"): residual,
-            quantity.named("residual_std"): residual_std,
-        },
-    )  # fmt: skip

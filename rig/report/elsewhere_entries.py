@@ -8,9 +8,9 @@ from rig.analysis.attitudes import InAttitudes, Result
 from rig.analysis.elsewhere import OfSensor
 from rig.analysis.increments import InIncrements
 from rig.analysis.outcome import Outcome
-from rig.data.accelerometer_entries import AccelerometerEntry, DwellEntry, InAttitudesEntry
+from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.attitude_entries import BesideEntry, FollowedEntry, InAttitudesRatesEntry, LeftOutEntry, TurnedEntry
-from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.motion_file import Item
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.result_types import ErrorEntry, LaidDownEntry
@@ -18,17 +18,11 @@ from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.arrays import scale_of
-from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.known_increments import EarthSeen
-from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import REFERENCE, SECOND, F
-from rig.estimation.residuals import attitude_residual_std
-from rig.estimation.sensor_axes import SensorAxes
-from rig.estimation.six_observation import PARAMETERS
+from rig.estimation.reference_model import REFERENCE, SECOND
 from rig.estimation.triaxial import TriaxialSolution
-from rig.report.axes import beside_entries, dwell_entry
-from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
+from rig.report.triad_entry import OF_ACCELEROMETERS, OF_MAGNETOMETERS, attitudes_entry
 
 ORDER = (
     *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
@@ -39,7 +33,7 @@ ORDER = (
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     """The accelerometers that were calibrated in attitudes of a file."""
     return {
-        name: _at_rest(AccelerometerEntry, ACCELERATION, item, result,
+        name: attitudes_entry(OF_ACCELEROMETERS, result, item,
             role="calibrate",
             model=accelerometer.MODEL,
             gravity_m_s2=site.gravity_m_s2,
@@ -49,8 +43,7 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
             lever_arm_m=None, lever_arm_std_m=None, delay_s=None, delay_std_s=None, alignment=None, held_out=None,
             sweeps=0,
             temperature_c=None,
-            dwells=_dwells(DwellEntry, ACCELERATION, result),
-            beside=beside_entries(InAttitudesEntry, ACCELERATION, result.beside),
+            laid_down=_laid_down(result),
         )
         for name, item, site, result in _placed(outcome, ACCELERATION)
     }  # fmt: skip
@@ -59,14 +52,13 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
     """The magnetometers that were calibrated in attitudes of a file."""
     return {
-        name: _at_rest(MagnetometerEntry, FIELD, item, result,
+        name: attitudes_entry(OF_MAGNETOMETERS, result, item,
             model=magnetometer.MODEL,
             arm_field_in_bias=False,
             field_t=site.magnetic_field_t,
             field_base_t=result.solution.reference,
             hard_iron_t=magnetometer.hard_iron(result.solution),
-            dwells=_dwells(FieldDwellEntry, FIELD, result),
-            beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
+            laid_down=_laid_down(result),
         )
         for name, item, site, result in _placed(outcome, FIELD)
     }  # fmt: skip
@@ -152,52 +144,16 @@ def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site,
     ]
 
 
-def _at_rest(kind: Any, quantity: Quantity, item: Item, attitudes: InAttitudes, **own: Any) -> Any:
-    """What the entries of accelerometers and magnetometers share, each in the unit of its quantity."""
-    solution, error, laid = attitudes.solution, attitudes.solution.attitude_error, attitudes.laid
-    axes = SensorAxes.of(solution.matrix)
-    return entry(
-        kind, solution,
-        part=item.part,
-        serial_number=item.serial_number,
-        estimator=solution.method,
-        scale=axes.scale,
-        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
-        covariance_order=PARAMETERS,
-        covariance_units=quantity.parameter_units,
-        covariance_combined=attitudes.budget.covariance,
-        budget=budget_entry(attitudes.budget),
-        non_orthogonality_rad=axes.non_orthogonality_rad,
-        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
-        **attitude_error(error),
-        correction_matrix=axes.correction_matrix,
-        laid_down=LaidDownEntry(
-            placement_std=None if laid is None else laid.placement_std,
-            placement_uncertainty=None if laid is None else laid.placement_uncertainty,
-            rests_elsewhere=attitudes.elsewhere,
-            rows_left_out=attitudes.moving,
-            covariance=solution.covariance.tolist(),
-            covariance_order=ORDER[: len(solution.covariance)],
-        ),
-        **{quantity.named("bias"): solution.bias},
-        **own,
-    )  # fmt: skip
-
-
-def attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
-    """How far the attitudes are off about each axis, and how well that is known; none by a method that holds them."""
-    if error is None:
-        return {"attitude_error_rad": None, "attitude_error_std_rad": None}
-    known = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
-    return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": known}
-
-
-def _dwells(kind: Any, quantity: Quantity, attitudes: InAttitudes) -> list[Any]:
-    if attitudes.seen is None:  # of rows there are no placements
-        return []
-    expected = attitude_residual_std(attitudes.solution, attitudes.seen)
-    rows = zip(attitudes.dwells, attitudes.solution.residuals, expected, strict=True)
-    return [dwell_entry(kind, quantity, *each) for each in rows]
+def _laid_down(attitudes: InAttitudes) -> LaidDownEntry:
+    solution, laid = attitudes.solution, attitudes.laid
+    return LaidDownEntry(
+        placement_std=None if laid is None else laid.placement_std,
+        placement_uncertainty=None if laid is None else laid.placement_uncertainty,
+        rests_elsewhere=attitudes.elsewhere,
+        rows_left_out=attitudes.moving,
+        covariance=solution.covariance.tolist(),
+        covariance_order=ORDER[: len(solution.covariance)],
+    )
 
 
 def _second_order_std(solution: TriaxialSolution) -> Any:

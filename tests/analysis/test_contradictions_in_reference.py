@@ -145,7 +145,7 @@ def test_a_sensor_that_is_no_more_bent_than_its_data_sheet_says_is_within_its_un
         "accelerometer"
     ]
     assert found.budget is not None and told_of(run).failed == set()
-    off = np.concatenate([found.scale - truth["scale"], found.bias_m_s2 - truth["bias_m_s2"]])
+    off = np.concatenate([found.triad.scale - truth["scale"], found.bias_m_s2 - truth["bias_m_s2"]])
     assert np.all(np.abs(off) < found.budget.expanded)
     old = calibrate_accelerometers(observe_recordings([run]), run.settings.with_overrides(["reckoning=1"]))["kvh"]
     assert old.budget is not None and np.abs(old.bias_m_s2 - truth["bias_m_s2"])[1] > 2 * old.budget.expanded[4]

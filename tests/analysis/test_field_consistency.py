@@ -9,7 +9,8 @@ from rig.analysis.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
 from rig.analysis.reference_suspected import Read
 from rig.config.attitude_sets import MAGNETIC
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Dwells, Movement
-from rig.estimation.magnetometer import solve_magnetometer
+from rig.estimation.reference_model import KnownNorm
+from rig.estimation.triaxial import solve_triaxial
 from rig.motion.geometry import NOMINAL, flange_pose
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.reference_p_values import p_values
@@ -30,17 +31,14 @@ def read_of(seed: int) -> Read:
     felt = np.einsum("nji,nj->ni", arm(JOINTS)[:, :3, :3], fields_t)
     means = felt @ matrix.T + 3e-5 * rng.normal(size=3) + NOISE_T * rng.normal(size=felt.shape)
     variances = np.full_like(means, NOISE_T**2)
-    norm_t = float(np.linalg.norm(FIELD_T))
-    found = solve_magnetometer(
-        means, told, variances, field_t=norm_t, side=(0.0, 0.0, -1.0), method="attitude_weighted"
-    )
+    known = KnownNorm(float(np.linalg.norm(FIELD_T)), (0.0, 0.0, -1.0))
+    found = solve_triaxial(means, told, variances, known, method="attitude_weighted")
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = found.theta
     movement = Movement(Dwells(means, variances, told), NO_SWEEPS)
-    off_rad = 0.0 if found.attitude_error is None else found.attitude_error.std_rad
-    known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), off_rad)
+    arm_known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), found.attitude_std_rad)
     drift, _ = drift_patterns(found.matrix, told, None)
-    of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], known)
+    of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], arm_known)
     times_s = np.linspace(0.0, 5.0 * len(JOINTS), len(JOINTS))
     return Read(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
 

@@ -12,14 +12,15 @@ from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_bu
 from rig.config.attitude_sets import EIGHTEEN
 from rig.data.quantity import ACCELERATION
 from rig.data.settings import Site
-from rig.estimation.accelerometer_model import OWN_ERRORS, Movement, turned
+from rig.estimation.accelerometer_model import OWN_ERRORS, Dwells, Movement, turned
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu import solve_imu
-from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
+from rig.estimation.magnetometer import field_drift, uniformity
 from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import BIAS
+from rig.estimation.reference_model import BIAS, KnownNorm
+from rig.estimation.triaxial import solve_triaxial
 from rig.plans.recorded import open_run
 from support import drawn_accelerations
 from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
@@ -81,16 +82,14 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
     readings = np.einsum("nji,nj->ni", true, field + along) @ matrix.T + bias
     variances = np.full_like(readings, NOISE_T**2)
     readings += NOISE_T * rng.normal(size=readings.shape)
-    solution = solve_magnetometer(
-        readings, told, variances, field_t=FIELD_T, side=-np.eye(3)[2], method="attitude_weighted"
-    )
+    solution = solve_triaxial(readings, told, variances, KnownNorm(FIELD_T, -np.eye(3)[2]), method="attitude_weighted")
     assert solution.attitude_error is not None
     tests = [bias, bias + drift] + TEST_NOISE_T / np.sqrt(2) * rng.normal(size=(2, 3))
     tested = (
         uniformity(solution, readings, told, variances, solution.attitude_error.std_rad),
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
-    budget = magnetometer_budget(solution, told, variances, tested, site, field_t=FIELD_T)
+    budget = magnetometer_budget(solution, Dwells(readings, variances, told), tested, site, field_t=FIELD_T)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias - bias])
     return off / budget.std, budget, off / own_spread(budget)

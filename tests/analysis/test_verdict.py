@@ -134,9 +134,10 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
         bias_drift_rad_s=1e-4,
     )
     found = SimpleNamespace(
-        scale=np.array([1.0, 0.981, 1.0]),
+        triad=SimpleNamespace(
+            scale=np.array([1.0, 0.981, 1.0]), covariance=np.diag(np.square([6e-4] * 3 + [3e-3] * 3))
+        ),
         bias_m_s2=np.array([0.1, 0.0, -0.495]),
-        covariance=np.diag(np.square([6e-4] * 3 + [3e-3] * 3)),
         budget=Budget((_line("noise", 6e-4, 3e-3), _line("gravity", 13**0.5 * 1e-4, 7**0.5 * 1e-3))),
         held_out=None,
     )

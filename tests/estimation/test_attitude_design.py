@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rig.config.attitude_sets import EIGHTEEN, FACES, WristAngles
-from rig.estimation.accelerometer import solve_accelerometer
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_design import Expected, Order, expected, g_efficiency, telling
 from rig.estimation.attitude_error import effects, whitening_with
-from rig.estimation.reference_model import weighted_jacobian
+from rig.estimation.reference_model import KnownNorm, weighted_jacobian
+from rig.estimation.triaxial import solve_triaxial
 from support.arm_attitudes import attitudes_of, joints_rad
 from support.exchange_search import exchange_search, information, log_determinant
 
@@ -114,12 +114,11 @@ def test_what_is_expected_is_what_a_fit_reaches() -> None:
     off = []
     for _ in range(60):
         readings = felt + std * rng.normal(size=felt.shape)
-        fit = solve_accelerometer(
+        fit = solve_triaxial(
             readings,
             attitudes,
             np.full_like(felt, std**2),
-            gravity_m_s2=G,
-            down=-UP,
+            KnownNorm(G, UP),
             method="maximum_likelihood",
         )
         off.append([*(np.linalg.norm(fit.matrix, axis=1) - 1), *fit.bias])

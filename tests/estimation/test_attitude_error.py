@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.errors import Fault
-from rig.estimation.accelerometer import solve_accelerometer
 from rig.estimation.arrays import Array
-from rig.estimation.triaxial import Method, TriaxialSolution
+from rig.estimation.reference_model import KnownNorm
+from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.study.rate_table import ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_MATRIX, MG
 from support.arm_attitudes import attitudes_of, crooked, joints_rad
 
@@ -41,9 +41,7 @@ def geometry(error_rad: float) -> Arm:
 
 def solve(m: Array, std: float, method: Method, r: Array, *, attitude_std_rad: Array | None = None) -> TriaxialSolution:
     variances = np.full_like(m, std**2)
-    return solve_accelerometer(
-        m, r, variances, gravity_m_s2=NORM, down=(0, 0, -1), method=method, attitude_std_rad=attitude_std_rad
-    )
+    return solve_triaxial(m, r, variances, KnownNorm(NORM, (0, 0, 1)), method=method, attitude_std_rad=attitude_std_rad)
 
 
 def recorded(arm: Arm, std: float, seed: int, joints: Array = JOINTS) -> Array:

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from rig.config.attitude_sets import EIGHTEEN
 from rig.errors import Fault
-from rig.estimation.accelerometer import solve_accelerometer
 from rig.estimation.accelerometer_model import (
     DELAY,
     LEVER,
@@ -27,8 +26,9 @@ from rig.estimation.accelerometer_model import (
 from rig.estimation.arrays import Array
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.imu_fit import covariance_bound, most_likely
-from rig.estimation.reference_model import BIAS
+from rig.estimation.reference_model import BIAS, KnownNorm
 from rig.estimation.sensor_axes import non_orthogonality
+from rig.estimation.triaxial import solve_triaxial
 from rig.motion.geometry import flange_pose
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import (
@@ -183,12 +183,11 @@ def test_the_effects_of_an_arm_s_errors_are_those_of_such_an_arm(error: int) -> 
 def test_attitudes_alone_give_what_the_attitude_weighted_fit_gives(rms_rad: float) -> None:
     _, dwells, _ = recorded((0, True), rms_rad, 119.0, 5)
     solution = solve(dwells)
-    other = solve_accelerometer(
+    other = solve_triaxial(
         dwells.readings_m_s2,
         dwells.attitudes,
         dwells.variances_m2_s4,
-        gravity_m_s2=NORM,
-        down=(0, 0, -1),
+        KnownNorm(NORM, (0, 0, 1)),
         method="attitude_weighted",
     )
     assert other.attitude_error is not None

@@ -5,9 +5,9 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.magnetometer import field_drift, hard_iron, solve_magnetometer, uniformity
+from rig.estimation.magnetometer import field_drift, hard_iron, uniformity
 from rig.estimation.reference_model import KnownNorm
-from rig.estimation.triaxial import EqualWeights, solve_triaxial_batch
+from rig.estimation.triaxial import EqualWeights, solve_triaxial, solve_triaxial_batch
 from support.rate_table import attitudes, noisy
 
 METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
@@ -19,7 +19,7 @@ HARD_IRON = np.array([12.0, -7.0, 20.0]) * 1e-6
 OFFSET = np.array([1.0, 2.0, -3.0]) * 1e-6
 MATRIX = SCALE @ NON_ORTHOGONALITY @ SOFT_IRON
 BIAS = SCALE @ NON_ORTHOGONALITY @ HARD_IRON + OFFSET
-NORM = float(np.linalg.norm(EARTH_FIELD))
+KNOWN = KnownNorm(float(np.linalg.norm(EARTH_FIELD)), (0, 0, 1))
 VARIANCES = np.full((20, 3), (0.1e-6) ** 2) * np.array([1.0, 2.0, 0.5])
 
 
@@ -33,12 +33,12 @@ def readings(r: Array) -> Array:
 @pytest.mark.parametrize("method", METHODS)
 def test_iron_field_and_offset_are_found(method: EqualWeights) -> None:
     r = attitudes(20)
-    solution = solve_magnetometer(noisy(readings(r), VARIANCES), r, VARIANCES, field_t=NORM, method=method)
+    solution = solve_triaxial(noisy(readings(r), VARIANCES), r, VARIANCES, KNOWN, method=method)
     std = np.sqrt(np.diag(solution.covariance))
     found = solution.theta
     assert np.all(np.abs(found - np.concatenate([MATRIX.ravel(), EARTH_FIELD, BIAS])) < 4 * std)
     assert solution.rank == 14 and not solution.warnings
-    exact = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method=method)
+    exact = solve_triaxial(readings(r), r, VARIANCES, KNOWN, method=method)
     np.testing.assert_allclose(exact.matrix, MATRIX, atol=1e-12)
     np.testing.assert_allclose(hard_iron(exact), np.linalg.solve(MATRIX, BIAS), atol=1e-17)
     np.testing.assert_allclose(exact.bias, BIAS, atol=1e-17)
@@ -48,12 +48,12 @@ def test_iron_field_and_offset_are_found(method: EqualWeights) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights) -> None:
     r = attitudes(20)
-    reported = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method=method).covariance
+    reported = solve_triaxial(readings(r), r, VARIANCES, KNOWN, method=method).covariance
     found = solve_triaxial_batch(
         noisy(readings(r), VARIANCES, runs=5000),
         r,
         VARIANCES,
-        KnownNorm(NORM, [0, 0, 1]),
+        KNOWN,
         method=method,
     )
     np.testing.assert_allclose(np.var(found, axis=0), np.diag(reported), rtol=0.1)
@@ -62,13 +62,13 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights) -
 def test_an_axis_of_the_other_hand_is_refused() -> None:
     r = attitudes(20)
     with pytest.raises(Fault, match="mirrored_axis"):
-        solve_magnetometer(readings(r) * np.array([-1.0, 1.0, 1.0]), r, VARIANCES, field_t=NORM)
+        solve_triaxial(readings(r) * np.array([-1.0, 1.0, 1.0]), r, VARIANCES, KNOWN)
 
 
 def test_microtesla_given_as_tesla_are_refused() -> None:
     r = attitudes(20)
     with pytest.raises(Fault, match="wrong_unit"):
-        solve_magnetometer(readings(r) * 1e6, r, VARIANCES * 1e12, field_t=NORM)
+        solve_triaxial(readings(r) * 1e6, r, VARIANCES * 1e12, KNOWN)
 
 
 def test_a_field_that_drifts_is_told_from_noise() -> None:
@@ -84,7 +84,7 @@ def test_a_field_that_drifts_is_told_from_noise() -> None:
 
 def test_noise_seldom_makes_a_uniform_field_look_uneven_and_attitudes_that_are_known_to_be_off_do_not() -> None:
     r = attitudes(20)
-    solution = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method="maximum_likelihood")
+    solution = solve_triaxial(readings(r), r, VARIANCES, KNOWN, method="maximum_likelihood")
     found = [uniformity(solution, noisy(readings(r), VARIANCES, seed=seed), r, VARIANCES, 0.0) for seed in range(40)]
     assert (
         np.mean([each.chi_square for each in found]) == pytest.approx(46, abs=5) and found[0].degrees_of_freedom == 46

@@ -10,8 +10,9 @@ from rig.config.attitude_sets import SETS
 from rig.config.sensor_sections import MountingSection, mounting_matrix
 from rig.config.world_magnetism import IronSection, SimulatedMagnetometerSection
 from rig.config.world_models import SiteSection
-from rig.estimation.magnetometer import Uniformity, solve_magnetometer, uniformity
-from rig.estimation.triaxial import Method, TriaxialSolution
+from rig.estimation.magnetometer import Uniformity, uniformity
+from rig.estimation.reference_model import KnownNorm
+from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.ur10e.forward_kinematics import frames
@@ -66,9 +67,7 @@ def seen(
     rows = mounting_matrix(section)
     attitudes = np.array([np.array(pose[-1][0]) @ rows.T for pose in poses])
     variances = np.full(felt.shape, NOISE_T**2)
-    solution = solve_magnetometer(
-        readings, attitudes, variances, field_t=1e-6 * FIELD_UT, side=(0, 0, -1), method=method
-    )
+    solution = solve_triaxial(readings, attitudes, variances, KnownNorm(1e-6 * FIELD_UT, (0, 0, -1)), method=method)
     alike = uniformity(solution, readings, attitudes, variances, 0.0)
     return Seen(np.array(mounted.truth.bias_t), matrix, solution, alike, rows)
 

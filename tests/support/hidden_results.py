@@ -74,7 +74,7 @@ def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
         yield from _split(result.sensor.part, (SCALE, BIAS), found - true, result.uncertainty)
     for name, accelerometer in outcome.accelerometers.items():
         assert accelerometer.budget is not None
-        found = np.concatenate([accelerometer.scale, accelerometer.bias_m_s2])
+        found = np.concatenate([accelerometer.triad.scale, accelerometer.bias_m_s2])
         error = found - true_accelerometer(document, name, accelerometer)
         yield from _split(accelerometer.sensor.part, OF_GRAVITY, error, accelerometer.budget)
 

@@ -1,7 +1,6 @@
 """Accelerometers: scale, bias and axes from attitudes to gravity, and from sweeps (TRIAX, section III-B)."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -9,22 +8,14 @@ from rig.analysis.acceleration import AccelerometerResult, HeldOut
 from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_accelerometer
-from rig.data.accelerometer_entries import (
-    AccelerometerEntry,
-    AlignmentEntry,
-    DwellEntry,
-    HeldOutEntry,
-    InAttitudesEntry,
-)
+from rig.data.accelerometer_entries import AccelerometerEntry, AlignmentEntry, HeldOutEntry
 from rig.data.quantity import ACCELERATION
 from rig.estimation.accelerometer_model import DELAY, SECOND
 from rig.estimation.imu import MODEL
 from rig.estimation.own_errors import NONLINEARITY
 from rig.estimation.residuals import dwell_residual_std_m_s2
-from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triads import Alignment
-from rig.report.axes import beside_entries, dwell_entry, triple
-from rig.report.budget_entry import budget_entry
+from rig.report.axes import triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
@@ -36,51 +27,34 @@ from rig.report.kinds.followed import Further
 from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
+from rig.report.triad_entry import OF_ACCELEROMETERS, triad_entry
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
-    return accelerometers_elsewhere(outcome) | {
-        name: accelerometer_entry(
-            result,
-            found_at=when_entry(of_accelerometer(outcome.recordings, name, (dwell.index for dwell in result.dwells))),
-            **told_from(outcome.told_from_in_reference.get(name, ())),
-        )
-        for name, result in outcome.accelerometers.items()
-    }
+    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.accelerometers.items()}
+    return accelerometers_elsewhere(outcome) | on_arm
 
 
-def accelerometer_entry(result: AccelerometerResult, **more: Any) -> AccelerometerEntry:
-    """Scale, bias and covariance; beside them the other methods from the attitudes alone, and what `more` there is."""
+def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> AccelerometerEntry:
     solution = result.solution
-    std, expected = np.sqrt(np.diag(solution.covariance)), dwell_residual_std_m_s2(solution, result.movement)
-    return entry(
-        AccelerometerEntry, result, result.sensor, solution,
+    std = np.sqrt(np.diag(solution.covariance))
+    return triad_entry(
+        OF_ACCELEROMETERS, result, result.sensor,
+        (solution.dwell_residuals_m_s2, dwell_residual_std_m_s2(solution, result.movement)),
         role="calibrate",
         range_m_s2=result.sensor.channel(ACCELERATION).range,
         model=MODEL,
         estimator="attitude_weighted",
-        covariance_combined=None if result.budget is None else result.budget.covariance,
-        budget=None if result.budget is None else budget_entry(result.budget),
-        covariance_order=PARAMETERS,
-        covariance_units=ACCELERATION.parameter_units,
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
-        attitude_error_rad=solution.attitude_error.std_rad,
-        attitude_error_std_rad=solution.attitude_error.uncertainty_rad,
-        lever_arm_m=result.lever_arm_m,
-        lever_arm_std_m=result.lever_arm_std_m,
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
-        dwells=[
-            dwell_entry(DwellEntry, ACCELERATION, *each)
-            for each in zip(result.dwells, solution.dwell_residuals_m_s2, expected, strict=True)
-        ],
-        beside=beside_entries(InAttitudesEntry, ACCELERATION, result.beside),
         non_orthogonality_freedom=counted(of_acceleration_angles(result)),
         second_order_freedom=counted(of_second_order(result)),
         held_out=None if result.held_out is None else _held_out(result.held_out),
-        **more,
+        found_at=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 

@@ -1,38 +1,29 @@
 """Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from rig.analysis.freedom_beside import of_field_angles
-from rig.analysis.magnetic_field import ESTIMATOR, MagnetometerResult
+from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_magnetometer
-from rig.data.magnetometer_entries import (
-    FieldDriftEntry,
-    FieldDwellEntry,
-    FieldSolutionEntry,
-    MagnetometerEntry,
-    UniformityEntry,
-)
+from rig.data.magnetometer_entries import FieldDriftEntry, MagnetometerEntry, UniformityEntry
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, hard_iron
-from rig.estimation.residuals import attitude_residual_std
-from rig.estimation.six_observation import PARAMETERS
-from rig.report.axes import beside_entries, dwell_entry, triple
-from rig.report.budget_entry import budget_entry
+from rig.report.axes import triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
-from rig.report.elsewhere_entries import attitude_error, magnetometers_elsewhere
+from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
 from rig.report.kinds.followed import Further
 from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
+from rig.report.triad_entry import OF_MAGNETOMETERS, attitudes_entry
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
@@ -40,45 +31,25 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
-    return magnetometers_elsewhere(outcome) | {
-        name: ErrorEntry(error=str(result))
-        if isinstance(result, Fault)
-        else magnetometer_entry(
-            result,
-            found_at=when_entry(of_magnetometer(outcome.recordings, (dwell.index for dwell in result.dwells))),
-            **told_from(outcome.told_from_in_reference.get(name, ())),
-        )
-        for name, result in outcome.magnetometers.items()
-    }
+    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.magnetometers.items()}
+    return magnetometers_elsewhere(outcome) | on_arm
 
 
-def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
-    """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
-    solution = result.solution
-    expected = attitude_residual_std(solution, result.seen)
-    return entry(
-        MagnetometerEntry, result, result.sensor, solution,
+def _entry(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
+    if isinstance(result, Fault):
+        return ErrorEntry(error=str(result))
+    return attitudes_entry(
+        OF_MAGNETOMETERS, result, result.sensor,
         model=MODEL,
         range_t=result.sensor.channel(FIELD).range,
-        estimator=ESTIMATOR,
-        covariance_combined=result.budget.covariance,
-        budget=budget_entry(result.budget),
-        covariance_order=PARAMETERS,
-        covariance_units=FIELD.parameter_units,
         arm_field_in_bias=True,
         uniformity=entry(UniformityEntry, result.uniformity),
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
-        bias_t=solution.bias,
-        hard_iron_t=hard_iron(solution),
-        field_base_t=solution.reference,
+        hard_iron_t=hard_iron(result.solution),
+        field_base_t=result.solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
-        **attitude_error(solution.attitude_error),
-        dwells=[
-            dwell_entry(FieldDwellEntry, FIELD, *each)
-            for each in zip(result.dwells, solution.residuals, expected, strict=True)
-        ],
-        beside=beside_entries(FieldSolutionEntry, FIELD, result.beside),
-        **more,
+        found_at=when_entry(of_magnetometer(outcome.recordings, [dwell.index for dwell in result.dwells])),
+        **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
 
