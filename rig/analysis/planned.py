@@ -75,8 +75,7 @@ def _told_from(
     known: Uncertainty,
 ) -> tuple[ToldFrom, ...]:
     matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
-    noise_rad_s_sqrt_hz = np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60
-    seen = turned.read_by(matrix, float(noise_rad_s_sqrt_hz), sensor.rate_hz)
+    seen = turned.read_by(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     at_s = seen.pieces.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in settings.planned_sweeps]))
     allowed = allowed_of(

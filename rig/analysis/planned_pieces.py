@@ -23,14 +23,14 @@ class Planned:
     pieces: Pieces
     ways: Pieces
 
-    def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float, rate_hz: float) -> "Planned":
+    def read_by(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "Planned":
         """The pieces read by a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T.
 
         Samples that are too far apart tell nothing of the ways.
         """
 
         def read(pieces: Pieces) -> Pieces:
-            variances = noise_rad_s_sqrt_hz**2 / np.diff(pieces.times_s) * np.ones(3)
+            variances = angle_random_walk_rad_sqrt_s**2 / np.diff(pieces.times_s) * np.ones(3)
             return replace(pieces, means_rad_s=pieces.rates_rad_s @ matrix.T, variances_rad2_s2=variances)
 
         return Planned(read(self.pieces), read(self.ways if 1 / rate_hz <= SPARSE_S else self.pieces))

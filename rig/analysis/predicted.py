@@ -46,11 +46,6 @@ ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking 
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
-def angle_walk_rad_sqrt_s(sensor: SensorSection) -> float:
-    """What noise alone makes of an angle in a second, by the data sheet: rad/√s, a standard deviation."""
-    return float(np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60)
-
-
 def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = False) -> dict[str, Budget]:
     """The budget that a run of the plan will have, for each sensor to calibrate.
 
@@ -150,12 +145,12 @@ def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: Sen
 
 
 def _average(window_s: tuple[float, float], sensor: SensorSection, attitude: Array) -> Average:
-    lasting_s = window_s[1] - window_s[0]
+    lasting_s, walk_rad_sqrt_s = window_s[1] - window_s[0], PARTS[sensor.part].angle_random_walk_rad_sqrt_s
     samples = max(round(lasting_s * sensor.rate_hz), 2)
     return Average(
         mean_rad_s=np.zeros(3),
-        variance_rad2_s2=np.full(3, angle_walk_rad_sqrt_s(sensor) ** 2 / lasting_s),
-        noise_rad_s=np.full(3, angle_walk_rad_sqrt_s(sensor) * sensor.rate_hz**0.5),
+        variance_rad2_s2=np.full(3, walk_rad_sqrt_s**2 / lasting_s),
+        noise_rad_s=np.full(3, walk_rad_sqrt_s * sensor.rate_hz**0.5),
         samples=samples,
         start_s=window_s[0],
         end_s=window_s[1],

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.predicted import angle_walk_rad_sqrt_s
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
@@ -68,7 +67,7 @@ def _move_s(move: Instruction) -> float:
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> Handled:
     """Rests of the wanted length, a little of it lost to the moves, and the moves between, in the sensor's axes."""
-    mounting = mounting_matrix(sensor.mounting)
+    mounting, part = mounting_matrix(sensor.mounting), PARTS[sensor.part]
     spans: list[tuple[float, Array | None]] = [(rest_s, None)]
     faces, last = [FIRST], FIRST
     for move in moves:
@@ -92,11 +91,11 @@ def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float)
         up[inside] = [rotation_by(-each * rotation) @ face for each in gone]
         made.append(Move(end_s - lasting_s, end_s, float(np.abs(rates[inside]).max())))
     rng = np.random.default_rng(len(moves))
-    noise = angle_walk_rad_sqrt_s(sensor) * SAMPLED_HZ**0.5
+    noise = part.angle_random_walk_rad_sqrt_s * SAMPLED_HZ**0.5
     rates = rates @ mounting.T + noise * rng.standard_normal(rates.shape)
     felt, felt_noise = STANDARD_GRAVITY_M_S2 * up @ mounting.T, 0.0
     if sensor.acceleration is not None:
-        felt_noise = PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 * SAMPLED_HZ**0.5
+        felt_noise = part.acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 * SAMPLED_HZ**0.5
         felt = felt + felt_noise * rng.standard_normal(felt.shape)
     for lasting_s, rest_end_s in (
         (each, end_s) for (each, way), end_s in zip(spans, ends_s, strict=True) if way is None
