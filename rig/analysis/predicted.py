@@ -23,7 +23,7 @@ from rig.data.settings import RunSettings, Uncertainty, settings_of, site_of, un
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
-from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING, Budget, budget
+from rig.estimation.budget import Budget, budget
 from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
@@ -41,16 +41,15 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
-ANEW = (NOISE, WANDERING, FLICKER, STATES)  # repeats lessen these
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
-def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = False) -> dict[str, Budget]:
+def predicted(config: RigConfig, plan: Plan, made: Made) -> dict[str, Budget]:
     """The budget that a run of the plan will have, for each sensor to calibrate.
 
     It is that of the solution which the turner's runs are judged by: of the speeds alone where single readings of its
-    angle scatter. Of an `endless` run, which is repeated without end, nothing is left that comes anew each time.
+    angle scatter.
     Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
     """
     settings = settings_of(config, plan)
@@ -60,8 +59,7 @@ def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = Fals
         surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
         parts = [_part(config, each, sensor, made) for each in _stages(plan, settings)]
         seen = put_together(parts, surroundings)
-        whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
-        found[name] = whole.without(ANEW) if endless else whole
+        found[name] = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
     return found
 
 

@@ -15,7 +15,7 @@ from rig.config.models import RigConfig
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import scale_of
 from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.budget import FLICKER, NOISE, Budget
+from rig.estimation.budget import Budget
 from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_budget import Spread, scale_and_bias
@@ -23,24 +23,15 @@ from rig.estimation.reference_model import matrix
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan
 
-ANEW = (NOISE, FLICKER)  # repeats lessen these
 
-
-def predicted_accelerations(
-    config: RigConfig, plan: Plan, arm: DenavitHartenberg, *, endless: bool = False
-) -> dict[str, Budget]:
+def predicted_accelerations(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> dict[str, Budget]:
     """The budget that a run of the plan will have, for each accelerometer to calibrate, on an `arm` made so.
 
-    Of an `endless` run, which stands in its attitudes without end, nothing is left that comes anew each time.
     Raises LinAlgError where the plan does not tell enough.
     """
     if config.procedure.accelerometer_order == 0:
         return {}
-    found = {}
-    for each in planned_accelerometers(config, plan, arm):
-        whole = _budget(each)
-        found[each.name] = whole.without(ANEW) if endless else whole
-    return found
+    return {each.name: _budget(each) for each in planned_accelerometers(config, plan, arm)}
 
 
 def _budget(of: PlannedAccelerometer) -> Budget:

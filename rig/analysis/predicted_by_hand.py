@@ -5,7 +5,6 @@ found of a hand that has not moved yet.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.by_hand.fit import fit
 from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of
-from rig.estimation.by_hand.solution import CLOCK, RECORDED_HANDS, solution_of
+from rig.estimation.by_hand.solution import solution_of
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import Face, Instruction
 from rig.observation.hand_runs import ITS_OWN_CLOCK, turned_face
@@ -36,22 +35,17 @@ def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
 
 
 def predicted_by_hand(
-    config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float, *, endless: bool = False
+    config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float
 ) -> dict[str, Budget]:
     """The budget that a session of these moves will have, for each sensor to calibrate.
 
-    `section` says how well the item's faces are made. Of an `endless` session only what no reading tells is left.
-    Raises Fault `no_fit`.
+    `section` says how well the item's faces are made. Raises Fault `no_fit`.
     """
     known, said = uncertainty_of(config), by_hand_of(section)
     found = {}
     for name, sensor in config.to_calibrate.items():
         session = _session(sensor, moves, rest_s)
-        solved = solution_of(fit(session, _told(sensor, known, said), trusted=0)).budget
-        if endless:
-            kept = tuple(each for each in solved.contributors if each.name in (CLOCK, RECORDED_HANDS))
-            solved = replace(solved, contributors=kept)
-        found[name] = solved
+        found[name] = solution_of(fit(session, _told(sensor, known, said), trusted=0)).budget
     return found
 
 

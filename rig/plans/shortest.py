@@ -4,7 +4,7 @@ What the file asks for beside the uncertainty stays: order, directions, stages, 
 attitudes where magnetometers need theirs.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -26,7 +26,8 @@ from rig.config.procedure_sections import (
 from rig.config.servo_procedure import ServoSixObservationSection
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.solution import REAL_HANDS
+from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING
+from rig.estimation.by_hand.solution import LINES, REAL_HANDS
 from rig.motion.state import Made
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked
@@ -44,18 +45,23 @@ RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
 # Of the endless run a plan of two repeats is looked at: in one alone, noise weighs too much beside what repeats have
 # alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
 TWICE, HOPELESS = 2, 2.0
+ANEW = NOISE, WANDERING, FLICKER, STATES  # the lines that repeats lessen, of accelerometers too
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
 
 class Tried(Protocol):
-    """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run."""
+    """What may be run: the candidates there are, and what each is predicted to reach, None of what cannot be run.
 
+    The lines of its budgets that come `anew` each time are gone from those of a run that is repeated without end.
+    """
+
+    @property
+    def anew(self) -> Collection[str]: ...
     def candidates(self) -> Sequence[Candidate]: ...
     def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def predict(self, candidate: Candidate) -> Budgets | None: ...
-    def endless(self, candidate: Candidate) -> Budgets | None: ...
     def final(self, best: Planned | None, wanted: Wanted) -> Planned | None: ...
     def directions(self, procedure: ProcedureSection) -> Array | None: ...
 
@@ -69,7 +75,9 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     _refuse_others(wanted, config)
     candidates = what.candidates()
     floors = [
-        (each.family, floor) for each in what.made_endless(candidates) if (floor := what.endless(each)) is not None
+        (each.family, once.without(what.anew))
+        for each in what.made_endless(candidates)
+        if (once := what.predict(each)) is not None
     ]
     able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
     least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
@@ -174,6 +182,7 @@ class _Swept:
     made: Made
     motions: Callable[[RigConfig], Iterator[Motion]]
     waits: tuple[str, ...] = ("rest_s",)
+    anew: Collection[str] = ANEW
 
     def candidates(self) -> Sequence[Candidate]:
         found = []
@@ -237,10 +246,13 @@ class _Swept:
         return [{"rest_s": rests, "dwell_s": len(plan.dwells)}[each] for each in self.waits]
 
     def predict(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=False)
-
-    def endless(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=True)
+        config = self.config.model_copy(update={"procedure": candidate.procedure})
+        plan = plan_of(config, candidate.procedure)
+        try:
+            rates = predicted(config, plan, self.made) if plan.sweeps else {}
+            return Budgets(rates, predicted_accelerations(config, plan, self.made.kinematics))
+        except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
+            return None
 
     def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
         """The run that also ends after an earlier repeat, when U is reached."""
@@ -263,15 +275,6 @@ class _Swept:
                 turned[each.index] = np.array(stage.mount) @ np.array(each.axis_flange)
         return np.array(turned)
 
-    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
-        config = self.config.model_copy(update={"procedure": candidate.procedure})
-        plan = plan_of(config, candidate.procedure)
-        try:
-            rates = predicted(config, plan, self.made, endless=endless) if plan.sweeps else {}
-            return Budgets(rates, predicted_accelerations(config, plan, self.made.kinematics, endless=endless))
-        except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
-            return None
-
     def _procedure(self, **keys: object) -> ProcedureSection:
         return self.config.procedure.model_copy(update=keys)
 
@@ -288,6 +291,7 @@ class _ByHand:
 
     config: RigConfig
     section: ByHandSection
+    anew: Collection[str] = tuple(LINES)  # all that readings tell
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
@@ -303,10 +307,12 @@ class _ByHand:
         return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
 
     def predict(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=False)
-
-    def endless(self, candidate: Candidate) -> Budgets | None:
-        return self._predicted(candidate, endless=True)
+        flips, turns, rest_s = candidate.sizes
+        try:
+            moves = list(listed(Asked(int(flips), int(turns))))
+            return Budgets(predicted_by_hand(self.config, self.section, moves, rest_s))
+        except Fault:
+            return None
 
     def final(self, best: Planned | None, wanted: Wanted) -> Planned | None:
         """The session that also ends before its list, when U is reached: beside what no session shows of hands."""
@@ -323,11 +329,3 @@ class _ByHand:
         procedure = self.section.model_copy(update={"flips": flips, "turns": turns, "rest_s": rest_s})
         lasting_s = duration_s(list(listed(Asked(flips, turns))), rest_s)
         return Candidate(procedure, (), (flips, turns, rest_s), lasting_s)
-
-    def _predicted(self, candidate: Candidate, *, endless: bool) -> Budgets | None:
-        flips, turns, rest_s = candidate.sizes
-        try:
-            moves = list(listed(Asked(int(flips), int(turns))))
-            return Budgets(predicted_by_hand(self.config, self.section, moves, rest_s, endless=endless))
-        except Fault:
-            return None
