@@ -142,7 +142,7 @@ def _calibrated(
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
     used, left_out = _apart(dwells, _wanted(dwells, settings))
     mounting = np.array(sensor.mounting)
-    seen, sweeps = _dwells(used, mounting), _sweeps(name, recordings, mounting)
+    seen, sweeps = _dwells(used, mounting), sweeps_of(_swept(name, recordings), mounting)
     solve = partial(
         solve_accelerometer,
         seen.readings_m_s2,
@@ -222,16 +222,21 @@ def _apart(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
     """The dwells a calibration is made from, and the last repeat of the attitudes where there are several."""
-    repeat = {each.index: each.repeat for each in planned}
-    if missing := sorted(repeat.keys() - {dwell.index for dwell in dwells}):
+    if missing := {each.index for each in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",
-            f"{len(missing)} of {len(repeat)} dwells were not finished",
+            f"{len(missing)} of {len(planned)} dwells were not finished",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
-    last = max(repeat.values())
-    used = tuple(dwell for dwell in dwells if last == 0 or repeat[dwell.index] < last)
-    return used, tuple(dwell for dwell in dwells if last > 0 and repeat[dwell.index] == last)
+    last = held_out(planned)
+    used = tuple(dwell for dwell in dwells if dwell.index not in last)
+    return used, tuple(dwell for dwell in dwells if dwell.index in last)
+
+
+def held_out(planned: Sequence[PlannedDwell]) -> frozenset[int]:
+    """The last repeat of the attitudes, by the dwells' indices; none where they are gone through once."""
+    last = max(each.repeat for each in planned)
+    return frozenset(each.index for each in planned if each.repeat == last > 0)
 
 
 def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
@@ -243,9 +248,8 @@ def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
     )
 
 
-def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sweeps:
+def sweeps_of(found: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
     """All that was swept, in the axes of the sensor as it is nominally mounted."""
-    found = _swept(name, recordings)
     if not found:
         return NO_SWEEPS
     stations = list(dict.fromkeys(each.station for each in found))

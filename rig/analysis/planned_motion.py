@@ -1,15 +1,21 @@
-"""A plan as if it had been recorded: when the arm would be where. Pure."""
+"""A plan as if it had been recorded: when the arm would be where, and how it would turn. Pure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from rig.motion.geometry import DenavitHartenberg
-from rig.motion.state import state_dtype
+from rig.config.models import RigConfig
+from rig.data.recorded_sensor import AS_THE_FLANGE, Mounting
+from rig.data.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
+from rig.estimation.arrays import Array
+from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
+from rig.motion.state import Joints, state_dtype
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
-from rig.observation.arm_motion import ArmMotion
+from rig.observation.arm_motion import ATTITUDES, ArmMotion
+from rig.observation.revolution import Revolution
 
 STATE_RATE_HZ = 125.0
 STANDING_S = 1.0  # before the first step and after the last
@@ -18,12 +24,33 @@ StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedRun:
+    """A recording that a plan will give, of a chain of joints made so (`arm`), and what is stated beforehand.
+
+    Its clock begins `since_s` after that of the run's first recording.
+    """
+
+    plan: Plan
+    arm: DenavitHartenberg
+    settings: RunSettings
+    site: Site
+    known: Uncertainty
+    since_s: float = 0.0
+
+
+def planned_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRun:
+    """A new run of the plan. Raises Refused as `settings_of`."""
+    return PlannedRun(plan, arm, settings_of(config, plan), site_of(config.site), uncertainty_of(config))
+
+
+@dataclass(frozen=True, slots=True)
 class Timed(Generic[StepT_co]):
-    """A step, and when it begins and ends."""
+    """A step, when it begins and ends, and the joint angles where it begins."""
 
     step: StepT_co
     start_s: float
     end_s: float
+    q_rad: Joints
 
     @property
     def window_s(self) -> tuple[float, float]:
@@ -36,10 +63,70 @@ class Timed(Generic[StepT_co]):
 
 def timed(plan: Plan) -> Iterator[Timed[Step]]:
     """Every step of it, one after the other; no sensor takes long to settle before a dwell."""
-    time_s = STANDING_S
+    time_s, q_rad = STANDING_S, plan.start_q_rad
     for step in plan.steps:
-        yield Timed(step, time_s, time_s + step.duration_s)
+        yield Timed(step, time_s, time_s + step.duration_s, q_rad)
         time_s += step.duration_s
+        q_rad = step.target_q_rad if isinstance(step, (Sweep, Transfer)) else q_rad
+
+
+def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
+    """The plan's steps of one kind, its sweeps alone or its dwells, with their times."""
+    return [
+        Timed(each.step, each.start_s, each.end_s, each.q_rad) for each in timed(plan) if isinstance(each.step, kind)
+    ]
+
+
+def measured(plan: Plan) -> Iterator[Timed[Step]]:
+    """What a plan measures: its sweeps, rests and dwells, with their times."""
+    return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))
+
+
+def planned_turn(at: Timed[Sweep], arm: DenavitHartenberg, mount: Mounting = AS_THE_FLANGE) -> Revolution:
+    """The turn of a sweep, or its arc, as `ArmMotion.turn` will find it."""
+    sweep = at.step
+    axis, errors, attitude, arm_m = _where_it_began(arm, sweep.began_q_rad, sweep.joint, mount)
+    return Revolution(
+        *at.window_s,
+        duration_std_s=0.0,
+        axis_flange=sweep.growing * axis,
+        attitude=attitude,
+        axis_errors=sweep.growing * errors,
+        arm_m=arm_m,
+        station=(sweep.joint, *np.round(np.delete(sweep.began_q_rad, sweep.joint), 2).tolist()),
+        angle_rad=sweep.angle_rad,
+    )
+
+
+def planned_attitude(at: Timed[Step], arm: DenavitHartenberg, mount: Mounting = AS_THE_FLANGE) -> Array:
+    """The mean attitude (3, 3) over a sweep's turn, or of a rest or a dwell, as `ArmMotion.attitude` will find it."""
+    if isinstance(at.step, Sweep):
+        return _mean_attitude(arm, at.step.began_q_rad, at.step.joint, at.step.growing * at.step.angle_rad, mount)
+    return _mean_attitude(arm, at.q_rad, 0, 0.0, mount)
+
+
+@lru_cache(maxsize=512)
+def _where_it_began(
+    arm: DenavitHartenberg, began_q_rad: Joints, joint: int, mount: Mounting
+) -> tuple[Array, Array, Array, Array]:
+    """The axis (3,) of a growing angle, its errors, the attitude and the arm as `Revolution` has them."""
+    q_rad, to_item = np.array(began_q_rad), np.array(mount)
+    return (
+        to_item @ flange_axes(q_rad, arm)[:, joint],
+        axis_errors(q_rad, joint, arm) @ to_item.T,
+        to_item @ flange_attitude(q_rad, arm),
+        to_item @ flange_arm(q_rad, joint, arm),
+    )
+
+
+@lru_cache(maxsize=512)
+def _mean_attitude(
+    arm: DenavitHartenberg, began_q_rad: Joints, joint: int, turned_rad: float, mount: Mounting
+) -> Array:
+    q_rad = np.tile(began_q_rad, (ATTITUDES, 1))
+    q_rad[:, joint] += turned_rad * (np.arange(ATTITUDES) + 0.5) / ATTITUDES
+    mean: Array = np.array(mount) @ flange_attitude(q_rad, arm).mean(axis=0)
+    return mean
 
 
 def planned_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
@@ -59,13 +146,3 @@ def planned_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
             q_rad[since] = start + share * (target - start)
     states["q_rad"] = q_rad
     return ArmMotion(states, arm)
-
-
-def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
-    """The plan's steps of one kind, its sweeps alone or its dwells, with their times."""
-    return [Timed(each.step, each.start_s, each.end_s) for each in timed(plan) if isinstance(each.step, kind)]
-
-
-def measured(plan: Plan) -> Iterator[Timed[Step]]:
-    """What a plan measures: its sweeps, rests and dwells, with their times."""
-    return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))
