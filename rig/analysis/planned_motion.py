@@ -8,7 +8,6 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.data.recorded_sensor import AS_THE_FLANGE, Mounting
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of, site_of, uncertainty_of
 from rig.estimation.arrays import Array
 from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
@@ -82,50 +81,38 @@ def measured(plan: Plan) -> Iterator[Timed[Step]]:
     return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))
 
 
-def planned_turn(at: Timed[Sweep], arm: DenavitHartenberg, mount: Mounting = AS_THE_FLANGE) -> Revolution:
-    """The turn of a sweep, or its arc, as `ArmMotion.turn` will find it."""
-    sweep = at.step
-    axis, errors, attitude, arm_m = _where_it_began(arm, sweep.began_q_rad, sweep.joint, mount)
+def planned_turn(at: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
+    """The turn of a sweep, or its arc, as `ArmMotion.turn` will find it where the item is mounted so (3, 3)."""
+    sweep, began = at.step, at.step.began_q_rad
     return Revolution(
         *at.window_s,
         duration_std_s=0.0,
-        axis_flange=sweep.growing * axis,
-        attitude=attitude,
-        axis_errors=sweep.growing * errors,
-        arm_m=arm_m,
-        station=(sweep.joint, *np.round(np.delete(sweep.began_q_rad, sweep.joint), 2).tolist()),
+        axis_flange=sweep.growing * mount @ _axes(began, arm)[:, sweep.joint],
+        attitude=mount @ _attitude(began, arm),
+        axis_errors=sweep.growing * _axis_errors(began, sweep.joint, arm) @ mount.T,
+        arm_m=mount @ _arm(began, sweep.joint, arm),
+        station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
         angle_rad=sweep.angle_rad,
     )
 
 
-def planned_attitude(at: Timed[Step], arm: DenavitHartenberg, mount: Mounting = AS_THE_FLANGE) -> Array:
+def planned_attitude(at: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
     """The mean attitude (3, 3) over a sweep's turn, or of a rest or a dwell, as `ArmMotion.attitude` will find it."""
-    if isinstance(at.step, Sweep):
-        return _mean_attitude(arm, at.step.began_q_rad, at.step.joint, at.step.growing * at.step.angle_rad, mount)
-    return _mean_attitude(arm, at.q_rad, 0, 0.0, mount)
+    if not isinstance(at.step, Sweep):
+        return mount @ _attitude(at.q_rad, arm)
+    return mount @ _mean_attitude(at.step.began_q_rad, at.step.joint, at.step.growing * at.step.angle_rad, arm)
+
+
+# Each pose comes again in every repeat, and in most of the plans that a search looks at.
+_axes, _axis_errors = lru_cache(maxsize=512)(flange_axes), lru_cache(maxsize=512)(axis_errors)
+_attitude, _arm = lru_cache(maxsize=512)(flange_attitude), lru_cache(maxsize=512)(flange_arm)
 
 
 @lru_cache(maxsize=512)
-def _where_it_began(
-    arm: DenavitHartenberg, began_q_rad: Joints, joint: int, mount: Mounting
-) -> tuple[Array, Array, Array, Array]:
-    """The axis (3,) of a growing angle, its errors, the attitude and the arm as `Revolution` has them."""
-    q_rad, to_item = np.array(began_q_rad), np.array(mount)
-    return (
-        to_item @ flange_axes(q_rad, arm)[:, joint],
-        axis_errors(q_rad, joint, arm) @ to_item.T,
-        to_item @ flange_attitude(q_rad, arm),
-        to_item @ flange_arm(q_rad, joint, arm),
-    )
-
-
-@lru_cache(maxsize=512)
-def _mean_attitude(
-    arm: DenavitHartenberg, began_q_rad: Joints, joint: int, turned_rad: float, mount: Mounting
-) -> Array:
+def _mean_attitude(began_q_rad: Joints, joint: int, turned_rad: float, arm: DenavitHartenberg) -> Array:
     q_rad = np.tile(began_q_rad, (ATTITUDES, 1))
     q_rad[:, joint] += turned_rad * (np.arange(ATTITUDES) + 0.5) / ATTITUDES
-    mean: Array = np.array(mount) @ flange_attitude(q_rad, arm).mean(axis=0)
+    mean: Array = flange_attitude(q_rad, arm).mean(axis=0)
     return mean
 
 

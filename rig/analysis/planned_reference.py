@@ -65,7 +65,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
         Dwells(
             readings_m_s2=np.zeros((len(dwells), 3)),
             variances_m2_s4=np.array([np.full(3, noise_m_s2_sqrt_hz**2 / each.step.duration_s) for each in dwells]),
-            attitudes=np.array([(mounting @ planned_attitude(each, run.arm)).T for each in dwells]),
+            attitudes=np.array([planned_attitude(each, run.arm, mounting).T for each in dwells]),
         ),
         sweeps_of(swept, mounting),
         run.known.repeatability_std_rad,
@@ -89,7 +89,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
 
 
 def _swept(at: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:
-    turn = planned_turn(at, arm)
+    turn = planned_turn(at, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # mean, cosine and sine of so many readings
     harmonic = FirstHarmonic(
         harmonic_m_s2=np.zeros((3, 3)),

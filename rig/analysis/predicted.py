@@ -149,13 +149,13 @@ def _average(at: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average
         start_s=start_s,
         end_s=end_s,
         temperature_c=ROOM_C,
-        attitude=planned_attitude(at, run.arm, run.settings.mount),
+        attitude=planned_attitude(at, run.arm, np.array(run.settings.mount)),
         freedom=float(samples - 1),
     )
 
 
 def _turn(at: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
-    sweep, turn = at.step, planned_turn(at, run.arm, run.settings.mount)
+    sweep, turn = at.step, planned_turn(at, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(
         sweep=sweep.index,
