@@ -307,9 +307,9 @@ class _ByHand:
         return [self._candidate(each, int(turns), rest_s) for each in range(below + 1, int(flips))]
 
     def predict(self, candidate: Candidate) -> Budgets | None:
-        flips, turns, rest_s = candidate.sizes
+        flips, turns, rest_s = (getattr(candidate.procedure, each) for each in ("flips", "turns", "rest_s"))
         try:
-            moves = list(listed(Asked(int(flips), int(turns))))
+            moves = list(listed(Asked(flips, turns)))
             return Budgets(predicted_by_hand(self.config, self.section, moves, rest_s))
         except Fault:
             return None
