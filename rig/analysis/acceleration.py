@@ -137,7 +137,7 @@ def _calibrated(
     used, left_out = _apart(dwells, _wanted(dwells, settings))
     mounting = np.array(sensor.mounting)
     seen, swept = seen_in(used, mounting), _swept(name, recordings)
-    sweeps = _sweeps(swept, mounting)
+    sweeps = sweeps_of(swept, mounting)
     solve = partial(
         solve_triaxial,
         seen.readings_m_s2,
@@ -212,19 +212,24 @@ def _apart(
     dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
 ) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
     """The dwells a calibration is made from, and the last repeat of the attitudes where there are several."""
-    repeat = {each.index: each.repeat for each in planned}
-    if missing := sorted(repeat.keys() - {dwell.index for dwell in dwells}):
+    if missing := {each.index for each in planned} - {dwell.index for dwell in dwells}:
         raise Fault(
             "not_all_attitudes",
-            f"{len(missing)} of {len(repeat)} dwells were not finished",
+            f"{len(missing)} of {len(planned)} dwells were not finished",
             "Go on with `rig resume RUN_DIR`, or run the procedure again",
         )
-    last = max(repeat.values())
-    used = tuple(dwell for dwell in dwells if last == 0 or repeat[dwell.index] < last)
-    return used, tuple(dwell for dwell in dwells if last > 0 and repeat[dwell.index] == last)
+    last = held_out(planned)
+    used = tuple(dwell for dwell in dwells if dwell.index not in last)
+    return used, tuple(dwell for dwell in dwells if dwell.index in last)
 
 
-def _sweeps(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
+def held_out(planned: Sequence[PlannedDwell]) -> frozenset[int]:
+    """The last repeat of the attitudes, by the dwells' indices; none where they are gone through once."""
+    last = max(each.repeat for each in planned)
+    return frozenset(each.index for each in planned if each.repeat == last > 0)
+
+
+def sweeps_of(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
     """All that was swept, in the axes of the sensor as it is nominally mounted."""
     if not swept:
         return NO_SWEEPS

@@ -9,6 +9,7 @@ from rig.analysis import reference_consistency
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
+from rig.analysis.planned_motion import PlannedRun, planned_run
 from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.planned_reference import planned_accelerometers, planned_read
 from rig.analysis.suspected import DAMAGES
@@ -18,7 +19,6 @@ from rig.config.models import ArmSection, RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan, Rest
@@ -38,22 +38,17 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
     For a `turner` made so, an arm as its model is drawn, and for a sensor as its data sheet has it, which nothing but
     its noise and its flicker makes wander. Of a plan over temperature one set is reckoned.
     """
-    plan = _one_set(plan)
-    settings = settings_of(config, plan)
-    site, known = settings.site, settings.uncertainty
-    if site is None or known is None or turner.joints == 0:  # None in settings of before
+    if turner.joints == 0:
         return Told({}, {})
+    run = planned_run(config, _one_set(plan), turner)
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
     rates: dict[str, tuple[ToldFrom, ...]] = {}
-    if plan.sweeps and not plan.stages:  # what several mountings tell together is not foretold
-        turned = planned_pieces(plan, site, np.array(settings.extension_m), turner)
-        rates = {
-            name: _told_from(name, each, turned, settings, rate, site=site, known=known)
-            for name, each in config.to_calibrate.items()
-        }
-    on_arm = isinstance(config.turner, ArmSection) and plan.dwells
-    read = {each.name: planned_read(each) for each in planned_accelerometers(config, plan, turner)} if on_arm else {}
+    if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
+        turned = planned_pieces(run)
+        rates = {name: _told_from(run, name, each, turned, rate) for name, each in config.to_calibrate.items()}
+    on_arm = isinstance(config.turner, ArmSection) and run.plan.dwells
+    read = {each.name: planned_read(each) for each in planned_accelerometers(config, run)} if on_arm else {}
     found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
 
@@ -64,29 +59,19 @@ def _one_set(plan: Plan) -> Plan:
     return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 
 
-def _told_from(
-    name: str,
-    sensor: SensorSection,
-    turned: Planned,
-    settings: RunSettings,
-    rate: float,
-    *,
-    site: Site,
-    known: Uncertainty,
-) -> tuple[ToldFrom, ...]:
+def _told_from(run: PlannedRun, name: str, sensor: SensorSection, turned: Planned, rate: float) -> tuple[ToldFrom, ...]:
     matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
-    noise_rad_s_sqrt_hz = np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60
-    seen = turned.read_by(matrix, float(noise_rad_s_sqrt_hz), sensor.rate_hz)
+    seen = turned.read_by(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     at_s = seen.pieces.times_s.mean(axis=1)
-    speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in settings.planned_sweeps]))
+    speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in run.plan.sweeps]))
     allowed = allowed_of(
-        known,
+        run.known,
         of,
         finds_curve=len(speeds) > 1,
-        arcs=settings.has_arcs,
+        arcs=run.settings.has_arcs,
         jitter_s=0.0,
-        earth_rad_s=any_earth_rate(known=site.earth_rate_rad_s is not None or settings.finds_earth_rate),
-        sensor=known_sensor(known, of, np.zeros(len(at_s)), 0.0),
+        earth_rad_s=any_earth_rate(known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
+        sensor=known_sensor(run.known, of, np.zeros(len(at_s)), 0.0),
         at_s=at_s,
     )
     found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))

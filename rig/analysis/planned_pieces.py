@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
-from rig.analysis.planned_motion import measured, planned_motion
-from rig.analysis.ways import SPARSE_S, STEPS, by_the_wrists, moved, pull_m_s2
-from rig.data.settings import Site
+from rig.analysis.planned_motion import PlannedRun, measured, planned_motion
+from rig.analysis.ways import SPARSE_S, by_the_wrists, moved, pull_m_s2
 from rig.estimation.arrays import Array
-from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan, Sweep
+from rig.observation.arm_beside_lines import turned
 from rig.observation.arm_motion import ArmMotion
+from rig.observation.lines import NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,14 +23,14 @@ class Planned:
     pieces: Pieces
     ways: Pieces
 
-    def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float, rate_hz: float) -> "Planned":
+    def read_by(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "Planned":
         """The pieces read by a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T.
 
         Samples that are too far apart tell nothing of the ways.
         """
 
         def read(pieces: Pieces) -> Pieces:
-            variances = noise_rad_s_sqrt_hz**2 / np.diff(pieces.times_s) * np.ones(3)
+            variances = angle_random_walk_rad_sqrt_s**2 / np.diff(pieces.times_s) * np.ones(3)
             return replace(pieces, means_rad_s=pieces.rates_rad_s @ matrix.T, variances_rad2_s2=variances)
 
         return Planned(read(self.pieces), read(self.ways if 1 / rate_hz <= SPARSE_S else self.pieces))
@@ -43,11 +43,11 @@ class _Part:
     stretch: Stretch
 
 
-def planned_pieces(plan: Plan, site: Site, extension_m: Array, arm: DenavitHartenberg) -> Planned:
-    """A plan's pieces on an arm made so, sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
-    motion = planned_motion(plan, arm)
-    parts = list(_parts(plan, motion))
-    ways = [_Part(REST - 1 - place, 0.0, way) for place, way in enumerate(_ways(plan, motion))]
+def planned_pieces(run: PlannedRun) -> Planned:
+    """The pieces of a planned run. Raises Fault `no_motion`."""
+    motion, extension_m = planned_motion(run.plan, run.arm), np.array(run.settings.extension_m)
+    parts = list(_parts(run.plan, motion))
+    ways = [_Part(REST - 1 - place, 0.0, way) for place, way in enumerate(_ways(run.plan, motion))]
 
     def pieces(of: Sequence[_Part]) -> Pieces:
         stretches = tuple(each.stretch for each in of)
@@ -57,8 +57,8 @@ def planned_pieces(plan: Plan, site: Site, extension_m: Array, arm: DenavitHarte
             place=np.array([each.place for each in of]),
             means_rad_s=nothing,
             variances_rad2_s2=nothing,
-            rates_rad_s=np.array([np.zeros(3) if each.sweep == REST else _rate(each.stretch) for each in of]),
-            pull_m_s2=np.array([pull_m_s2(each, site.down_m_s2, extension_m) for each in stretches]),
+            rates_rad_s=np.array([turned(motion, each.start_s, each.end_s, NONE, 1)[0] for each in stretches]),
+            pull_m_s2=np.array([pull_m_s2(each, run.site.down_m_s2, extension_m) for each in stretches]),
             attitudes=np.array([motion.attitude(each.start_s, each.end_s) for each in stretches]),
             speed_std=np.zeros(len(of)),
             times_s=np.array([(each.start_s, each.end_s) for each in stretches]),
@@ -96,10 +96,3 @@ def _ways(plan: Plan, motion: ArmMotion) -> Iterator[Stretch]:
         way = moved(motion, start_s, end_s)
         if way is not None and by_the_wrists(way):
             yield way
-
-
-def _rate(stretch: Stretch) -> Array:
-    """(3,) rad/s of the flange, in the mean."""
-    edges = np.linspace(stretch.start_s, stretch.end_s, 8 * STEPS + 1)
-    rate: Array = stretch.motion.rate((edges[1:] + edges[:-1]) / 2).mean(axis=0)
-    return rate

@@ -5,13 +5,22 @@ says how the sensor scatters. That is all the budget of a run is made of, but fo
 beside its flicker, and how far it warmed, which readings alone tell.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from rig.analysis.clock import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
-from rig.analysis.planned_motion import STANDING_S, Timed, timed
+from rig.analysis.planned_motion import (
+    STANDING_S,
+    PlannedRun,
+    Timed,
+    measured,
+    planned_attitude,
+    planned_run,
+    planned_turn,
+    timed_of,
+)
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import Part, known_sensor, put_together, unknown_of
 from rig.config.models import RigConfig
@@ -19,17 +28,15 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import rotation_by
-from rig.data.settings import RunSettings, Uncertainty, settings_of, site_of, uncertainty_of
+from rig.data.settings import Uncertainty
 from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
-from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING, Budget, budget
+from rig.estimation.budget import Budget, budget
 from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
-from rig.motion.geometry import DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_axes
-from rig.motion.state import Joints, Made
-from rig.motion.steps import TURN_RAD, Dwell, Plan, Rest, Sweep, closes
-from rig.observation.arm_motion import ATTITUDES
+from rig.motion.state import Made
+from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
 from rig.observation.observe import REST_SETTLING_S, Observation, nearest_axis
@@ -41,32 +48,23 @@ REMOUNTING_S = 60.0  # between two stages, assumed
 # How far off its nominal mounting a sensor sits, in all, where no `uncertainty.mount_deg` says it of an item that is
 # mounted anew; assumed. The farther it does, the more do the axes of arm and sensor matter.
 SITS_OFF_DEG = 5.0
-ANEW = (NOISE, WANDERING, FLICKER, STATES)  # repeats lessen these
 ASKING_STD_S = 0.9e-3  # of the moment of a reading within the 3 ms that asking a servo takes
 STATE_JITTER_S = 2e-6  # of an arm's states, as runs with controllers of real time find it
 
 
-def angle_walk_rad_sqrt_s(sensor: SensorSection) -> float:
-    """What noise alone makes of an angle in a second, by the data sheet: rad/√s, a standard deviation."""
-    return float(np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60)
-
-
-def predicted(config: RigConfig, plan: Plan, made: Made, *, endless: bool = False) -> dict[str, Budget]:
+def predicted(config: RigConfig, plan: Plan, made: Made) -> dict[str, Budget]:
     """The budget that a run of the plan will have, for each sensor to calibrate.
 
     It is that of the solution which the turner's runs are judged by: of the speeds alone where single readings of its
-    angle scatter. Of an `endless` run, which is repeated without end, nothing is left that comes anew each time.
+    angle scatter.
     Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
     """
-    settings = settings_of(config, plan)
-    site, known = site_of(config.site), uncertainty_of(config)
-    found = {}
+    run, found = planned_run(config, plan, made.kinematics), {}
     for name, sensor in config.to_calibrate.items():
-        surroundings = Surroundings(site, known, _clock(known, on_board=sensor.on_board), _jitter_s(made))
-        parts = [_part(config, each, sensor, made) for each in _stages(plan, settings)]
+        surroundings = Surroundings(run.site, run.known, _clock(run.known, on_board=sensor.on_board), _jitter_s(made))
+        parts = [_part(config, each, sensor, made) for each in _stages(run)]
         seen = put_together(parts, surroundings)
-        whole = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
-        found[name] = whole.without(ANEW) if endless else whole
+        found[name] = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
     return found
 
 
@@ -117,77 +115,63 @@ def _jitter_s(made: Made) -> float:
     return 0.0 if made.reading_std_rad else STATE_JITTER_S  # what scatters tells no jitter beside
 
 
-def _stages(plan: Plan, settings: RunSettings) -> list[tuple[Plan, RunSettings, float]]:
-    """The plan cut into its stages, each with its settings and when it begins; one of a plan without."""
-    if not plan.stages:
-        return [(plan, settings, 0.0)]
-    begins = [stage.begins for stage in plan.stages]
-    found, since_s = [], 0.0
-    for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(plan.steps)], strict=True)):
-        own = replace(plan, steps=plan.steps[first:last], stages=())
-        found.append((own, replace(settings, stage=number), since_s))
+def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
+    """The recordings of a run, one of each stage of its plan; the run itself of a plan without."""
+    begins, since_s = [stage.begins for stage in run.plan.stages] or [0], 0.0
+    for number, (first, last) in enumerate(zip(begins, [*begins[1:], len(run.plan.steps)], strict=True)):
+        own = replace(run.plan, steps=run.plan.steps[first:last], stages=())
+        yield replace(run, plan=own, settings=replace(run.settings, stage=number), since_s=since_s)
         since_s += own.duration_s + 2 * STANDING_S + REMOUNTING_S
-    return found
 
 
-def _part(config: RigConfig, stage: tuple[Plan, RunSettings, float], sensor: SensorSection, made: Made) -> Part:
-    """What a recording of a stage would tell."""
-    plan, settings, since_s = stage
-    mount = np.array(settings.mount)
-    turns, rests, here = list[Observation](), list[Average](), plan.start_q_rad
-    for each in timed(plan):
-        if isinstance(each.step, Sweep):
-            turned = Timed(each.step, each.start_s, each.end_s)
-            turns.append(_turn(turned, sensor, made, mount, _scatter(config, each.step, made)))
-        elif isinstance(each.step, (Rest, Dwell)):
-            here = each.step.q_rad if isinstance(each.step, Dwell) else here
-            window_s = each.start_s + REST_SETTLING_S, each.end_s - REST_SETTLING_S
-            if (window_s[1] - window_s[0]) * sensor.rate_hz >= MIN_SAMPLES_AT_REST:
-                rests.append(_average(window_s, sensor, mount @ _attitude(made.kinematics, here)))
-            continue
-        here = getattr(each.step, "target_q_rad", here)
-    return Part(turns, rests, since_s, settings, mount)
+def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, made: Made) -> Part:
+    """What a recording would tell."""
+    turns = [_turn(each, run, sensor, _scatter(config, each.step, made)) for each in timed_of(run.plan, Sweep)]
+    still = [
+        replace(each, start_s=each.start_s + REST_SETTLING_S, end_s=each.end_s - REST_SETTLING_S)
+        for each in measured(run.plan)
+        if not isinstance(each.step, Sweep)
+    ]
+    told = [each for each in still if (each.end_s - each.start_s) * sensor.rate_hz >= MIN_SAMPLES_AT_REST]
+    rests = [_average(each, run, sensor) for each in told]
+    return Part(turns, rests, run.since_s, run.settings, np.array(run.settings.mount))
 
 
-def _average(window_s: tuple[float, float], sensor: SensorSection, attitude: Array) -> Average:
-    lasting_s = window_s[1] - window_s[0]
+def _average(at: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
+    start_s, end_s = at.window_s
+    lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
     samples = max(round(lasting_s * sensor.rate_hz), 2)
     return Average(
         mean_rad_s=np.zeros(3),
-        variance_rad2_s2=np.full(3, angle_walk_rad_sqrt_s(sensor) ** 2 / lasting_s),
-        noise_rad_s=np.full(3, angle_walk_rad_sqrt_s(sensor) * sensor.rate_hz**0.5),
+        variance_rad2_s2=np.full(3, walk_rad_sqrt_s**2 / lasting_s),
+        noise_rad_s=np.full(3, walk_rad_sqrt_s * sensor.rate_hz**0.5),
         samples=samples,
-        start_s=window_s[0],
-        end_s=window_s[1],
+        start_s=start_s,
+        end_s=end_s,
         temperature_c=ROOM_C,
-        attitude=attitude,
+        attitude=planned_attitude(at, run.arm, np.array(run.settings.mount)),
         freedom=float(samples - 1),
     )
 
 
-def _turn(at: Timed[Sweep], sensor: SensorSection, made: Made, mount: Array, speed_std: float) -> Observation:
-    sweep = at.step
-    growing = 1.0 if sweep.direction == "ccw" else -1.0
-    began, attitude = _through(made.kinematics, sweep.start_q_rad, sweep.joint, sweep.revolution_rad)
-    if sweep.direction == "cw":
-        began = (*began[: sweep.joint], sweep.revolution_rad[1], *began[sweep.joint + 1 :])
-    axis = growing * mount @ _axes(made.kinematics, began)[:, sweep.joint]
-    nearest, sign = nearest_axis(mounting_matrix(sensor.mounting) @ axis)
+def _turn(at: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
+    sweep, turn = at.step, planned_turn(at, run.arm, np.array(run.settings.mount))
+    axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(
         sweep=sweep.index,
         joint_name=sweep.joint_name,
         direction=sweep.direction,
-        axis=nearest,
+        axis=axis,
         sign=sign,
-        axis_flange=axis,
+        axis_flange=turn.axis_flange,
         speed_rad_s=sweep.speed_rad_s,
         speed_std_rad_s=speed_std * sweep.speed_rad_s,
         lost=0,
-        average=_average(at.window_s, sensor, mount @ attitude),
-        axis_errors=growing * _axis_errors(made.kinematics, began, sweep.joint) @ mount.T,
-        arm_m=mount @ _arm(made.kinematics, began, sweep.joint),
-        angle_rad=sweep.angle_rad,
-        arc_rad=None if closes(sweep.angle_rad) else sweep.revolution_rad,
+        average=_average(at, run, sensor),
+        axis_errors=turn.axis_errors,
+        arm_m=turn.arm_m,
+        angle_rad=turn.angle_rad,
+        arc_rad=None if turn.closed else sweep.revolution_rad,
     )
 
 
@@ -203,35 +187,3 @@ def _scatter(config: RigConfig, sweep: Sweep, made: Made) -> float:
     places = (whole_rad - 2 * ramp_rad - TURN_RAD) / sweep.speed_rad_s * config.turner.state_rate_hz
     scatter_rad = np.hypot(made.reading_std_rad, ASKING_STD_S * sweep.speed_rad_s)
     return float(scatter_rad * np.sqrt(2 / max(places, 1.0)) / TURN_RAD)
-
-
-@lru_cache(maxsize=512)
-def _through(
-    arm: DenavitHartenberg, start_q_rad: Joints, joint: int, ends_rad: tuple[float, float]
-) -> tuple[Joints, Array]:
-    """Joint angles at the lower end of a sweep's turn, and the mean attitude (3, 3) over it."""
-    low, high = ends_rad
-    q_rad = np.tile(start_q_rad, (ATTITUDES, 1))
-    q_rad[:, joint] = np.linspace(low, high, ATTITUDES, endpoint=False) + (high - low) / (2 * ATTITUDES)
-    mean: Array = flange_attitude(q_rad, arm).mean(axis=0)
-    return (*start_q_rad[:joint], low, *start_q_rad[joint + 1 :]), mean
-
-
-@lru_cache(maxsize=512)
-def _attitude(arm: DenavitHartenberg, q_rad: Joints) -> Array:
-    return flange_attitude(np.array(q_rad), arm)
-
-
-@lru_cache(maxsize=512)
-def _axes(arm: DenavitHartenberg, q_rad: Joints) -> Array:
-    return flange_axes(q_rad, arm)
-
-
-@lru_cache(maxsize=512)
-def _axis_errors(arm: DenavitHartenberg, q_rad: Joints, joint: int) -> Array:
-    return axis_errors(q_rad, joint, arm)
-
-
-@lru_cache(maxsize=512)
-def _arm(arm: DenavitHartenberg, q_rad: Joints, joint: int) -> Array:
-    return flange_arm(np.array(q_rad), joint, arm)

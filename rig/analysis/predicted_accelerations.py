@@ -9,13 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig.analysis.planned_motion import planned_run
 from rig.analysis.planned_reference import PlannedAccelerometer, planned_accelerometers, planned_read
 from rig.analysis.reference_budgets import accelerometer_lines
 from rig.config.models import RigConfig
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import scale_of
 from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.budget import FLICKER, NOISE, Budget
+from rig.estimation.budget import Budget
 from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_budget import Spread, scale_and_bias
@@ -23,37 +24,28 @@ from rig.estimation.reference_model import matrix
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Plan
 
-ANEW = (NOISE, FLICKER)  # repeats lessen these
 
-
-def predicted_accelerations(
-    config: RigConfig, plan: Plan, arm: DenavitHartenberg, *, endless: bool = False
-) -> dict[str, Budget]:
+def predicted_accelerations(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> dict[str, Budget]:
     """The budget that a run of the plan will have, for each accelerometer to calibrate, on an `arm` made so.
 
-    Of an `endless` run, which stands in its attitudes without end, nothing is left that comes anew each time.
     Raises LinAlgError where the plan does not tell enough.
     """
     if config.procedure.accelerometer_order == 0:
         return {}
-    found = {}
-    for each in planned_accelerometers(config, plan, arm):
-        whole = _budget(each)
-        found[each.name] = whole.without(ANEW) if endless else whole
-    return found
+    return {each.name: _budget(each) for each in planned_accelerometers(config, planned_run(config, plan, arm))}
 
 
 def _budget(of: PlannedAccelerometer) -> Budget:
-    read, known = planned_read(of), of.known
-    off_rad = float(np.radians(known.axis_deg) / np.sqrt(3))
-    movement = replace(read.movement, own_share=_own_share(known))
-    covariance, response = covariance_bound(read.theta, movement, off_rad, second_order=of.settings.second_order)
+    read, run = planned_read(of), of.run
+    off_rad = float(np.radians(run.known.axis_deg) / np.sqrt(3))
+    movement = replace(read.movement, own_share=_own_share(run.known))
+    covariance, response = covariance_bound(read.theta, movement, off_rad, second_order=read.second_order)
     scale = scale_of(matrix(read.theta))
     told = scale_and_bias(matrix(read.theta), scale, len(read.theta))
     off = AttitudeError(off_rad, 0.0)
     spread = Spread(scale, told @ covariance @ told.T, told @ response, movement.noise(), off, 0.0, 0)
-    lag_s = 1e-3 * known.acceleration_lag_ms
-    return accelerometer_lines(spread, read.theta, movement, of.site, lag_s, sheet=of.sheet)
+    lag_s = 1e-3 * run.known.acceleration_lag_ms
+    return accelerometer_lines(spread, read.theta, movement, run.site, lag_s, sheet=of.sheet)
 
 
 def _own_share(known: Uncertainty) -> float:

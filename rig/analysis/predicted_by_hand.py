@@ -5,11 +5,9 @@ found of a hand that has not moved yet.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.predicted import angle_walk_rad_sqrt_s
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
@@ -19,11 +17,12 @@ from rig.data.settings import ByHand, Uncertainty, by_hand_of, uncertainty_of
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.by_hand.fit import fit
-from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of
-from rig.estimation.by_hand.solution import CLOCK, RECORDED_HANDS, solution_of
+from rig.estimation.by_hand.session import Handled, Told, axis_of
+from rig.estimation.by_hand.solution import solution_of
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import Face, Instruction
 from rig.observation.hand_runs import ITS_OWN_CLOCK, turned_face
+from rig.observation.handled import handled
 
 FLIP_S, TURN_S = 1.5, 2.5  # a move, from rest to rest; assumed
 ASKED_S = 1.0  # from the end of a rest to the next move: somebody reads what is asked for; assumed
@@ -37,22 +36,17 @@ def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
 
 
 def predicted_by_hand(
-    config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float, *, endless: bool = False
+    config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float
 ) -> dict[str, Budget]:
     """The budget that a session of these moves will have, for each sensor to calibrate.
 
-    `section` says how well the item's faces are made. Of an `endless` session only what no reading tells is left.
-    Raises Fault `no_fit`.
+    `section` says how well the item's faces are made. Raises Fault `no_fit`.
     """
     known, said = uncertainty_of(config), by_hand_of(section)
     found = {}
     for name, sensor in config.to_calibrate.items():
         session = _session(sensor, moves, rest_s)
-        solved = solution_of(fit(session, _told(sensor, known, said), trusted=0)).budget
-        if endless:
-            kept = tuple(each for each in solved.contributors if each.name in (CLOCK, RECORDED_HANDS))
-            solved = replace(solved, contributors=kept)
-        found[name] = solved
+        found[name] = solution_of(fit(session, _told(sensor, known, said), trusted=0)).budget
     return found
 
 
@@ -67,53 +61,32 @@ def _move_s(move: Instruction) -> float:
 
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> Handled:
-    """Rests of the wanted length, a little of it lost to the moves, and the moves between, in the sensor's axes."""
-    mounting = mounting_matrix(sensor.mounting)
-    spans: list[tuple[float, Array | None]] = [(rest_s, None)]
-    faces, last = [FIRST], FIRST
-    for move in moves:
-        spans += [(_move_s(move), _rotation(last, move)), (rest_s + ASKED_S, None)]
-        last = move.face
-        faces.append(last)
-    ends_s = np.cumsum([lasting_s for lasting_s, _ in spans])
-    time_s = np.arange(0.0, ends_s[-1], 1 / SAMPLED_HZ)
-    rates, up = np.zeros((len(time_s), 3)), np.zeros((len(time_s), 3))
-    rests: list[Rest] = []
-    made: list[Move] = []
-    for number, ((lasting_s, rotation), end_s) in enumerate(zip(spans, ends_s.tolist(), strict=True)):
-        inside = (time_s >= end_s - lasting_s) & (time_s < end_s)
-        face = axis_of(faces[number // 2])
-        if rotation is None:
-            up[inside] = face
-            continue
-        share = (time_s[inside] - (end_s - lasting_s)) / lasting_s
-        rates[inside] = (1 - np.cos(2 * np.pi * share))[:, None] * rotation / lasting_s
-        gone = share - np.sin(2 * np.pi * share) / (2 * np.pi)
-        up[inside] = [rotation_by(-each * rotation) @ face for each in gone]
-        made.append(Move(end_s - lasting_s, end_s, float(np.abs(rates[inside]).max())))
-    rng = np.random.default_rng(len(moves))
-    noise = angle_walk_rad_sqrt_s(sensor) * SAMPLED_HZ**0.5
-    rates = rates @ mounting.T + noise * rng.standard_normal(rates.shape)
-    felt, felt_noise = STANDARD_GRAVITY_M_S2 * up @ mounting.T, 0.0
+    """The readings of such a session in the sensor's axes, cut into rests and moves as a recording is."""
+    still, faces = np.zeros(3), [FIRST, *(move.face for move in moves)]
+    spans = [_turning(rest_s, FIRST, still)]
+    for face, move in zip(faces, moves, strict=False):
+        spans += [_turning(_move_s(move), face, _rotation(face, move)), _turning(rest_s + ASKED_S, move.face, still)]
+    turning_rad_s, up = (np.concatenate(each) for each in zip(*spans, strict=True))
+    part, mounting, rng = PARTS[sensor.part], mounting_matrix(sensor.mounting), np.random.default_rng(len(moves))
+
+    def read(true: Array, noise_sqrt_hz: float) -> Array:
+        readings: Array = true @ mounting.T + noise_sqrt_hz * SAMPLED_HZ**0.5 * rng.standard_normal(true.shape)
+        return readings
+
+    rates, felt = read(turning_rad_s, part.angle_random_walk_rad_sqrt_s), None
     if sensor.acceleration is not None:
-        felt_noise = PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 * SAMPLED_HZ**0.5
-        felt = felt + felt_noise * rng.standard_normal(felt.shape)
-    for lasting_s, rest_end_s in (
-        (each, end_s) for (each, way), end_s in zip(spans, ends_s, strict=True) if way is None
-    ):
-        inside = (time_s >= rest_end_s - lasting_s) & (time_s < rest_end_s)
-        rests.append(
-            Rest(
-                float(rest_end_s - lasting_s),
-                float(rest_end_s),
-                int(inside.sum()),
-                rates[inside].mean(axis=0),
-                np.full(3, noise),
-                felt[inside].mean(axis=0) if sensor.acceleration is not None else None,
-                np.full(3, felt_noise) if sensor.acceleration is not None else None,
-            )
-        )
-    return Handled(time_s, rates, felt if sensor.acceleration is not None else None, tuple(rests), tuple(made))
+        felt = read(STANDARD_GRAVITY_M_S2 * up, part.acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2)
+    return handled(np.arange(len(rates)) / SAMPLED_HZ, rates, felt)
+
+
+def _turning(lasting_s: float, face: Face, rotation: Array) -> tuple[Array, Array]:
+    """(n, 3) rates of the item and (n, 3) what is up, in its axes, while a rotation vector turns it from a face."""
+    count = round(lasting_s * SAMPLED_HZ)
+    share, up = (np.arange(count) + 0.5) / count, np.tile(axis_of(face), (count, 1))
+    if rotation.any():
+        gone = share - np.sin(2 * np.pi * share) / (2 * np.pi)
+        up = np.array([rotation_by(-each * rotation) @ axis_of(face) for each in gone])
+    return (1 - np.cos(2 * np.pi * share))[:, None] * rotation / lasting_s, up
 
 
 def _rotation(face: Face, move: Instruction) -> Array:

@@ -1,6 +1,6 @@
 """The shortest run that reaches a wanted uncertainty: a search among candidates by what is predicted of each. Pure."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from types import MappingProxyType
@@ -42,6 +42,14 @@ class Budgets:
     def reached(self) -> Reached:
         """The worst U of them."""
         return Reached.by(self.rates, self.accelerations)
+
+    def without(self, names: Collection[str]) -> "Budgets":
+        """The budgets without contributors of these names."""
+        rates, accelerations = (
+            {sensor: each.without(names) for sensor, each in budgets.items()}
+            for budgets in (self.rates, self.accelerations)
+        )
+        return Budgets(rates, accelerations)
 
 
 @dataclass(frozen=True, slots=True)

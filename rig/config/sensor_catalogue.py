@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import radians
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
@@ -61,6 +62,11 @@ class Part:
     delivered: Delivered = Delivered()
     own_port: bool = False
     any_rate: bool = False
+
+    @property
+    def angle_random_walk_rad_sqrt_s(self) -> float:
+        """Standard deviation of what white noise alone makes of an angle in a second, rad/√s."""
+        return radians(self.angle_random_walk_deg_sqrt_h) / 60
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""

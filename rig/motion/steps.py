@@ -65,6 +65,18 @@ class Sweep:
         return self.end_q_rad
 
     @property
+    def growing(self) -> float:
+        """1 where the joint's angle grows, −1 where it falls."""
+        return 1.0 if self.direction == "ccw" else -1.0
+
+    @property
+    def began_q_rad(self) -> Joints:
+        """The joint angles where the revolution or the arc begins."""
+        low, high = self.revolution_rad
+        angle_rad = low if self.direction == "ccw" else high
+        return (*self.start_q_rad[: self.joint], angle_rad, *self.start_q_rad[self.joint + 1 :])
+
+    @property
     def angle_rad(self) -> float:
         """How far it turns while it is averaged: exactly 2π n where that is n whole turns."""
         low, high = self.revolution_rad

@@ -139,14 +139,13 @@ class ArmMotion:
         found = find(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
         began = self.angles(found.start_s)
         rate = self.rate(found.time_s).mean(axis=0)
-        growing = 1 if sweep.direction == "ccw" else -1
         return Revolution(
             found.start_s,
             found.end_s,
             found.duration_std_s,
             axis_flange=rate / np.linalg.norm(rate),
             attitude=self.mount @ flange_attitude(began, self.kinematics),
-            axis_errors=growing * self.axis_errors(began, sweep.joint),
+            axis_errors=sweep.growing * self.axis_errors(began, sweep.joint),
             arm_m=self.mount @ flange_arm(began, sweep.joint, self.kinematics),
             station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
             angle_rad=sweep.angle_rad,

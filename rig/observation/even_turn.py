@@ -57,7 +57,7 @@ def find_even_turn(states: NDArray[Any], sweep: Sweep, settings: ObservationThre
     """
     where = describe(sweep)
     time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
-    growing = 1.0 if sweep.direction == "ccw" else -1.0
+    growing = sweep.growing
     gone = growing * (angle - sweep.start_q_rad[sweep.joint])
     whole = growing * (sweep.end_q_rad[sweep.joint] - sweep.start_q_rad[sweep.joint])
     ramp = sweep.speed_rad_s**2 / (2 * sweep.acceleration_rad_s2) + GUARD_RAD

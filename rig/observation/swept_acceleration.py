@@ -42,20 +42,25 @@ def swept_acceleration(
     time_s = stream.time_s[inside]
     known = motion.covered(time_s)
     time_s = time_s[known]
-    growing = 1.0 if sweep.direction == "ccw" else -1.0
+    harmonic = first_harmonic(
+        time_s,
+        accelerations(stream, inside)[known],
+        motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
+        motion.angle(sweep, time_s, 1),
+        averaging.colour,
+        swings=averaging.swings,
+    )
+    return of_turn(sweep, turn, harmonic)
+
+
+def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
+    """The first harmonic of a sweep, and how the arm turned meanwhile."""
     return SweptAcceleration(
         sweep=sweep.index,
         joint=sweep.joint,
-        harmonic=first_harmonic(
-            time_s,
-            accelerations(stream, inside)[known],
-            motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
-            motion.angle(sweep, time_s, 1),
-            averaging.colour,
-            swings=averaging.swings,
-        ),
+        harmonic=harmonic,
         attitude=turn.attitude,
-        axis_flange=growing * turn.axis_flange,
+        axis_flange=sweep.growing * turn.axis_flange,
         arm_m=turn.arm_m,
         station=turn.station,
     )

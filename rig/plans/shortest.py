@@ -4,7 +4,7 @@ What the file asks for beside the uncertainty stays: order, directions, stages, 
 attitudes where magnetometers need theirs.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,7 +25,8 @@ from rig.config.procedure_sections import SixObservationSection, StaticAttitudes
 from rig.config.section import Section
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.solution import REAL_HANDS
+from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING
+from rig.estimation.by_hand.solution import LINES, REAL_HANDS
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked
@@ -42,6 +43,7 @@ RESTS_S = (1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of a rest, and of a dwell
 # Of the endless run a plan of two repeats is looked at: in one alone, noise weighs too much beside what repeats have
 # alike. Other rests, and more repeats, make U of it smaller yet, but not by more than this.
 TWICE, HOPELESS = 2, 2.0
+ANEW = NOISE, WANDERING, FLICKER, STATES  # the lines that repeats lessen, of accelerometers too
 FLIPS, TURNS_BY_HAND = (8, 10, 12, 16, 24, 36, 48), (0, 3, 6)
 REST_STEP_S = 0.1  # of the last, fine search
 
@@ -49,15 +51,17 @@ REST_STEP_S = 0.1  # of the last, fine search
 class Tried(Protocol):
     """The runs of a procedure that are tried: which there are, and what each is predicted to reach.
 
-    `predict` is None of what cannot be run; of an `endless` run nothing is left that comes anew each time.
-    `ending` are the keys that let a run end before, when what is wanted is reached.
+    `predict` is None of what cannot be run; the lines of its budgets that come `anew` each time are gone from those of
+    a run that is repeated without end. `ending` are the keys that let a run end before, when what is wanted is reached.
     """
 
+    @property
+    def anew(self) -> Collection[str]: ...
     def candidates(self) -> Sequence[Candidate]: ...
     def made_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]: ...
     def finer(self, best: Candidate) -> Sequence[Candidate]: ...
     def duration_s(self, procedure: ProcedureSection) -> float: ...
-    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None: ...
+    def predict(self, candidate: Candidate) -> Budgets | None: ...
     def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]: ...
 
 
@@ -69,8 +73,11 @@ def shortest_run(config: RigConfig, wanted: Wanted) -> Shortest:
     what = tried(config)
     _refuse_others(wanted, config)
     candidates = what.candidates()
-    endless = [(each.family, what.predict(each, endless=True)) for each in what.made_endless(candidates)]
-    floors = [(family, floor) for family, floor in endless if floor is not None]
+    floors = [
+        (each.family, once.without(what.anew))
+        for each in what.made_endless(candidates)
+        if (once := what.predict(each)) is not None
+    ]
     able = {family for family, floor in floors if wanted.share(floor.reached) <= HOPELESS}
     least = min(floors, key=lambda each: wanted.share(each[1].reached))[0]
     hopeful = [each for each in candidates if each.family in able] or _longest(candidates, least, wanted.at_most_s)
@@ -171,6 +178,7 @@ class _Swept:
     motions: Callable[[RigConfig], Iterator[Motion]]
     waits: tuple[str, ...]
     config: RigConfig
+    anew: Collection[str] = ANEW
 
     def candidates(self) -> Sequence[Candidate]:
         found = []
@@ -226,12 +234,12 @@ class _Swept:
     def duration_s(self, procedure: ProcedureSection) -> float:
         return plan_of(self.config, procedure).duration_s
 
-    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None:
+    def predict(self, candidate: Candidate) -> Budgets | None:
         config = _changed(self.config, procedure=candidate.procedure)
         plan, made = plan_of(config, candidate.procedure), kind_of(config.turner).meant(config.turner)
         try:
-            rates = predicted(config, plan, made, endless=endless) if plan.sweeps else {}
-            return Budgets(rates, predicted_accelerations(config, plan, made.kinematics, endless=endless))
+            rates = predicted(config, plan, made) if plan.sweeps else {}
+            return Budgets(rates, predicted_accelerations(config, plan, made.kinematics))
         except (Fault, np.linalg.LinAlgError):  # so few sweeps and rests, or such attitudes, tell nothing
             return None
 
@@ -259,6 +267,7 @@ class _ByHand:
     """A session by hand of so many flips and turns."""
 
     config: RigConfig
+    anew: Collection[str] = tuple(LINES)  # all that readings tell
 
     def candidates(self) -> Sequence[Candidate]:
         return [self._candidate(*each) for each in product(FLIPS, TURNS_BY_HAND, RESTS_S[:4])]
@@ -277,9 +286,9 @@ class _ByHand:
         _, moves, rest_s = _session(procedure)
         return duration_s(moves, rest_s)
 
-    def predict(self, candidate: Candidate, *, endless: bool = False) -> Budgets | None:
+    def predict(self, candidate: Candidate) -> Budgets | None:
         try:
-            return Budgets(predicted_by_hand(self.config, *_session(candidate.procedure), endless=endless))
+            return Budgets(predicted_by_hand(self.config, *_session(candidate.procedure)))
         except Fault:
             return None
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.predicted import angle_walk_rad_sqrt_s
 from rig.analysis.predicted_accelerations import predicted_accelerations
 from rig.analysis.shortest import Budgets, Candidate, Reached, Wanted, shortest
 from rig.analysis.surroundings import surroundings_of
 from rig.cli import main
 from rig.config.load import load, parse
 from rig.config.models import RigConfig
+from rig.config.sensor_catalogue import PARTS as DATA_SHEETS
 from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand import Told, solve_by_hand
@@ -100,7 +100,8 @@ def as_set(part: str) -> tuple[str, ...]:
 def noise_of(of: Run) -> float:
     """RMS of one sample, as the data sheet's random walk makes it."""
     sensor = config_of(of).sensors["gyro"]
-    return float(angle_walk_rad_sqrt_s(sensor) * np.sqrt(sensor.rate_hz if of.turner == "servo" else SAMPLED_HZ))
+    rate_hz = sensor.rate_hz if of.turner == "servo" else SAMPLED_HZ
+    return float(DATA_SHEETS[sensor.part].angle_random_walk_rad_sqrt_s * np.sqrt(rate_hz))
 
 
 def reached(of: Run, seed: int) -> Reached:
