@@ -44,6 +44,11 @@ class Cuts:
     times_a_rest: int
     most: int
 
+    def of(self, revolutions: int) -> tuple[int, int]:
+        """How many parts each of so many revolutions has, and each rest beside them."""
+        parts = max(1, min(self.parts, self.most // max(revolutions, 1)))
+        return parts, max(1, parts // self.times_a_rest)
+
 
 BEFORE = Cuts(parts=4, times_a_rest=2, most=48)
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no part shows it.
@@ -122,9 +127,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     x, y, z = explained.seen.earth_rate_rad_s.tolist()  # known by the site, or found
     site = replace(site, earth_rate_rad_s=(x, y, z))
     by_model = recordings[0].run.settings.checked_by_model
-    cuts = BY_MODEL if by_model else BEFORE
-    parts = max(1, min(cuts.parts, cuts.most // len(result.observations)))
-    of_rest = max(1, parts // cuts.times_a_rest)
+    parts, of_rest = (BY_MODEL if by_model else BEFORE).of(len(result.observations))
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
-from rig.analysis.planned_motion import PlannedRun, measured, planned_motion
+from rig.analysis.planned_motion import PlannedRun, measured, planned_motion, timed_of
 from rig.analysis.ways import SPARSE_S, by_the_wrists, moved, pull_m_s2
 from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Sweep
@@ -71,15 +71,12 @@ def planned_pieces(run: PlannedRun) -> Planned:
 
 def _parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
     """A plan's parts, as `rig.analysis.pieces` cuts a recording: the sweeps, then the rests."""
-    parts = max(1, min(BY_MODEL.parts, BY_MODEL.most // max(len(plan.sweeps), 1)))
-    of_rest = max(1, parts // BY_MODEL.times_a_rest)
-    steps = list(measured(plan))
-    sweeps = [each for each in steps if isinstance(each.step, Sweep)]
-    rests = [each for each in steps if not isinstance(each.step, Sweep)]
-    for place, each in enumerate(sweeps):
-        yield from _cut(motion, each.window_s, place, parts)
-    for each in rests:
-        yield from _cut(motion, each.window_s, REST, of_rest)
+    parts, of_rest = BY_MODEL.of(len(plan.sweeps))
+    for place, sweep in enumerate(timed_of(plan, Sweep)):
+        yield from _cut(motion, sweep.window_s, place, parts)
+    for each in measured(plan):
+        if not isinstance(each.step, Sweep):
+            yield from _cut(motion, each.window_s, REST, of_rest)
 
 
 def _cut(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: int) -> Iterator[_Part]:
@@ -87,12 +84,9 @@ def _cut(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: in
         yield _Part(sweep, 2 * each / (parts - 1) - 1 if parts > 1 else 0.0, Stretch(motion, *ends))
 
 
-def _ways(plan: Plan, motion: ArmMotion) -> Iterator[Stretch]:
+def _ways(plan: Plan, motion: ArmMotion) -> list[Stretch]:
     """The wrists' ways between all that is measured, before it and after."""
-    steps = list(measured(plan))
-    begins = [0.0, *(each.end_s for each in steps)]
-    ends = [*(each.start_s for each in steps), float(motion.time_s[-1])]
-    for start_s, end_s in zip(begins, ends, strict=True):
-        way = moved(motion, start_s, end_s)
-        if way is not None and by_the_wrists(way):
-            yield way
+    measured_s = [time_s for each in measured(plan) for time_s in (each.start_s, each.end_s)]
+    edges_s = [0.0, *measured_s, float(motion.time_s[-1])]
+    ways = [moved(motion, *between_s) for between_s in zip(edges_s[::2], edges_s[1::2], strict=True)]
+    return [way for way in ways if way is not None and by_the_wrists(way)]

@@ -70,12 +70,7 @@ def planned_read(of: PlannedAccelerometer) -> Read:
         sweeps_of(swept, mounting),
         run.known.repeatability_std_rad,
     )
-    # At a temperature that stays.
-    pieces = [Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.q_rad))) for each in dwells]
-    pieces += [
-        Piece(each.step.index, each.window_s, 1, 0.0, Stood(np.array(each.step.began_q_rad), each.step.joint - WRIST_1))
-        for each in sweeps
-    ]
+    pieces = [*map(_piece, dwells), *map(_piece, sweeps)]
     stood = [each.stood for each in pieces]
     movement = replace(
         _reading(theta, movement),
@@ -86,6 +81,14 @@ def planned_read(of: PlannedAccelerometer) -> Read:
     off = arm_patterns(theta, movement, stood, Known(run.arm, run.known.axis_deg, mounting, 0.0))
     middles_s = np.array([sum(each.window_s) / 2 for each in pieces])
     return Read(theta, movement, np.concatenate([lag, off]), middles_s, second_order=second_order)
+
+
+def _piece(at: Timed[Dwell] | Timed[Sweep]) -> Piece:
+    """A dwell or a sweep at a temperature that stays."""
+    step = at.step
+    wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
+    q_rad = step.began_q_rad if isinstance(step, Sweep) else step.q_rad
+    return Piece(step.index, at.window_s, 1, 0.0, Stood(np.array(q_rad), wrist))
 
 
 def _swept(at: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) -> SweptAcceleration:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig.analysis.calibration import solve_six_observation
 from rig.analysis.clock import BY_COMPUTER, BY_CRYSTAL, PPM, ClockCheck, ClockComparison
 from rig.analysis.planned_motion import (
     STANDING_S,
@@ -29,7 +30,6 @@ from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import rotation_by
 from rig.data.settings import Uncertainty
-from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
 from rig.estimation.budget import Budget, budget
@@ -59,35 +59,32 @@ def predicted(config: RigConfig, plan: Plan, made: Made) -> dict[str, Budget]:
     angle scatter.
     Raises Fault as the estimators do where the plan does not tell enough, Refused as `settings_of`.
     """
-    run, found = planned_run(config, plan, made.kinematics), {}
-    for name, sensor in config.to_calibrate.items():
-        surroundings = Surroundings(run.site, run.known, _clock(run.known, on_board=sensor.on_board), _jitter_s(made))
-        parts = [_part(config, each, sensor, made) for each in _stages(run)]
-        seen = put_together(parts, surroundings)
-        found[name] = _budget(seen, name, sensor, surroundings, by_speeds_alone=made.reading_std_rad > 0)
-    return found
+    run = planned_run(config, plan, made.kinematics)
+    return {name: _budget(config, run, made, name, sensor) for name, sensor in config.to_calibrate.items()}
 
 
-def _budget(
-    seen: Seen, name: str, sensor: SensorSection, surroundings: Surroundings, *, by_speeds_alone: bool
-) -> Budget:
-    known, mounting = surroundings.uncertainty, mounting_matrix(sensor.mounting)
+def _budget(config: RigConfig, run: PlannedRun, made: Made, name: str, sensor: SensorSection) -> Budget:
+    known, mounting = run.known, mounting_matrix(sensor.mounting)
+    scatters = made.reading_std_rad > 0
+    jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
+    surroundings = Surroundings(run.site, known, _clock(known, on_board=sensor.on_board), jitter_s)
+    parts = [_part(config, each, sensor, made) for each in _stages(run)]
+    seen = put_together(parts, surroundings)
     of = name, sensor.part, float(np.radians(sensor.range_deg_s))
     stays = known_sensor(known, of, np.full(len(seen.windows_s), ROOM_C), STEP_K)
     off_deg = SITS_OFF_DEG if seen.mount_turns_rad is None else known.mount_deg
     seen = replace(seen, means_rad_s=_read(seen, _sitting_off(off_deg) @ mounting), sensor=stays)
     explained = explain(seen, mounting, BiasProcess(0.0, 0.0, 0, stays.instability_rad_s))
     unknown = unknown_of(surroundings, name, sensor.part, None)
-    if not by_speeds_alone:
+    if not scatters:
         return budget(explained, unknown)
-    accumulated = Accumulator.empty()
-    for mean, variance, turn, std in zip(
-        seen.means_rad_s, seen.variances_rad2_s2, seen.turns_rad_s, seen.speed_std_rad_s, strict=True
-    ):
-        if turn.any():
-            accumulated = accumulated.add(mean, variance, float(np.linalg.norm(turn)), float(std))
+    turns = [turn for part in parts for turn in part.turns]
+    read = [
+        replace(turn, average=replace(turn.average, mean_rad_s=mean))
+        for turn, mean in zip(turns, seen.means_rad_s, strict=False)  # the rests come after them
+    ]
     axes_rad = float(np.radians(known.of("non_orthogonality_deg", name, sensor.part)))
-    return six_observation_budget(explained, accumulated.solve("newton"), unknown, axes_rad)
+    return six_observation_budget(explained, solve_six_observation(read, "newton"), unknown, axes_rad)
 
 
 def _sitting_off(angle_deg: float) -> Array:
@@ -109,10 +106,6 @@ def _clock(known: Uncertainty, *, on_board: bool) -> ClockCheck:
     half_width = known.controller_clock_ppm * PPM
     weights = 3 / half_width**2 + sum(1 / each.std**2 for each in compared)
     return ClockCheck(0.0, float(weights**-0.5), compared, half_width)
-
-
-def _jitter_s(made: Made) -> float:
-    return 0.0 if made.reading_std_rad else STATE_JITTER_S  # what scatters tells no jitter beside
 
 
 def _stages(run: PlannedRun) -> Iterator[PlannedRun]:
