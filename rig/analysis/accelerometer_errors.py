@@ -109,7 +109,7 @@ def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[Dwe
 
 
 def mean_temperature_c(pieces: Sequence[Piece]) -> float:
-    """Mean temperature of the pieces' readings, which `rig.analysis.when` too says that scale and bias hold at."""
+    """Mean temperature of the pieces' readings, which `rig.analysis.read_when` too says that scale and bias hold at."""
     return float(np.average([each.temperature_c for each in pieces], weights=[each.samples for each in pieces]))
 
 

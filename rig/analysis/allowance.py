@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.analysis.calibration import SensorResult, found_earth_rate
 from rig.analysis.consistency import Allowance
-from rig.analysis.pieces import REST, Pieces, Stretch
+from rig.analysis.cut_recording import REST, Pieces, Stretch
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import WAVE_SHARE, unknown_of
 from rig.config.judged_by import OfSensor

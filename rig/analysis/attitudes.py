@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.calibration import or_fault
 from rig.analysis.estimators import estimator_among
 from rig.analysis.increments import InIncrements, solve_turning
-from rig.analysis.of_kinds import OfKind
+from rig.analysis.installed_kinds import OfKind
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
 from rig.analysis.triad import Triad, check_mounted, check_seen, known_field, known_gravity

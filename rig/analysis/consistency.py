@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.held_pieces import (
+from rig.analysis.cut_recording import Pieces
+from rig.analysis.pieces_against_model import (
     HeldPieces,
     Scatter,
     beyond_chance,
@@ -23,7 +24,6 @@ from rig.analysis.held_pieces import (
     whiten,
     whitening,
 )
-from rig.analysis.pieces import Pieces
 from rig.analysis.suspected import (
     DAMAGES,
     Means,

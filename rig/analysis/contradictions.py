@@ -11,10 +11,10 @@ from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import consistency
+from rig.analysis.cut_recording import cut
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.over_temperature import taken_to_reference
-from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import (
     DISTURBED_SWEEP,

@@ -13,7 +13,7 @@ from rig.analysis.check import Check, fitness
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
-from rig.analysis.of_kinds import KindFound, OfKind
+from rig.analysis.installed_kinds import KindFound, OfKind
 from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference, with_rate_polynomials
 from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.data.motion_file import Item, ReadElsewhere
@@ -82,15 +82,15 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     return found
 
 
-def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
+def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
     """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
 
     No configuration states limits of anything else.
     """
-    if (gyroscope := found.gyroscope) is not None:
-        largest = triaxial.MAX_CONDITION if found.rates is not None else known_turns.MAX_CONDITION
+    if (gyroscope := sensor.gyroscope) is not None:
+        largest = triaxial.MAX_CONDITION if sensor.rates is not None else known_turns.MAX_CONDITION
         yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
-    for quantity, result in found.at_rest.items():
+    for quantity, result in sensor.at_rest.items():
         yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
             at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements tell it badly
@@ -222,9 +222,9 @@ def _samples(read: ReadElsewhere) -> Samples:
     return samples_in(read.readings, "the recording")
 
 
-def _gyroscope(item: Item, found: Result, clock: TimeBase | None) -> SensorResult:
+def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
     """A gyroscope in attitudes as one that was swept is described."""
-    solution = _as_swept(found)
+    solution = _as_swept(result)
     return SensorResult(
         sensor=item,
         solution=solution,
@@ -240,20 +240,20 @@ def _gyroscope(item: Item, found: Result, clock: TimeBase | None) -> SensorResul
     )
 
 
-def _as_swept(found: Result) -> TurnedSolution:
+def _as_swept(result: Result) -> TurnedSolution:
     """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
-    solution, matrix = found.solution, found.solution.matrix
+    solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.of(matrix)
     of_matrix = np.r_[F, OFFSET]
     lines = tuple(
-        replace(line, covariance=OTHER_SIGN @ line.covariance @ OTHER_SIGN) for line in found.budget.contributors
+        replace(line, covariance=OTHER_SIGN @ line.covariance @ OTHER_SIGN) for line in result.budget.contributors
     )
-    if isinstance(found, InIncrements):
-        observations, rank = len(found.solution.residuals_rad), 12
+    if isinstance(result, InIncrements):
+        observations, rank = len(result.solution.residuals_rad), 12
         warnings: tuple[str, ...] = ()
         residuals, estimator = np.zeros((0, 3)), "increments"
     else:
-        of_rows = found.solution
+        of_rows = result.solution
         observations, rank, warnings = of_rows.observations, of_rows.rank, of_rows.warnings
         residuals, estimator = of_rows.residuals, str(of_rows.method)
     return TurnedSolution(

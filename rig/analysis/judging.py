@@ -17,9 +17,9 @@ from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
 from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
+from rig.analysis.installed_kinds import kinds_on_arm
 from rig.analysis.magnetic_field import calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
-from rig.analysis.of_kinds import kinds_on_arm
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.over_temperature import (

@@ -164,10 +164,11 @@ def _attitude_error_rad(
     return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
 
 
-def _not_alike(found: Uniformity, solution: TriaxialSolution) -> str:
+def _not_alike(uniformity: Uniformity, solution: TriaxialSolution) -> str:
     left_t = np.sqrt(np.mean(solution.residuals**2))
     return (
-        f"the field is not the same in all attitudes: χ² of what the model leaves is {found.chi_square:.4g}, "
-        f"{found.limit:.3g} at most by noise and by attitudes off by {1e3 * found.attitude_error_rad:.2g} mrad; "
+        f"the field is not the same in all attitudes: χ² of what the model leaves is {uniformity.chi_square:.4g}, "
+        f"{uniformity.limit:.3g} at most by noise and by attitudes off by "
+        f"{1e3 * uniformity.attitude_error_rad:.2g} mrad; "
         f"{1e6 * left_t:.3f} µT are left in the mean"
     )

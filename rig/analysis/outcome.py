@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from rig.analysis.check import Check
     from rig.analysis.clock import ClockCheck
     from rig.analysis.elsewhere import OfSensor
+    from rig.analysis.installed_kinds import KindFound
     from rig.analysis.magnetic_field import MagnetometerResult
     from rig.analysis.mounts import FoundMount
-    from rig.analysis.of_kinds import KindFound
     from rig.analysis.onboard_check import Agreement
     from rig.analysis.over_temperature import Polynomials
     from rig.analysis.told_from import ToldFrom

@@ -94,34 +94,34 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
     return ExternalData(sweeps, tuple(moved[len(sweeps) :]), at_reference=True), found
 
 
-def with_rate_polynomials(result: SensorResult, found: OverTemperature) -> tuple[SensorResult, OverTemperature]:
+def with_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
     """A gyroscope's calibration with what the polynomials add to its uncertainty, and these with all of its budget."""
-    budget, whole = _together(found, np.r_[result.scale, -result.bias_rad_s], result.uncertainty, OTHER_SIGN)
+    budget, whole = _together(polynomials, np.r_[result.scale, -result.bias_rad_s], result.uncertainty, OTHER_SIGN)
     return replace(result, uncertainty=budget), whole
 
 
 def with_acceleration_polynomials(
-    result: AccelerometerResult, found: OverTemperature
+    result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
     """An accelerometer's, as a gyroscope's."""
-    budget, whole = _together(found, np.r_[result.triad.scale, result.bias_m_s2], result.budget, np.eye(6))
+    budget, whole = _together(polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget, np.eye(6))
     return replace(result, budget=budget), whole
 
 
 def _together(
-    found: OverTemperature, values: Array, budget: Budget | None, sign: Array
+    polynomials: OverTemperature, values: Array, budget: Budget | None, sign: Array
 ) -> tuple[Budget | None, OverTemperature]:
     if budget is None:
-        return None, settled(found, values, ())
+        return None, settled(polynomials, values, ())
     lines = tuple(
         Line(each.name, each.kind, each.distribution, each.source, each.freedom, sign @ each.covariance @ sign)
         for each in budget.contributors
     )
     at = powers_at(0.0)
-    moved = sign @ at @ settled(found, values, ()).covariance @ at.T @ sign
+    moved = sign @ at @ settled(polynomials, values, ()).covariance @ at.T @ sign
     source = "what the repeats tell of the way to the reference temperature"
-    added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(found.process.freedom), moved)
-    return replace(budget, contributors=(*budget.contributors, added)), settled(found, values, lines)
+    added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(polynomials.process.freedom), moved)
+    return replace(budget, contributors=(*budget.contributors, added)), settled(polynomials, values, lines)
 
 
 def _rates(
@@ -193,13 +193,13 @@ def _turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> Observati
     return replace(turn, average=_average(turn.average, mean_rad_s, reference_c))
 
 
-def _waved(turn: Observation, warmed_c: float, found: OverTemperature) -> Observation:
+def _waved(turn: Observation, warmed_c: float, polynomials: OverTemperature) -> Observation:
     """A turn with the mean and the wave of what its accelerometer read, at the reference temperature."""
     if turn.acceleration is None:
         return turn
     wave = turn.acceleration.harmonic
     warm = np.array([warmed_c])
-    mean, share = found.at_reference(wave.harmonic_m_s2[:1], warm), found.changes(warm)[0]
+    mean, share = polynomials.at_reference(wave.harmonic_m_s2[:1], warm), polynomials.changes(warm)[0]
     harmonic = np.vstack([mean, share * wave.harmonic_m_s2[1:]])
     return replace(turn, acceleration=replace(turn.acceleration, harmonic=replace(wave, harmonic_m_s2=harmonic)))
 

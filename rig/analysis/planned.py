@@ -9,8 +9,8 @@ from rig.analysis import reference_consistency
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
+from rig.analysis.cut_plan import Planned, planned_pieces
 from rig.analysis.planned_motion import PlannedRun, planned_run
-from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.planned_reference import planned_accelerometers, planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference

@@ -50,10 +50,10 @@ def predicted_by_hand(
     return found
 
 
-def _told(sensor: SensorSection, known: Uncertainty, said: ByHand) -> Told:
+def _told(sensor: SensorSection, known: Uncertainty, procedure: ByHand) -> Told:
     first = None if sensor.acceleration is not None else turned_face(FIRST, mounting_matrix(sensor.mounting))
     clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
-    return Told(known.crystal_ppm, clock, said.box_rad, first_face=first)
+    return Told(known.crystal_ppm, clock, procedure.box_rad, first_face=first)
 
 
 def _move_s(move: Instruction) -> float:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.pieces import Window
+from rig.analysis.cut_recording import Window
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import innovations
-from rig.observation.sound_steps import SPIKE
+from rig.observation.steps_that_count import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
 Usual = Callable[..., Any]  # `np.median`, `np.min`

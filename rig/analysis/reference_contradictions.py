@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.accelerometer_errors import pieces_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
+from rig.analysis.cut_recording import Window
 from rig.analysis.magnetic_field import MagnetometerResult
-from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_budgets import drift_patterns, lag_pattern
 from rig.analysis.reference_consistency import reference_consistency

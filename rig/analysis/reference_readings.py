@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.pieces import Window as Read
+from rig.analysis.cut_recording import Window as Read
 from rig.analysis.suspicion import Statistic
 from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.pieces import REST, Pieces
+from rig.analysis.cut_recording import REST, Pieces
 from rig.analysis.suspicion import Damage, Suspicions
 from rig.estimation.arrays import Array
 

@@ -16,7 +16,7 @@ SAME_AXIS = 0.9  # cosine of two rows' axes, either way
 CHANCE = 4.5  # standard deviations that one of some dozens of means may be off by chance
 
 
-def check_agree(found: VectorSolution, data: ExternalData) -> None:
+def check_agree(solution: VectorSolution, data: ExternalData) -> None:
     """Every sweep is where all others, solved without it, put it.
 
     Raises Refused `bad_sweep` for the one that is farthest off: half a turn given as a whole one, a wrong axis. Of two
@@ -26,7 +26,7 @@ def check_agree(found: VectorSolution, data: ExternalData) -> None:
     toward = np.linalg.pinv(design)
     told = np.maximum(1 - np.einsum("ij,ji->i", design, toward), TOLD)[:, None]
     apart = (means - design @ (toward @ means)) / told
-    off = np.linalg.norm(apart @ np.linalg.inv(found.matrix).T, axis=1)
+    off = np.linalg.norm(apart @ np.linalg.inv(solution.matrix).T, axis=1)
     noise = np.linalg.norm(np.sqrt(variances) / told, axis=1)
     sweeps = slice(len(data.sweeps))
     share = np.where(off > BEYOND_NOISE * noise, off, 0.0)[sweeps] / np.linalg.norm(design[sweeps, :3], axis=1)
@@ -49,7 +49,7 @@ def _named(worst: int, data: ExternalData) -> str:
     return f"sweep {data.sweeps[worst].sweep} contradicts the others"
 
 
-def contradiction(found: VectorSolution, data: ExternalData) -> float:
+def contradiction(solution: VectorSolution, data: ExternalData) -> float:
     """How many times its noise the worst of the means contradicts the others by; 1 where chance may explain it.
 
     Not their mean square: one wrong row among twelve is hidden in that, and is all that two sweeps of an axis tell.
@@ -58,21 +58,21 @@ def contradiction(found: VectorSolution, data: ExternalData) -> float:
         return 1.0
     _, variances, design = _equations(data)
     worst = 1.0
-    for left, variance in zip(found.residuals_rad_s.T, variances.T, strict=True):
+    for left, variance in zip(solution.residuals_rad_s.T, variances.T, strict=True):
         weighted = design / np.sqrt(variance)[:, None]
         told = 1 - np.einsum("ij,ji->i", weighted, np.linalg.pinv(weighted))
         worst = max(worst, float((np.abs(left) / np.sqrt(variance * np.maximum(told, TOLD))).max()))
     return worst if worst > CHANCE else 1.0
 
 
-def counted(found: VectorSolution, data: ExternalData) -> VectorSolution:
+def counted(solution: VectorSolution, data: ExternalData) -> VectorSolution:
     """The solution with what the sweeps contradict each other by in its covariances."""
-    more = contradiction(found, data) ** 2
+    more = contradiction(solution, data) ** 2
     return replace(
-        found,
-        covariance=more * found.covariance,
-        matrix_covariance=more * found.matrix_covariance,
-        angles_covariance_rad2=more * found.angles_covariance_rad2,
+        solution,
+        covariance=more * solution.covariance,
+        matrix_covariance=more * solution.matrix_covariance,
+        angles_covariance_rad2=more * solution.angles_covariance_rad2,
     )
 
 

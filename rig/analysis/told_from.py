@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.calibration import SensorResult, found_earth_rate
-from rig.analysis.pieces import REST
+from rig.analysis.cut_recording import REST
 from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.allowance import STANDS_RAD
-from rig.analysis.pieces import FEWEST_AT_REST, REST, Pieces, Stretch
+from rig.analysis.cut_recording import FEWEST_AT_REST, REST, Pieces, Stretch
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData

@@ -62,12 +62,12 @@ def claimed_sensor(name: str, port: str) -> AbstractContextManager[None]:
 
 
 @contextmanager
-def _claimed(name: str, thing: str, told: str) -> Iterator[None]:
+def _claimed(name: str, device: str, told: str) -> Iterator[None]:
     if sys.platform != "linux":
         yield
         return
     # An address has room for 107 bytes, and a path may have more.
-    address = "\0calibration-rig " + sha256(os.fsencode(thing)).hexdigest()
+    address = "\0calibration-rig " + sha256(os.fsencode(device)).hexdigest()
     with socket.socket(socket.AF_UNIX) as claim:
         try:
             claim.bind(address)

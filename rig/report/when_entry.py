@@ -1,6 +1,6 @@
 """When something was found, as an entry of `result.json`."""
 
-from rig.analysis.when import When
+from rig.analysis.read_when import When
 from rig.data.result_types import WhenEntry
 from rig.report.entry import entry
 

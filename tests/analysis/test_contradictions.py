@@ -10,7 +10,7 @@ from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
-from rig.analysis.pieces import Window
+from rig.analysis.cut_recording import Window
 from rig.analysis.readings import judge_readings
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData

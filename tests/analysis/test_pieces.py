@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.pieces import Pieces, cut
+from rig.analysis.cut_recording import Pieces, cut
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
 from rig.observation.windows import swept

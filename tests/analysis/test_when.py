@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
-from rig.analysis.when import of_gyroscope
+from rig.analysis.read_when import of_gyroscope
 from rig.data.run_file import RunData
 from rig.plans.recorded import open_run
 from rig.report.document import document_of

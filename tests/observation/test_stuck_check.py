@@ -10,7 +10,7 @@ from rig.errors import Fault
 from rig.observation.acceleration import DwellReading
 from rig.observation.mean import Mean
 from rig.observation.observed_run import observe_run
-from rig.observation.sound_steps import sound_sweeps
+from rig.observation.steps_that_count import sound_sweeps
 from rig.observation.stuck_check import check_dwells
 from rig.observation.windows import Window, swept
 from support.damaged_readings import readings_of

@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.check import fitness
-from rig.analysis.of_kinds import OfKind
+from rig.analysis.installed_kinds import OfKind
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument

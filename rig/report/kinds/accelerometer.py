@@ -7,7 +7,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult, HeldOut
 from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
-from rig.analysis.when import of_accelerometer
+from rig.analysis.read_when import of_accelerometer
 from rig.data.accelerometer_entries import AccelerometerEntry, AlignmentEntry, HeldOutEntry
 from rig.data.quantity import ACCELERATION
 from rig.estimation.accelerometer_model import DELAY, SECOND

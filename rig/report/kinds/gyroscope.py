@@ -8,7 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.analysis.when import of_gyroscope
+from rig.analysis.read_when import of_gyroscope
 from rig.data.attitude_entries import InAttitudesRatesEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.quantity import RATE

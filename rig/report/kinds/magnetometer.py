@@ -7,7 +7,7 @@ import numpy as np
 from rig.analysis.freedom_beside import of_field_angles
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
-from rig.analysis.when import of_magnetometer
+from rig.analysis.read_when import of_magnetometer
 from rig.data.magnetometer_entries import FieldDriftEntry, MagnetometerEntry, UniformityEntry
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.pieces import Pieces
+from rig.analysis.cut_recording import Pieces
 from rig.analysis.suspected import each_axis, in_time
 from rig.analysis.suspicion import TOLD, Statistic, Suspected, basis, explained, told_from
 from rig.estimation.arrays import Array

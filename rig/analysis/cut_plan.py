@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
+from rig.analysis.cut_recording import BY_MODEL, REST, Pieces, Stretch
 from rig.analysis.planned_motion import PlannedRun, measured, planned_motion, timed_of
 from rig.analysis.ways import SPARSE_S, by_the_wrists, moved, pull_m_s2
 from rig.estimation.arrays import Array
@@ -70,7 +70,7 @@ def planned_pieces(run: PlannedRun) -> Planned:
 
 
 def _parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
-    """A plan's parts, as `rig.analysis.pieces` cuts a recording: the sweeps, then the rests."""
+    """A plan's parts, as `rig.analysis.cut_recording` cuts a recording: the sweeps, then the rests."""
     parts, of_rest = BY_MODEL.of(len(plan.sweeps))
     for place, sweep in enumerate(timed_of(plan, Sweep)):
         yield from _cut(motion, sweep.window_s, place, parts)
