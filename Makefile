@@ -30,9 +30,9 @@ demo: $(VENV)/demo.installed
 
 all-extras: $(VENV)/all.installed
 
-# Tests run three at a time on two processors, as a third of their time is waiting for a laboratory: every simulated one has
+# Tests run four at a time on two processors, as half of their time is waiting for a laboratory: every simulated one has
 # a loopback address of its own. As many threads for linear algebra would only be in each other's way.
-PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 3 --dist $(DIST)
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 4 --dist $(DIST)
 DIST := worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
@@ -50,7 +50,7 @@ check: system $(VENV)/dev.installed
 test: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint whole
 
-# What a test file is rewritten to for its assertions is kept. The first time it is made here, not by each of the three.
+# What a test file is rewritten to for its assertions is kept. The first time it is made here, not by each of the four.
 build/collected.txt: | $(VENV)/dev.installed
 	mkdir -p build && $(BIN)/pytest --collect-only --quiet > $@
 
