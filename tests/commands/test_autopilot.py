@@ -65,6 +65,7 @@ def fields(wire: AutopilotOnAWire) -> dict[str, bytes]:
     return {name: wire.parameters.field(name) for name in wire.parameters.names}
 
 
+@pytest.mark.slow
 def test_a_calibration_is_stored_and_the_old_one_comes_back_bit_by_bit(tmp_path: Path) -> None:
     with autopilot_on_a_wire("ardupilot", LEFT) as wire:
         before, config, found = fields(wire), configuration(tmp_path, wire.port), result(tmp_path)

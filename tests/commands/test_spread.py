@@ -55,6 +55,7 @@ def test_workers_of_a_cluster_work_in_processes_of_their_own_and_one_that_dies_c
     assert str(os.getpid()) not in {number for number, _ in workers} and {threads for _, threads in workers} == {"1"}
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_is_waited_for_and_then_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rig.commands.spread.WITHOUT_WORKERS_S", 0.5)
     with (

@@ -133,6 +133,7 @@ def pdfsig(file: Path) -> str:
     return said
 
 
+@pytest.mark.slow
 def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not(lab: Laboratory) -> None:
     said = pdfsig(lab.folder / PDF)
     assert "Signature is Valid" in said and "Total document signed" in said
@@ -160,6 +161,7 @@ def test_a_signed_digital_certificate_is_one_by_its_schema(lab: Laboratory) -> N
     assert schema_faults(lab.read(XML)) == []
 
 
+@pytest.mark.slow
 def test_with_revocation_lists_it_can_be_checked_long_after(
     lab: Laboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -457,6 +457,7 @@ def doubling(share: float, seed: int) -> tuple[Callable[[bytes], bytes], list[in
     return twice, doubled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.05, 1.0])
 def test_frames_that_come_twice_are_taken_once_and_counted(wire: tuple[BoardOnAWire, str], share: float) -> None:
     wire[0].on_send, doubled = doubling(share, seed=1)

@@ -46,6 +46,7 @@ def test_half_requests_hold_few_descriptors_and_the_page_answers_all_the_same(tm
         assert (status(url, "GET", "/"), status(url, "POST", "/stop", **token)) == (200, 409)
 
 
+@pytest.mark.slow
 def test_an_address_that_opens_many_loses_its_own_and_no_others(tmp_path: Path) -> None:
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))

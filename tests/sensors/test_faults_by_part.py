@@ -134,6 +134,7 @@ def of_kvh(fault: str, patience: Patience) -> Iterator[Bench]:
 BENCHES = {"lines": of_lines, "mavlink": of_mavlink, "kvh1775": of_kvh}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "fault", "name"), list(table()))
 def test_a_fault_has_its_parts_name(part: str, fault: str, name: str) -> None:
     patience = Patience(silent_s=0.5) if fault in LATER else Patience(first_s=1.0)

@@ -252,6 +252,7 @@ def test_a_laboratory_that_stands_still_is_no_silence() -> None:
     assert (np.diff(collected.samples["sequence"]) == 1).all()
 
 
+@pytest.mark.slow
 def test_bit_errors_cost_messages_and_nothing_else() -> None:
     with kvh_on_a_wire(motion_at=lambda time_s: TURNING, pace=4) as wire, streaming(wire) as (source, collected):
         wire.line.bit_error_rate = 1e-4  # every thirtieth message

@@ -65,6 +65,7 @@ class Listening:
         return caught[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 @pytest.mark.parametrize("imu", ["HIGHRES_IMU", "SCALED_IMU"])
 def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str) -> None:
@@ -121,6 +122,7 @@ def test_milliseconds_that_begin_anew_go_on() -> None:
     assert steps.min() > 0 and steps.max() < 20_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("firmware", "imu", "left", "name"),
     [
@@ -166,6 +168,7 @@ def test_what_is_not_ready_is_refused(
     assert caught.value.problem.name == name
 
 
+@pytest.mark.slow
 def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
     with autopilot_on_a_wire(on_for_s=100.0) as wire, Listening({"imu": section(wire.port)}) as heard:
         heard.hear(10)
@@ -174,6 +177,7 @@ def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
         assert heard.fails().problem.name == "autopilot_armed"
 
 
+@pytest.mark.slow
 def test_a_look_says_what_is_undone() -> None:
     with autopilot_on_a_wire("ardupilot", {"INS_GYROFFS_X": 0.01}) as wire:
         seen = list(look({"imu": section(wire.port)}))

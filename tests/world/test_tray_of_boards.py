@@ -4,11 +4,14 @@ import gc
 from pathlib import Path
 from weakref import ref
 
+import pytest
+
 from rig.config.load import load
 from rig.world.process import World
 from support.commands import configuration
 
 
+@pytest.mark.slow
 def test_of_a_tray_of_boards_only_the_one_that_is_laid_in_takes_memory(tmp_path: Path) -> None:
     world = World(load(configuration(tmp_path)))
     boards = []

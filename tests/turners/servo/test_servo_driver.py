@@ -30,6 +30,7 @@ def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
         assert wire.do("register", "Torque Enable") == 0
 
 
+@pytest.mark.slow
 def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() -> None:
     states: list[ServoState] = []
     with servo_on_a_wire() as wire:
@@ -49,6 +50,7 @@ def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() 
     assert np.ptp(record["q_rad"]) > math.radians(55.0)
 
 
+@pytest.mark.slow
 def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured() -> None:
     states: list[ServoState] = []
     with (
@@ -66,6 +68,7 @@ def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured(
     assert abs(found.speed_rad_s / motion.speed_rad_s - 1.0) < 6 * found.speed_std_rad_s / motion.speed_rad_s + 2e-3
 
 
+@pytest.mark.slow
 def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profile() -> None:
     with servo_on_a_wire(ServoTruth(left={"Baud Rate": 3})) as wire:
         with held(wire) as servo:
@@ -73,6 +76,7 @@ def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profi
         assert (wire.do("register", "Operating Mode"), wire.do("register", "Drive Mode")) == (4, 4)
 
 
+@pytest.mark.slow
 def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
     """Its profile is zero then, which is as fast as the servo can."""
     states: list[ServoState] = []
@@ -93,6 +97,7 @@ def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
         assert 0.3 <= servo.latest.time_s - began_s < 0.5
 
 
+@pytest.mark.slow
 def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
     with servo_on_a_wire() as wire, held(wire) as servo:
         told: list[float] = []
@@ -152,6 +157,7 @@ def test_one_program_at_a_time_has_the_port() -> None:
         assert refused.value.name == "servo_port_in_use"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["servo_out_of_range", "servo_too_fast", "servo_move_too_long"])
 def test_a_move_that_the_servo_cannot_make_is_not_begun(name: str) -> None:
     motion = {
