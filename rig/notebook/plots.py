@@ -72,9 +72,10 @@ def plot_residuals(left: Sequence[tuple[str, Unexplained]]) -> Plot:
             beside = places + (i - 1) * 0.15
             axes.errorbar(beside, values[:, i], bars[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
-        axes.set(ylabel=f"{found.shown} {unit.name}")
+        axes.set(ylabel=unit.name)
         axes.set_xticks(places, found.labels, rotation=60, ha="right")
-        _finish(axes, f"{name}: ± 2 σ of {found.of}")
+        _finish(axes, f"{name}: {found.shown}\n")
+        axes.text(0, 1.02, f"± 2 σ: {found.of}", transform=axes.transAxes, fontsize="x-small", color="0.4")
     return Plot(figure)
 
 
