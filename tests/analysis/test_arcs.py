@@ -82,6 +82,7 @@ def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
         assert line.half_width == pytest.approx(2 * STD_DEG)
 
 
+@pytest.mark.slow
 def test_of_whole_turns_the_encoders_err_by_nothing() -> None:
     """What is stated of them changes no number."""
     stated, unstated = (

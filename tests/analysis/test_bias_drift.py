@@ -73,6 +73,7 @@ def test_an_accelerometer_s_bias_is_as_good_as_its_bound() -> None:
     assert np.sqrt(np.mean(change**2)) < 1.2 * np.sqrt(2 * variance / rt.ATTITUDES)
 
 
+@pytest.mark.slow
 def test_a_gyroscope_s_bias_is_as_good_as_its_bound() -> None:
     """TRIAX, Fig. 4. What F is wrong by in the Earth's rate is the same in every repeat, and no drift."""
     truth = np.cumsum(0.1 * rt.DEG_H * np.random.default_rng(4).normal(size=(rt.REPEATS, 3)), axis=0)

@@ -84,6 +84,7 @@ def test_several_speeds_tell_the_nonlinearity_and_the_scale_without_it() -> None
     assert np.abs(off(CURVED)).max() < 4
 
 
+@pytest.mark.slow
 def test_one_speed_tells_no_nonlinearity_and_is_named() -> None:
     explained = solved(THREE).explained
     assert explained is not None

@@ -105,6 +105,7 @@ def test_a_log_made_elsewhere_tells_the_noise_of_its_sensors(
     assert "desk, acceleration" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_log_with_a_gap_is_two_stretches(
     still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -114,6 +115,7 @@ def test_a_log_with_a_gap_is_two_stretches(
     assert "2 stretches at rest" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [1.0, 90.0])
 def test_a_log_in_which_the_sensor_was_turned_is_refused(
     still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str], turn_deg: float

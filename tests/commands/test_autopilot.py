@@ -86,6 +86,7 @@ def test_a_calibration_is_stored_and_the_old_one_comes_back_bit_by_bit(tmp_path:
         assert "autopilot_not_kept" in rig_here("autopilot", "store", config, found, "--old", kept, "--yes").stderr
 
 
+@pytest.mark.slow
 def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
     with autopilot_on_a_wire("px4") as wire:
         before, config = fields(wire), configuration(tmp_path, wire.port)

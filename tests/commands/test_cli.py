@@ -170,6 +170,7 @@ LATER = {"h5py", "jinja2", "scipy", "serial", "rig.analysis.judging", "rig.analy
 LATER |= {"rig.report.certificate.page", "rig.report.kinds.registry"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [f"plan {CONFIG}", f"run {CONFIG} --out RUN", "history"])
 def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tmp_path: Path) -> None:
     words = [sys.executable, "-c", FIRST_LINE, *command.replace("RUN", str(tmp_path / "run")).split()]

@@ -187,6 +187,7 @@ def test_nobody_to_ask_is_a_refusal_and_yes_is_an_answer(tmp_path: Path) -> None
     assert done.returncode == 0 and f"flashed: firmware {FIRMWARE_VERSION}" in done.stdout, done
 
 
+@pytest.mark.slow
 def test_a_probe_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     error = refused(lambda: flashing.find_probe("no-such-probe"))
     assert error.name == "no_probe" and "no-such-probe" in error.what and "--drive" in error.remedy

@@ -165,6 +165,7 @@ def test_what_cannot_be_asked_is_refused_by_name(words: tuple[str, ...], named: 
     assert done.returncode == 2 and named in done.stderr
 
 
+@pytest.mark.slow
 def test_an_interrupted_one_is_gone_on_with(history: History) -> None:
     """With a stand-in for the solving: what is in the journal is not solved again."""
     runs = {run.content_sha256: run for run in map(finished, range(40))}

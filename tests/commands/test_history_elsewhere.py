@@ -63,6 +63,7 @@ def test_nothing_connects_to_a_history_that_a_folder_names(tmp_path: Path, monke
         assert len(list(history.kept())) == 1
 
 
+@pytest.mark.slow
 def test_no_file_that_a_folder_names_becomes_a_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RIG_HISTORY")
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "share"))

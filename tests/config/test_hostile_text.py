@@ -169,6 +169,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "override",
     [

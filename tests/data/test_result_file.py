@@ -39,6 +39,7 @@ def test_results_satisfy_the_committed_schema(name: str) -> None:
         validator.validate(document)
 
 
+@pytest.mark.slow
 def test_what_a_later_version_has_added_is_no_hindrance(tmp_path: Path) -> None:
     document = json.loads(VERIFIED.text())
     for place in (document, document["checks"][0], document["sensors"]["gyro"], document["verification"]["gyro"]):

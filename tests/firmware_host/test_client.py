@@ -129,6 +129,7 @@ def fault_of(board: Board, deadline_s: float = 60.0) -> tuple[BoardError, float]
     raise AssertionError("no fault was noticed")
 
 
+@pytest.mark.slow
 def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, str]) -> None:
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
@@ -175,6 +176,7 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     assert batches[0].samples["sequence"][0] == 0
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_a_lossy_wire_costs_frames_but_no_request(wire: tuple[BoardOnAWire, str]) -> None:
     garbled = [0]
@@ -312,6 +314,7 @@ def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOn
     assert batches[0].samples["counts"][:, 2] == pytest.approx(z_rad_s * 1e6, abs=1.0)
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_what_was_kept_is_averaged_between_two_board_times(wire: tuple[BoardOnAWire, str]) -> None:
     batches: list[SampleBatch] = []
@@ -396,6 +399,7 @@ def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
     assert failure.value.name == "no_board" and "rig board flash" in failure.value.remedy
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
@@ -404,6 +408,7 @@ def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire
     assert failure.value.name == "wrong_baud_rate" and "921600" in failure.value.remedy
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].board.receive = lambda data: wire[0].board.run()  # type: ignore[method-assign]
@@ -412,6 +417,7 @@ def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) ->
     assert failure.value.name == "no_board"
 
 
+@pytest.mark.slow
 def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[BoardOnAWire, str]) -> None:
     lost: list[bytes] = []
 

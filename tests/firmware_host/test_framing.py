@@ -98,6 +98,7 @@ def by_packages(wire: bytes) -> tuple[int, int, bytes] | None:
 # One message through every pair of codecs
 
 
+@pytest.mark.slow
 @given(messages())
 def test_every_message_comes_back_as_it_was_sent(sent: Sent) -> None:
     message, sequence, values, items = sent

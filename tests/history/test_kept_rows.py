@@ -121,6 +121,7 @@ def test_a_file_that_is_not_what_was_entered_is_named(
         ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statements", "named"),
     [

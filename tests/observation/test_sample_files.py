@@ -82,6 +82,7 @@ def as_csv(path: Path, table: dict[str, Any]) -> None:
     np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
 
 
+@pytest.mark.slow
 def test_a_session_solves_to_the_same_numbers_from_all_three(tmp_path: Path) -> None:
     """The log holds floats of 32 bits, and whole microseconds; so do the other two then."""
     table = dict(read_columns(EXAMPLES / "samples.csv", samples_header([RATE]), 256))

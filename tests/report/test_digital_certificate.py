@@ -287,6 +287,7 @@ def test_it_states_no_place_and_the_script_with_its_hash() -> None:
     assert certificate().procedure in xml.decode()
 
 
+@pytest.mark.slow
 def test_the_equipment_is_the_arm_that_was_found_and_valid_with_it_or_without() -> None:
     def equipment(document: ResultDocument) -> list[str]:
         xml = digital_certificate(certificate(document))

@@ -95,6 +95,7 @@ def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> N
 FIELD_T = (2.1e-5, -0.4e-5, -4.2e-5)
 
 
+@pytest.mark.slow
 def test_format_c_has_its_magnetometer_as_a_sensor_of_its_own() -> None:
     with (
         kvh_on_a_wire(pace=4, field_at=lambda time_s: FIELD_T) as wire,
@@ -239,6 +240,7 @@ def test_a_gap_nobody_can_count_ends_the_stream(message: str) -> None:
         assert until_raised(source).name == "kvh_gap_ambiguous"
 
 
+@pytest.mark.slow
 def test_a_laboratory_that_stands_still_is_no_silence() -> None:
     """A simulated one does on a busy machine, and the arm's clock with it."""
     with kvh_on_a_wire(pace=2) as wire, streaming(wire, message="A") as (source, collected):
@@ -307,6 +309,7 @@ def test_what_happens_in_a_stream_is_named(happens: Callable[[KvhOnAWire], None]
             wire.close()
 
 
+@pytest.mark.slow
 def test_the_microseconds_wrap_while_it_streams() -> None:
     """71.6 min after it was switched on."""
     on_for_s = 2**32 * 1e-6 - 4.0

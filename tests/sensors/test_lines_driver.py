@@ -45,6 +45,7 @@ class Taken:
         return np.concatenate(self.parts)
 
 
+@pytest.mark.slow
 def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
     taken = Taken()
     with pty_printing(chain([BOOT], stream())) as (port, _), lines("imu", sensor_section(port), taken) as source:
@@ -109,6 +110,7 @@ def test_a_look_says_what_comes() -> None:
     assert any("100 a second" in each for each in told) and any("+1.5 -2.25 +3 deg/s" in each for each in told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chunks", "name"),
     [
@@ -133,6 +135,7 @@ def test_arrival_times_are_recorded_as_less_certain() -> None:
     assert describe("imu", sensor_section("/dev/null")).stamp_std_s is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [12_000, pytest.param(600_000, marks=[pytest.mark.proof, pytest.mark.thorough])])
 @pytest.mark.timeout(1200)
 def test_1000_hz_of_seven_columns_lose_nothing(count: int) -> None:

@@ -59,6 +59,7 @@ def test_all_sensors_stream_each_at_its_own_pace_without_a_loss() -> None:
     assert {frame.values["dropped"] for frame in frames if frame.name == "samples"} == {0}
 
 
+@pytest.mark.slow
 def test_each_tells_its_own_truth_in_its_own_counts() -> None:
     session = Session(parts=ALL, rate_at=lambda _time_s: RATE_RAD_S, noise_rad_s=0.0)
     session.run(0.2)

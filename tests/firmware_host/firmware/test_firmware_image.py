@@ -120,6 +120,7 @@ def check_of(name: str) -> Callable[[str, str], None]:
     return check_register if name in REGISTERS else check_field
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), [define for define in DEFINES if define[0] != "UNIQUE_ID"])
 def test_every_line_of_the_register_header_is_the_makers(name: str, value: str) -> None:
     check_of(name)(name, value)

@@ -152,6 +152,7 @@ def test_the_newest_record_is_found_across_the_wrap_of_its_sequence(flash: HostF
         assert Store().read_numbered() == ((sequence + k) % 2**32, content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", range(3))
 def test_a_cut_at_any_operation_of_a_write_leaves_the_old_record_or_the_new_one(flash: HostFlash, before: int) -> None:
     """`before` records were written earlier. Every operation, many ways to leave the cells."""

@@ -90,6 +90,7 @@ def test_after_a_trip_of_the_watchdog_the_next_run_s_move_is_no_jump() -> None:
         assert max(abs(state.qd_rad_s[0]) for state in states) < math.radians(60.0) * 1.15
 
 
+@pytest.mark.slow
 def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
     with servo_on_a_wire() as wire, held(wire) as servo:
         began_s = servo.latest.time_s
@@ -116,6 +117,7 @@ def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
             servo.rest(0.1)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None:
     with servo_on_a_wire() as wire:
         with pytest.raises(KeyboardInterrupt) as interrupt, held(wire) as servo:
@@ -125,6 +127,7 @@ def test_ctrl_c_stops_the_shaft_and_the_last_line_says_how_it_was_left() -> None
         assert "the shaft stands" in interrupt.value.__notes__[0]
 
 
+@pytest.mark.slow
 def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> None:
     def disk_full() -> None:
         raise OSError(28, "No space left on device")
@@ -135,6 +138,7 @@ def test_what_the_watch_raises_stops_the_shaft_and_goes_on_to_the_caller() -> No
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
 
 
+@pytest.mark.slow
 def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
     armed: list[bool] = []
 

@@ -46,6 +46,7 @@ REFUSED: dict[str, tuple[str, tuple[ServoTruth, ...], LineTruth]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_servo_is_refused_by_name_and_stays_as_it_is(what: str) -> None:
     name, truths, line = REFUSED[what]
@@ -57,6 +58,7 @@ def test_a_servo_is_refused_by_name_and_stays_as_it_is(what: str) -> None:
         assert wire.angle_rad == before_rad
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1])
 def test_a_servo_that_acknowledges_nothing_is_made_to(level: int) -> None:
     with servo_on_a_wire() as wire:
@@ -66,6 +68,7 @@ def test_a_servo_that_acknowledges_nothing_is_made_to(level: int) -> None:
         assert wire.do("register", "Status Return Level") == 2
 
 
+@pytest.mark.slow
 def test_an_adapter_that_echoes_is_none_of_a_second_servo() -> None:
     with servo_on_a_wire(line=LineTruth(echo=True)) as wire, Servo(wire.port, MODEL, watchdog_s=2.0) as servo:
         servo.take_control(BOARD)

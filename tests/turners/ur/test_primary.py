@@ -99,6 +99,7 @@ def test_a_controller_that_does_not_tell_is_none() -> None:
         assert read_account(HOST, 0.3) == Account()
 
 
+@pytest.mark.slow
 def test_what_one_package_tells_holds_without_the_other() -> None:
     with saying(package(16, info(CALIBRATED) + cartesian((0.0,) * 5 + (float("nan"),)))):
         assert read_account(HOST, 0.3) == Account(CALIBRATED)

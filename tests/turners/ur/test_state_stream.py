@@ -128,6 +128,7 @@ def test_two_seconds_of_states_wait_also_where_the_controller_keeps_none(control
         assert times_of(stream, 1000) == [float(k) for k in range(1, 1001)]
 
 
+@pytest.mark.slow
 def test_a_silence_is_what_has_not_come_however_late_one_looks(controllers: Controllers) -> None:
     controller = controllers(S=ANSWERS["S"] + data(0.0))
     with StateStream(controller.host, 125.0, 5.0) as stream:
