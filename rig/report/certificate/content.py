@@ -321,7 +321,7 @@ def _held_still(result: ResultDocument, stated: Stated) -> Iterator[HeldStill]:
         entries = tuple(found.entry for found in kind.found(result))
         if isinstance(kind.standard, Without) or not entries:
             continue
-        origin, budgets = kind.standard.origin(stated.where), (each.budget for each in entries)
+        origin, budgets = kind.standard.origin(stated.where), (getattr(each, "budget", None) for each in entries)
         known = all(budget is not None and _size_stated(budget) for budget in budgets)
         traceable = known and origin is not None and not is_simulated(result, stated)
         yield HeldStill(kind.name, kind.standard, entries, kind.standard.value(entries[0]), origin, traceable)
