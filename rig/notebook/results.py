@@ -14,8 +14,7 @@ from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
-from rig.report.kinds.kind import Without
-from rig.report.kinds.registry import kinds, shown
+from rig.report.kinds.registry import outlets, shown
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
@@ -33,11 +32,9 @@ class Result(Mapping[str, Calibration]):
     @cached_property
     def _calibrations(self) -> dict[str, Calibration]:
         found = (
-            Calibration(shown.name, each, shown)
-            for kind in kinds()
-            if not isinstance(kind.shown, Without)
-            for each in kind.found(self.document)
-            if (shown := kind.shown(each)).scale is not None
+            Calibration(shown.name, finding, shown)
+            for _, show, finding in outlets(self.document, lambda kind: kind.shown)
+            if (shown := show(finding)).scale is not None
         )
         return {each.name: each for each in found}
 
@@ -62,15 +59,9 @@ class Result(Mapping[str, Calibration]):
         """
         from rig.notebook.plots import plot_residuals
 
-        return plot_residuals(
-            [
-                (f"{found.sensor}, {kind.name}", left)
-                for kind in kinds()
-                if not isinstance(kind.unexplained, Without)
-                for found in kind.found(self.document)
-                if (left := kind.unexplained(found)) is not None
-            ]
-        )
+        asked = outlets(self.document, lambda kind: kind.unexplained)
+        found = ((f"{finding.sensor}, {kind.name}", leave(finding)) for kind, leave, finding in asked)
+        return plot_residuals([(name, left) for name, left in found if left is not None])
 
     def __getitem__(self, name: str) -> Calibration:
         known = self._calibrations

@@ -8,8 +8,8 @@ from typing import Any
 from rig.data.motion_file import NOT_STATED
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.check_words import what_failed, words_of
-from rig.report.kinds.kind import Shown, Three, Without
-from rig.report.kinds.registry import kinds
+from rig.report.kinds.kind import Shown, Three
+from rig.report.kinds.registry import kinds, outlets
 from rig.report.mounts import farthest_off
 from rig.report.rounding import in_print, plus_minus
 from rig.station.plain_text import INDENT, wrapped
@@ -78,14 +78,12 @@ def _values(items: Sequence[_Item], width: int) -> Iterator[str]:
 
 def _items(result: ResultDocument) -> Iterator[_Item]:
     """What has values of its own: a reference is known already."""
-    for kind in kinds():
-        for found in kind.found(result):
-            entry: Any = found.entry
-            if isinstance(kind.shown, Without) or getattr(entry, "role", None) == "reference":
-                continue
-            serial = getattr(entry, "serial_number", None)
-            label = found.sensor if serial in (None, NOT_STATED) else f"{found.sensor} {serial}"
-            yield _Item(kind.name, label, entry, kind.shown(found))
+    for kind, show, finding in outlets(result, lambda kind: kind.shown):
+        if finding.known:
+            continue
+        serial = getattr(finding.entry, "serial_number", None)
+        label = finding.sensor if serial in (None, NOT_STATED) else f"{finding.sensor} {serial}"
+        yield _Item(kind.name, label, finding.entry, show(finding))
 
 
 def _one(item: _Item, width: int) -> Iterator[str]:

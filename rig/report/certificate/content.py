@@ -11,7 +11,7 @@ from rig.analysis.clock import BY_COMPUTER
 from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.provenance import calls_itself_simulated
-from rig.data.quantity import FIELD, RATE
+from rig.data.quantity import FIELD
 from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
@@ -19,7 +19,7 @@ from rig.motion.steps import closes, turn_words
 from rig.report.certificate.statements import Stated
 from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard, Without
-from rig.report.kinds.registry import kinds, shown
+from rig.report.kinds.registry import kinds, outlets, shown
 from rig.report.mounts import mount_lines
 from rig.turners.kind import Words
 from rig.turners.registry import words_of
@@ -176,13 +176,8 @@ class Certificate:
     @property
     def blocks(self) -> tuple[Block, ...]:
         """What the page prints of each sensor, one after the other; of a reference nothing."""
-        blocks = [
-            Block(kind.block, found)
-            for kind in kinds()
-            if not isinstance(kind.block, Without)
-            for found in kind.found(self.result)
-            if getattr(found.entry, "role", "calibrate") == "calibrate"
-        ]
+        asked = outlets(self.result, lambda kind: kind.block)
+        blocks = [Block(place, finding) for _, place, finding in asked if not finding.known]
         order = list(dict.fromkeys(block.found.sensor for block in blocks))
         return tuple(sorted(blocks, key=lambda block: order.index(block.found.sensor)))
 
@@ -268,10 +263,9 @@ def _title(result: ResultDocument) -> str:
 
 def _without_uncertainty(result: ResultDocument) -> Iterator[str]:
     """Sensors of which noise alone is known: in recordings of before there was a budget, and by some estimators."""
-    references = {(name, RATE) for name, sensor in result.sensors.items() if sensor.role == "reference"}
-    for each in shown(result):
-        if each.scale is not None and not each.combined and (each.sensor, each.quantity) not in references:
-            yield each.sensor
+    for _, show, finding in outlets(result, lambda kind: kind.shown):
+        if not finding.known and (row := show(finding)).scale is not None and not row.combined:
+            yield finding.sensor
 
 
 def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
@@ -341,10 +335,9 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
         if lost:
             yield f"{name}: {lost} samples were lost within sweeps and left out."
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
-    for kind in kinds():
-        for found in () if isinstance(kind.standard, Without) else kind.found(result):
-            said = getattr(found.entry, "warnings", ())
-            yield from (f"{found.quantity.of(found.sensor)}: {warning}" for warning in said)
+    for _, _, finding in outlets(result, lambda kind: kind.standard):
+        said = getattr(finding.entry, "warnings", ())
+        yield from (f"{finding.quantity.of(finding.sensor)}: {warning}" for warning in said)
     for name, magnetometer in result.magnetometers.items():
         if isinstance(magnetometer, ErrorEntry):
             yield f"{FIELD.of(name)}, was recorded and not calibrated: {magnetometer.error}"

@@ -15,8 +15,8 @@ from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import kind
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
-from rig.report.kinds.kind import Measured, Without
-from rig.report.kinds.registry import kinds
+from rig.report.kinds.kind import Measured
+from rig.report.kinds.registry import outlets
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
@@ -105,9 +105,8 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
 
 def _measured(c: Certificate) -> Iterator[Measured]:
     """Everything that was measured, kind by kind."""
-    for each in kinds():
-        if not isinstance(each.measured, Without):
-            yield from filter(None, (each.measured(found, c.reversals) for found in each.found(c.result)))
+    asked = outlets(c.result, lambda kind: kind.measured)
+    yield from filter(None, (measure(finding, c.reversals) for _, measure, finding in asked))
 
 
 def _keys(items: Iterable[Measured]) -> dict[tuple[str, str], str]:

@@ -13,8 +13,7 @@ from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.kinds.corrected import Corrected
-from rig.report.kinds.kind import Without
-from rig.report.kinds.registry import kinds
+from rig.report.kinds.registry import outlets
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +68,5 @@ class Calibrations:
 
 def calibrations(result: ResultDocument) -> Calibrations:
     """What every kind of result says to other programs; nothing of references, which are known already."""
-    found = (
-        kind.corrected(each)
-        for kind in kinds()
-        if not isinstance(kind.corrected, Without)
-        for each in kind.found(result)
-    )
+    found = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
     return Calibrations(result, tuple(each for each in found if each is not None), result.over_temperature)

@@ -58,7 +58,7 @@ def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
 def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     """The item is its gyroscope, as warm as that was; a reference is none."""
     sensor = finding.entry
-    if sensor.role == "reference":
+    if finding.known:
         return None
     name, results = f"the Earth's rate found by gyroscope {finding.sensor}", dcc_results.earth_rate(_of(finding))
     warm = temperatures_c(sensor)

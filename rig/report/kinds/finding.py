@@ -16,3 +16,8 @@ class Finding(Generic[EntryT]):
     sensor: str
     quantity: Quantity
     entry: EntryT
+
+    @property
+    def known(self) -> bool:
+        """Whether the sensor is a reference, which nothing was found of: its calibration was known before."""
+        return getattr(self.entry, "role", "calibrate") == "reference"

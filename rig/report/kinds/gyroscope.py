@@ -66,7 +66,7 @@ def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
 
 
 def _printed(finding: Finding[SensorEntry]) -> Iterator[Table | str]:
-    sensor, reference = finding.entry, " (known)" if finding.entry.role == "reference" else ""
+    sensor, reference = finding.entry, " (known)" if finding.known else ""
     title = f"{finding.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
     yield from tables(title, RATE, sensor)
     yield from _beside(sensor)
@@ -111,7 +111,7 @@ def _further(sensor: SensorEntry) -> Iterator[Further]:
 def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     """The item's results; nothing of a reference."""
     sensor = finding.entry
-    if sensor.role == "reference":
+    if finding.known:
         return None
     name = f"calibration of gyroscope {finding.sensor}"
     results = chain(dcc_results.gyroscope(sensor), dcc_results.beside(_further(sensor)))
@@ -122,7 +122,7 @@ def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
 def _corrected(finding: Finding[SensorEntry]) -> Corrected | None:
     """Readings to rates, in the frame nearest to its axes."""
     sensor = finding.entry
-    if sensor.role == "reference":
+    if finding.known:
         return None
     matrix, sensitivity = np.diag(1 / np.array(sensor.scale)), None
     if isinstance(vector := sensor.vector_model, VectorEntry):
