@@ -14,8 +14,9 @@ from rig.turners.ur.primary_stop import PrimaryStop
 from rig.turners.ur.spare_descriptors import SpareDescriptors
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
-WAY_S = 0.8  # a port of the controller has so long to answer
-ASK_S = 0.05  # … and is asked so often whether the program has ended
+WAY_S = 0.8  # a port of the controller has so long to answer …
+LATE_S = 0.1  # … and so long when no time is left
+ASK_S = 0.05  # a port is asked so often whether the program has ended
 BRAKE_RAD_S2 = 5.0
 
 
@@ -67,10 +68,11 @@ class Order:
             return self._changed.wait_for(lambda: not self._to_give, max(0.0, self._left_s))
 
     def program_ended(self) -> bool:
-        """Whether the controller says so on any way; waits for it as long as it may yet come."""
+        """Whether the controller says so on any way; waits for it as long as it may yet come, as `given` does."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or not self._under_way, max(0.0, self._left_s))
-            return self._ended
+        self.given()
+        return self._ended
 
     @property
     def words(self) -> str:
@@ -85,7 +87,8 @@ class Order:
 
     def _give(self, way: Port) -> None:
         try:
-            with closing(way(self._host, min(WAY_S, self._left_s))) as connection:
+            # However late it is: a program that was ended in vain is better than an arm that goes on.
+            with closing(way(self._host, max(LATE_S, min(WAY_S, self._left_s)))) as connection:
                 connection.stop_program()
                 self._heard = True
                 self._no_longer(way, self._to_give)

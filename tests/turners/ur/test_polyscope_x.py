@@ -14,6 +14,7 @@ from rig.turners.ur.primary import PORT as PRIMARY_PORT
 from rig.turners.ur.primary_stop import MODE_DATA, PrimaryStop
 from rig.turners.ur.robot_api import RobotApi
 from rig.turners.ur.stopping import Order, independent_ways
+from support.waiting import wait_for
 from support.worlds import fresh_host
 
 API_PORT = 8077
@@ -116,6 +117,13 @@ def test_a_primary_interface_that_does_not_tell_confirms_no_stop(states: bytes) 
         assert not order.program_ended()
         assert time.monotonic() - began_s < 5.0
     assert order.words == "the controller was told to stop"
+
+
+def test_an_order_is_given_however_late_its_thread_begins() -> None:
+    with saying(PRIMARY_PORT, [state(False)]) as (host, heard):
+        Order(host, independent_ways((10, 12, 0, 0)), 0.0)
+        wait_for(lambda: heard, "the order")
+    assert heard == [b"stop program\n"]
 
 
 def test_an_order_that_nobody_takes_names_every_way() -> None:
