@@ -73,6 +73,7 @@ def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> N
     assert "times what the variances explain" in first.warnings[0] and not second.warnings
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("second_order", [pytest.param(False, marks=[pytest.mark.proof, pytest.mark.thorough]), True])

@@ -60,6 +60,7 @@ def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: EqualWeights) -
         solve_triaxial(readings(r), r, variances, KnownNorm(EARTH.norm, [0, 0, 1]), method=method)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("still", [True, False])

@@ -609,7 +609,7 @@ def test_a_bias_too_large_for_algorithm_1_is_reported_beside_the_result() -> Non
 @pytest.mark.proof
 def test_reported_uncertainties_are_those_of_many_sessions(thorough: bool) -> None:
     """Sessions over four movements: errors in units of their reported standard deviation have RMS 1."""
-    sessions = 50 if thorough else 12
+    sessions = 50 if thorough else 5
     within = 3.3 / np.sqrt(2 * 4 * sessions)
     parameters, clocks = [], []
     for movement in range(4):

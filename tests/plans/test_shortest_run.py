@@ -215,6 +215,7 @@ def coarse(each: Candidate) -> bool:
     return each.family[0] == 3 and each.family[1] in (60.0, 120.0) and repeats in (1, 2, 3, 4) and rest_s <= 10
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_more_than_the_rest_is_chosen() -> None:
     """By the scale factors the speed is found, by the biases repeats or rests."""
@@ -226,6 +227,7 @@ def test_more_than_the_rest_is_chosen() -> None:
     assert quick.best.reached.scale <= 1.3e-4
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_what_no_run_reaches_is_told_from_what_takes_too_long() -> None:
     never = shortest_run(demo(), Wanted(scale=1e-6))

@@ -116,13 +116,14 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
         assert (out / f"accelerometer_gyro{suffix}").stat().st_size > 10_000
 
 
-def test_a_worse_limit_fails_the_verdict(in_attitudes: Finished) -> None:
-    out, *_ = in_attitudes
+def test_a_worse_limit_fails_the_verdict(imu: Finished) -> None:
+    out, *_ = imu
     judged = rig_here("solve", out, "--set", "limits.acceleration_verification_m_s2=1e-6", "--json")
     failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
     assert judged.returncode == 1 and failed == ["gyro.acceleration_verification"]
 
 
+@pytest.mark.thorough
 def test_the_page_shows_what_was_read_in_every_attitude(in_attitudes: Finished) -> None:
     out, result, *_ = in_attitudes
     run = read_run(out / "run.h5")

@@ -22,6 +22,7 @@ def finished(folder: Path, world: dict[str, Any]) -> tuple[int, dict[str, Any], 
     return done.returncode, clocks, result["provenance"]
 
 
+@pytest.mark.thorough
 def test_a_controllers_clock_that_the_boards_crystal_contradicts_fails_and_says_by_how_much(tmp_path: Path) -> None:
     status, clocks, provenance = finished(tmp_path, {"arm": {"clock_ppm": 500}})
     check = clocks["clocks_agree.controller_and_crystal"]

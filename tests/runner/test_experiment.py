@@ -207,6 +207,7 @@ def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
     assert "gyro_matrix[3][3]" in (out / "calibration.h").read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_the_script_runs_as_the_command_does_and_stores_and_verifies_no_calibration_that_failed(tmp_path: Path) -> None:
     script = CONFIGS.parent / "procedures" / "six_observation.py"
     config = configuration(tmp_path, merge(QUICK_EXPERIMENT, {"limits": {"scale_deviation": 0.01}}))

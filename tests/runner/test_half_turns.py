@@ -15,6 +15,7 @@ ONCE_RAD, TWICE_RAD = 3e-4, 1e-4  # what the simulated encoders err
 STD_DEG = float(np.degrees(np.hypot(ONCE_RAD, TWICE_RAD) / np.sqrt(2)))
 
 
+@pytest.mark.thorough
 def test_half_turns_recover_the_simulated_truth(tmp_path: Path) -> None:
     changes = {
         "procedure": {"arc_deg": 180},

@@ -37,6 +37,7 @@ def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
     assert float(max(short.solution.expanded_scale)) <= 2e-3
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("mistakes", "names"),
@@ -62,6 +63,7 @@ def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
     held(table)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> None:
     table = Table(seed=5, mistakes={"crumb": 0.2}, settings=SHORT)

@@ -152,6 +152,7 @@ def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt
     assert status == 130 and "interrupted; the arm is stopped and at rest; " in errors
 
 
+@pytest.mark.thorough
 def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> None:
     quick = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
     known_less = {"scale_std": 0.005, "bias_std_rad_s": 0.01, "condition": 20}
@@ -163,6 +164,7 @@ def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> Non
     assert status == 0, errors
 
 
+@pytest.mark.thorough
 def test_three_ctrl_c_at_once_leave_the_word_that_the_arm_stands(start: Start) -> None:
     rig = start({"world": {"time_scale": 1}})
     rig.until_sweeping()

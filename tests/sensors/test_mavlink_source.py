@@ -65,6 +65,7 @@ class Listening:
         return caught[0]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["ardupilot", "px4"])
 @pytest.mark.parametrize("imu", ["HIGHRES_IMU", "SCALED_IMU"])
@@ -122,6 +123,7 @@ def test_milliseconds_that_begin_anew_go_on() -> None:
     assert steps.min() > 0 and steps.max() < 20_000
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("firmware", "imu", "left", "name"),

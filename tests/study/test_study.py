@@ -31,6 +31,7 @@ def found(name: str, quantity: str) -> float:
     return next(finding.value for finding in report(name).findings if finding.quantity == quantity)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["normal", "extreme"])
 def test_the_published_bands_are_those_of_whole_turns_at_3_rad_s(name: str) -> None:
     ratios = {
@@ -106,6 +107,7 @@ def test_every_estimator_reaches_its_bound() -> None:
     assert all(0.9 < ratio < 1.05 for ratio in ratios)
 
 
+@pytest.mark.thorough
 def test_the_vector_model_with_rests_halves_the_bias_error_and_more() -> None:
     name = "{} MSE, Algorithm 1 over vector model with rests, {}"
     assert found("estimators", name.format("bias", "60°/s")) > 4

@@ -182,7 +182,7 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
     assert turned_rad / (inside[-1].time_s - inside[0].time_s) == pytest.approx(-sweep.speed_rad_s, rel=0.01)
 
 
-@pytest.mark.one_in(7)
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize(
     ("name", "order"),
     [
