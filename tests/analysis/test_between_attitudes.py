@@ -72,6 +72,7 @@ def before_cameras() -> Turning:
     return Turning(samples[:, 0], samples[:, 1:4], rows[:, :2], attitudes)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("window_s", [None, 1.0, 2.0, 3.0, 4.0])
 def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | None) -> None:
     found = solve_turning(before_cameras(), window_s, any_mounting=False)

@@ -26,6 +26,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [f"{PLAN} | head -1", f"{PLAN} >&-", f"{PLAN} >&- 2>&- <&-", f"{PLAN} --json | true"]

@@ -77,6 +77,7 @@ def test_the_bound_of_six_observations_is_the_theory_of_one_axis() -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(bound)), [*SCALE**2 * bias / speed, *[bias] * 3], rtol=1e-12)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("second_order", [None, ACCELEROMETER_SECOND_ORDER])
 def test_maximum_likelihood_reaches_the_triaxial_bound(second_order: Array | None) -> None:

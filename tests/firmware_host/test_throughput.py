@@ -8,6 +8,7 @@ from support.full_rate import CASES, stream
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("case", "simulated_s"),
     [("three sensors", 4.0), ("one at 952 Hz", 4.0), ("all at their highest rates, calibrated", 2.0)],

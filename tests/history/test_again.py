@@ -205,6 +205,7 @@ def replicated(history: History, run: Finished, count: int) -> None:
             connection.execute(text(f"INSERT INTO {table} {numbers} SELECT {taken} FROM n, {table} WHERE {key} = 1"))
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_ten_thousand_results_are_planned_in_a_handful_of_questions(history: History, tmp_path: Path) -> None:
     replicated(history, finished(0), 10_000)

@@ -139,6 +139,7 @@ def test_of_a_run_of_six_that_failed_the_first_screen_has_the_verdict_and_what_f
             legible(driver)
 
 
+@pytest.mark.one_in(2)
 def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: Telling) -> None:
     with screen(driver, *TELEPHONE):
         until(lambda: len(driver.find_elements(By.CSS_SELECTOR, ".plot")) == 6, "six plots")

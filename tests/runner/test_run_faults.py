@@ -142,6 +142,7 @@ def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal
     assert len(run.samples["gyro"]) > 0 and len(run.states) > 0
 
 
+@pytest.mark.thorough
 def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt_too(start: Start) -> None:
     with ignored(signal.SIGINT):
         rig = start()
@@ -295,6 +296,7 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("fault", "name"),
     [

@@ -390,6 +390,7 @@ def test_the_dashboard_answers_in_the_makers_words(world: World) -> None:
         assert ask("quit") == "Disconnected"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("polyscope", ["5.6.0.0", "5.23.1.0"])
 def test_the_controller_takes_other_polyscope_versions(world: World, polyscope: str) -> None:
     with client(world({"world": {"arm": {"polyscope": polyscope}}}), "say(control.moveJ([*home[:5], 0.1]))") as arm:
