@@ -43,7 +43,7 @@ NUMERIC := -n 2 --dist worksteal -m "kernels or not (slow or proof)" tests/estim
 system:
 	requirements/system.sh test
 
-# The type checker has one processor to itself while tests wait for their laboratories.
+# The type checker works while tests wait for their laboratories.
 check: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint fast
 
