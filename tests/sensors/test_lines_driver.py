@@ -119,6 +119,13 @@ def test_every_unit_of_a_column_is_of_a_quantity_that_is_known() -> None:
     assert units_of(LineFieldSection) == {FIELD.name} and units_of(LineTimeSection) == {"time"}
 
 
+def test_a_device_that_prints_no_temperature_has_one_that_is_stated() -> None:
+    assert describe("imu", sensor_section("/dev/null")).temperature_stated
+    printed = lines_section(columns=(*SEVEN, "temperature"), temperature=None)
+    section = sensor_section("/dev/null").model_copy(update={"lines": printed})
+    assert not describe("imu", section).temperature_stated
+
+
 def test_a_look_says_what_comes() -> None:
     with pty_printing(chain([BOOT], stream())) as (port, _):
         told = [str(each) for each in look("imu", sensor_section(port))]

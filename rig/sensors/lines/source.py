@@ -19,7 +19,7 @@ from rig.config.lines_section import (
 )
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
 from rig.config.units import UNITS
-from rig.data.channel import Channel, of_thermometer, of_three_axes, stamped
+from rig.data.channel import Channel, of_stated_temperature, of_thermometer, of_three_axes, stamped
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
@@ -174,8 +174,8 @@ def _triad(lines: LinesSection, quantity: Quantity, section: _OfTriad, full_scal
 
 def _thermometer(lines: LinesSection) -> tuple[Channel, _Printed]:
     told = lines.temperature
-    if told.stated_c is not None:  # a thermometer whose steps are so wide that it shows no change
-        return of_thermometer(told.stated_within_k, told.stated_c), _Printed(())
+    if told.stated_c is not None:
+        return of_stated_temperature(told.stated_c, told.stated_within_k), _Printed(())
     step = 0.0 if told.decimals is None else told.scale * 10.0**-told.decimals
     place = lines.columns.index("temperature")
     return of_thermometer(max(step, DEGREES_PER_COUNT), 0.0), _Printed((place,), told.scale, told.offset_c)
