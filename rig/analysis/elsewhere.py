@@ -14,7 +14,7 @@ from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.installed_kinds import KindFound, OfKind
-from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference, with_rate_polynomials
+from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
 from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
@@ -245,9 +245,8 @@ def _as_swept(result: Result) -> TurnedSolution:
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.of(matrix)
     of_matrix = np.r_[F, OFFSET]
-    lines = tuple(
-        replace(line, covariance=OTHER_SIGN @ line.covariance @ OTHER_SIGN) for line in result.budget.contributors
-    )
+    sign = np.diag(RATE.parameter_signs)
+    lines = tuple(replace(line, covariance=sign @ line.covariance @ sign) for line in result.budget.contributors)
     if isinstance(result, InIncrements):
         observations, rank = len(result.solution.residuals_rad), 12
         warnings: tuple[str, ...] = ()
@@ -258,8 +257,8 @@ def _as_swept(result: Result) -> TurnedSolution:
         residuals, estimator = of_rows.residuals, str(of_rows.method)
     return TurnedSolution(
         scale=axes.scale,
-        bias_rad_s=-solution.bias,
-        covariance=OTHER_SIGN @ scale_and_bias_covariance(matrix, axes.scale, solution.covariance) @ OTHER_SIGN,
+        bias_rad_s=RATE.offset * solution.bias,
+        covariance=sign @ scale_and_bias_covariance(matrix, axes.scale, solution.covariance) @ sign,
         matrix=matrix,
         matrix_covariance=solution.covariance[np.ix_(of_matrix, of_matrix)],
         non_orthogonality_rad=axes.non_orthogonality_rad,

@@ -34,7 +34,6 @@ from rig.observation.observed_run import ObservedRun
 
 CONTRIBUTOR = "polynomials over temperature"
 ASSUMED_GRADIENT_K = 0.1  # half a width, where no configuration states it
-OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # b of a gyroscope's g = K (m + b) is −c of m = F ω + c
 NOT_RECORDED = Fault(
     "temperature_not_recorded",
     "a calibration over temperature is asked for, and the readings have no temperature",
@@ -96,7 +95,7 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
 
 def with_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
     """A gyroscope's calibration with what the polynomials add to its uncertainty, and these with all of its budget."""
-    budget, whole = _together(polynomials, np.r_[result.scale, -result.bias_rad_s], result.uncertainty, OTHER_SIGN)
+    budget, whole = _together(RATE, polynomials, np.r_[result.scale, result.bias_rad_s], result.uncertainty)
     return replace(result, uncertainty=budget), whole
 
 
@@ -104,13 +103,16 @@ def with_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
     """An accelerometer's, as a gyroscope's."""
-    budget, whole = _together(polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget, np.eye(6))
+    budget, whole = _together(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), whole
 
 
 def _together(
-    polynomials: OverTemperature, values: Array, budget: Budget | None, sign: Array
+    quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget | None
 ) -> tuple[Budget | None, OverTemperature]:
+    """A budget of scale factors and biases (6,) with the polynomials' part, and these, whose bias is in the reading."""
+    sign = np.diag(quantity.parameter_signs)
+    values = sign @ parameters
     if budget is None:
         return None, settled(polynomials, values, ())
     lines = tuple(

@@ -20,7 +20,7 @@ from rig.observation.windows import Window, dwelt
 class When:
     """When readings were taken, in UTC, and their `mean_utc`; their mean temperature and how it ranged.
 
-    No temperatures where no thermometer tells them.
+    No temperatures where no thermometer tells them, and where the temperature was stated no range.
     """
 
     from_utc: datetime
@@ -52,7 +52,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
     parts = [(each.sensors[name], since_s) for each, since_s in _on_one_clock(recordings)]
     turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
     rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
-    return Held(_when(recordings, turns), _when(recordings, [*turns, *rests]))
+    return Held(_when(recordings, name, turns), _when(recordings, name, [*turns, *rests]))
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
@@ -66,10 +66,10 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
             for dwell in part.dwells
             if dwell.index in wanted
         ]
-    return _when(recordings, read)
+    return _when(recordings, name, read)
 
 
-def of_magnetometer(recordings: Sequence[ObservedRun], dwells: Iterable[int]) -> When:
+def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
     windows = {
@@ -78,7 +78,7 @@ def of_magnetometer(recordings: Sequence[ObservedRun], dwells: Iterable[int]) ->
         for each in dwelt(recording.run)
         if each.dwell.index in wanted
     }
-    return _when(recordings, [_Read(each, each.end_s - each.start_s, None) for each in windows.values()])
+    return _when(recordings, name, [_Read(each, each.end_s - each.start_s, None) for each in windows.values()])
 
 
 def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
@@ -94,8 +94,8 @@ def _moved(window: Window, since_s: float) -> Window:
     return Window(window.start_s + since_s, window.end_s + since_s)
 
 
-def _when(recordings: Sequence[ObservedRun], read: Sequence[_Read]) -> When:
-    """When readings were taken, each window by its weight; a recording's wall time is that of its first state."""
+def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
+    """When a sensor's readings were taken, each window by its weight; a recording began with its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [each.weight for each in read]
 
@@ -103,11 +103,12 @@ def _when(recordings: Sequence[ObservedRun], read: Sequence[_Read]) -> When:
         return began + timedelta(seconds=time_s - first_s)
 
     middles = [(each.window.start_s + each.window.end_s) / 2 for each in read]
+    stated = recordings[0].run.sensors[name].temperature_stated
     warm = [each.temperature_c for each in read if each.temperature_c is not None]
     return When(
         utc(min(each.window.start_s for each in read)),
         utc(max(each.window.end_s for each in read)),
         utc(float(np.average(middles, weights=weights))),
         float(np.average(warm, weights=weights)) if warm else None,
-        (min(warm), max(warm)) if warm else None,
+        (min(warm), max(warm)) if warm and not stated else None,
     )

@@ -35,14 +35,14 @@ def run(options: Namespace) -> int:
 
 
 def files(options: Namespace) -> list[Path]:
-    """Readings of the first movement, or the calibrations of a run that passed, into `--out`.
+    """Readings of the first movement with what turned it, or the calibrations of a run that passed, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
     Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of
-    readings as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and the format do.
+    readings as `open_run` and `exported`, of calibrations as `passed_result`, `at_temperature` and the format do.
     """
-    from rig.observation.observed_run import observe_runs
     from rig.plans.recorded import open_run
+    from rig.report.exports.recorded import exported
 
     run, name, out = options.run, options.format, options.out
     moved: tuple[str, str] | None = options.at_temperature
@@ -52,10 +52,8 @@ def files(options: Namespace) -> list[Path]:
     try:
         if name in OF_READINGS:
             write = writer_of_readings(name)
-            say_on_terminal("finding the time base")
-            recordings = observe_runs(open_run(run).movement)
-            if not recordings:
-                raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")
+            say_on_terminal("reading the recordings")
+            recordings = exported(open_run(run).movement)
             _made(folder, own=out is not None)
             written = write(recordings, folder)
         else:

@@ -1,32 +1,14 @@
 """Which columns of somebody else's files hold what, and in which units: the file that `--columns` names."""
 
-from collections.abc import Mapping
-from math import pi, radians
-from types import MappingProxyType
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.section import Positive, Section
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.config.units import ACCELERATION, ANGLE, FIELD, NUMBER, PRESSURE, RATE, TEMPERATURE, TIME, UNITS
 
-TIME, ANGLE, RATE, ACCELERATION, FIELD, TEMPERATURE, NUMBER = (
-    "a time", "an angle", "a rate", "an acceleration", "a field", "a temperature", "a plain number",
-)  # fmt: skip
-UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
-    {
-        **dict.fromkeys(("s", "sec"), (TIME, 1.0)), "ms": (TIME, 1e-3), **dict.fromkeys(("us", "µs"), (TIME, 1e-6)),
-        "ns": (TIME, 1e-9), "min": (TIME, 60.0), "h": (TIME, 3600.0),
-        "rad": (ANGLE, 1.0), "mrad": (ANGLE, 1e-3), **dict.fromkeys(("deg", "°"), (ANGLE, radians(1))),
-        "arcsec": (ANGLE, radians(1 / 3600)), **dict.fromkeys(("turn", "rev"), (ANGLE, 2 * pi)),
-        "rad/s": (RATE, 1.0), "mrad/s": (RATE, 1e-3), **dict.fromkeys(("deg/s", "°/s", "dps"), (RATE, radians(1))),
-        **dict.fromkeys(("deg/h", "°/h"), (RATE, radians(1 / 3600))), "rpm": (RATE, 2 * pi / 60),
-        **dict.fromkeys(("m/s2", "m/s²"), (ACCELERATION, 1.0)), "g": (ACCELERATION, STANDARD_GRAVITY_M_S2),
-        "mg": (ACCELERATION, 1e-3 * STANDARD_GRAVITY_M_S2),
-        "T": (FIELD, 1.0), **dict.fromkeys(("uT", "µT"), (FIELD, 1e-6)), "nT": (FIELD, 1e-9), "G": (FIELD, 1e-4),
-        "mG": (FIELD, 1e-7), **dict.fromkeys(("C", "°C"), (TEMPERATURE, 1.0)), "1": (NUMBER, 1.0),
-    }
-)  # fmt: skip
+# Files tell no pressure, and a column of theirs is multiplied by its unit alone.
+ALLOWED = tuple(name for name, unit in UNITS.items() if unit.of != PRESSURE and not unit.zero)
 SUFFIXES = (
     ("_rad_s", RATE),
     ("_m_s2", ACCELERATION),
@@ -48,14 +30,14 @@ class ColumnSection(Section):
     @classmethod
     def known(cls, value: str) -> str:
         """A unit that is not known is no unit to convert from."""
-        if value not in UNITS:
-            raise ValueError(f"no unit that is known here; allowed: {', '.join(UNITS)}")
+        if value not in ALLOWED:
+            raise ValueError(f"no unit that is known here; allowed: {', '.join(ALLOWED)}")
         return value
 
     @property
     def factor(self) -> float:
         """What takes its numbers to SI units."""
-        return UNITS[self.unit][1]
+        return UNITS[self.unit].size
 
 
 class AxisSection(Section):
@@ -117,6 +99,10 @@ class ColumnMap(Section):
 
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:
-    found = UNITS[column.unit][0]
+    found = UNITS[column.unit].of
     if found != wanted:
-        raise ValueError(f"{name} is {wanted}, and {column.unit} is the unit of {found}")
+        raise ValueError(f"{name} is {_one(wanted)}, and {column.unit} is the unit of {_one(found)}")
+
+
+def _one(name: str) -> str:
+    return f"an {name}" if name[0] in "aeiou" else f"a {name}"

@@ -10,13 +10,7 @@ from rig.errors.quoting import quote
 
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
 COLUMNS = ("time", "sequence", *GYROSCOPE, *ACCELEROMETER, *MAGNETOMETER, "temperature", "-")
-# Units of what has no axes: of which of `rig.data.quantity.SCALARS`, and in its unit how large one is, and zero.
-SCALAR_UNITS = {
-    "Pa": ("pressure", 1.0, 0.0), "hPa": ("pressure", 100.0, 0.0), "kPa": ("pressure", 1e3, 0.0),
-    "degC": ("temperature", 1.0, 0.0), "K": ("temperature", 1.0, -273.15),
-}  # fmt: skip
 SEPARATORS = {"comma": b",", "semicolon": b";", "tab": b"\t", "space": b" "}
-SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "ns": 1e-9}
 GAP = "?"  # what `rig lines` writes where the readings do not tell it
 LONGEST_GAP_S = 2.0  # a device that is silent for longer is lost
 PRINTABLE = r"^[ -~]*$"

@@ -4,7 +4,7 @@ A sample is its three stamps and a column for each channel, so the channels say 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
@@ -29,6 +29,7 @@ class Channel:
     saturated, None where nothing tells; `range` is the nominal end of scale in the unit, None where it is not known.
     `step` is how far neighbouring readings are apart at most, in the unit, where that is more than a count: so about
     zero of numbers that were cut toward it, and half as far elsewhere.
+    Where the value is `stated` nobody read it: all numbers are the same; a count is by how much it may have changed.
     """
 
     quantity: str
@@ -39,6 +40,7 @@ class Channel:
     full_scale_counts: Annotated[int, Field(gt=0)] | None = None
     range: Positive | None = None
     step: Positive | None = None
+    stated: Literal[True] | None = None
 
     @property
     def measures(self) -> Quantity | Scalar:
@@ -110,6 +112,11 @@ def of_three_axes(
 def of_thermometer(c_per_count: float, offset_c: float) -> Channel:
     """The channel of the thermometer in such a sensor."""
     return Channel(TEMPERATURE.name, "temperature_counts", "<i2", c_per_count, offset_c)
+
+
+def of_stated_temperature(stated_c: float, within_k: float) -> Channel:
+    """The channel of a sensor without a thermometer: how warm it is, and by how much that may change."""
+    return replace(of_thermometer(within_k, stated_c), stated=True)
 
 
 def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:

@@ -48,7 +48,7 @@ class DriftEntry(Entry):
     repeat to repeat than they do within a dwell. `freedom` are the degrees of freedom of the `held` biases' standard
     deviations, null where they have no end; results of before do not count them. A steady bias has `moves` in a share
     of `false_alarm` of all runs. Results of before do not say whose bias it is: `part`, `serial_number`, `full_scale`
-    in the same unit.
+    in the same unit. The repeats' temperatures are `temperature_stated` where the sensor has no thermometer.
     """
 
     unit: str
@@ -64,3 +64,4 @@ class DriftEntry(Entry):
     part: str | None = None
     serial_number: str | None = None
     full_scale: float | None = None
+    temperature_stated: bool = False

@@ -102,6 +102,11 @@ class Quantity:
         """The units of the scale factors, then of the biases."""
         return ("1",) * len(self.axes) + (self.unit,) * len(self.axes)
 
+    @property
+    def parameter_signs(self) -> tuple[float, ...]:
+        """What takes scale factors, then biases, to those of a model whose biases are part of the reading, and back."""
+        return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
+
 
 @dataclass(frozen=True, slots=True)
 class Scalar:

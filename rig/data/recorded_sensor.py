@@ -54,6 +54,11 @@ class RecordedSensor:
         return any(each.measures.shape for each in self.channels)
 
     @property
+    def temperature_stated(self) -> bool:
+        """Whether somebody stated how warm it was: it has no thermometer."""
+        return any(each.quantity == TEMPERATURE.name and each.stated is not None for each in self.channels)
+
+    @property
     def sample_dtype(self) -> np.dtype[Any]:
         """The type of its samples."""
         return sample_dtype(self.channels)

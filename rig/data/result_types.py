@@ -48,7 +48,7 @@ class WhenEntry(Entry):
     """When readings were taken, from when to when (UTC, by the arm controller's clock since the recording's start).
 
     `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
-    between the two of `temperature_range_c`; null where it has none.
+    between the two of `temperature_range_c`; null where it has none. A temperature without range was stated, not read.
     """
 
     from_utc: Utc
@@ -56,6 +56,11 @@ class WhenEntry(Entry):
     mean_utc: Utc
     temperature_c: float | None
     temperature_range_c: tuple[float, float] | None
+
+    @property
+    def temperature_stated(self) -> bool:
+        """Whether nobody read the temperature that it says."""
+        return self.temperature_c is not None and self.temperature_range_c is None
 
 
 class LaidDownEntry(Entry):

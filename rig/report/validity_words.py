@@ -8,6 +8,7 @@ from rig.data.result_file import SensorEntry
 from rig.data.result_types import WhenEntry
 
 DEG = math.degrees(1)
+AS_STATED = ", as stated"
 ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
 
 
@@ -17,11 +18,30 @@ def when_words(when: WhenEntry) -> str:
     day = f"{began:%Y-%m-%d} "
     until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
     over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
-    if when.temperature_c is None or when.temperature_range_c is None:
+    if when.temperature_c is None:
         return over
+    if when.temperature_range_c is None:
+        return f"at {when.temperature_c:.1f} °C, as stated, {over}"
     low, high = (f"{each:.2f}" for each in when.temperature_range_c)
     went = f"stayed at {low} °C" if low == high else f"was between {low} and {high} °C"
     return f"at {when.temperature_c:.1f} °C, {over}, in which it {went}"
+
+
+def warmth_words(when: WhenEntry | None) -> str:
+    """What tells a temperature, in words; results of before, which do not say when, read it."""
+    if when is not None and when.temperature_stated:
+        return "as stated, for the item has no thermometer"
+    return "by the item's own thermometer, which is not calibrated"
+
+
+def warmth(when: WhenEntry, of: str = "") -> dict[str, float | None]:
+    """A temperature, by what was read `of` the sensor then."""
+    return {f"{of}{AS_STATED}" if when.temperature_stated else of: when.temperature_c}
+
+
+def told_by(of: str) -> str:
+    """What tells a temperature of `warmth`, behind what it is of."""
+    return of if of.endswith(AS_STATED) else f"{of}, by its own thermometer"
 
 
 def speed_words(sensor: SensorEntry) -> str:

@@ -1,7 +1,9 @@
 """Scale factors and biases say when they were read, how warm it was then, and how fast the sensor's own axes turned."""
 
+import json
 from dataclasses import replace
 from datetime import datetime, timedelta
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +11,18 @@ import pytest
 from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings
 from rig.analysis.read_when import of_gyroscope
+from rig.data.channel import of_stated_temperature
+from rig.data.quantity import TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.run_file import RunData
+from rig.motion.geometry import NOMINAL
 from rig.plans.recorded import open_run
+from rig.report.certificate.content import certificate_of
+from rig.report.certificate.dcc import digital_certificate
+from rig.report.certificate.statements import Stated
 from rig.report.document import document_of
 from rig.report.validity_words import load_words, when_words
+from support.certified import LABORATORY, read
 from support.frozen import RECORDINGS
 from support.synthetic_run import Setup, synthetic_run
 
@@ -54,6 +64,36 @@ def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
     low, high = sensor.bias_at.temperature_range_c or (0.0, 0.0)
     assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_at)
+
+
+def without_thermometer(run: RunData) -> RunData:
+    """A recording of a sensor whose temperature was stated, by 22 °C and 5 K."""
+    (sensor,), (samples,) = run.sensors.values(), run.samples.values()
+    channels = [each for each in sensor.channels if each.quantity != TEMPERATURE.name]
+    samples = samples.copy()
+    samples["temperature_counts"] = 0
+    sensor = replace(sensor, channels=(*channels, of_stated_temperature(22.0, 5.0)))
+    return replace(run, sensors={"gyro": sensor_of(parsed_attributes(sensor))}, samples={"gyro": samples})
+
+
+def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
+    """What a run file keeps of a sensor."""
+    attributes = sensor.attributes()
+    return {**attributes, "channels": json.loads(attributes["channels"])}
+
+
+@pytest.mark.slow
+def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
+    document = document_of(calibrated([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
+    sensor = document.sensors["gyro"]
+    assert sensor.bias_at is not None and sensor.bias_at.temperature_stated and sensor.temperature_c == 22.0
+    assert when_words(sensor.bias_at).startswith("at 22.0 °C, as stated, mean over")
+    certificate = certificate_of(document, Stated())
+    said = " ".join(read(certificate).text.split())
+    assert "Temperature and time, as stated, for the item has no thermometer: scale factors at 22.0 °C" in said
+    assert "Temperature: as stated; not traceable" in said and "own thermometer" not in said
+    conditions = digital_certificate(certificate_of(document, LABORATORY)).decode()
+    assert "temperature of the item at the biases, as stated" in conditions and "own thermometer" not in conditions
 
 
 @pytest.mark.slow

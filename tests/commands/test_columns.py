@@ -109,11 +109,19 @@ def test_a_table_that_counts_the_other_way_turns_the_other_way(tmp_path: Path) -
     assert found["attitude_std_rad"] == pytest.approx([np.radians(0.1)] * 5)
 
 
+def test_units_are_spelt_as_in_the_section_of_a_device_that_prints_lines() -> None:
+    of = {"x_t": "mgauss", "x_rad_s": "mdeg/s", "temperature_c": "degC"}
+    told = ColumnMap.model_validate({"samples": {name: {"column": name, "unit": unit} for name, unit in of.items()}})
+    factors = [each.factor for each in told.samples.values()]
+    assert factors == pytest.approx([1e-7, np.radians(1e-3), 1.0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("told", "words"),
     [
         (SAMPLES.replace("unit: dps", "unit: deg", 1), "x_rad_s is a rate, and deg is the unit of an angle"),
         (SAMPLES.replace("unit: dps", "unit: knots", 1), "no unit that is known here"),
+        (SAMPLES.replace("unit: dps", "unit: K", 1), "no unit that is known here"),  # begins elsewhere than at zero
         (SAMPLES.replace("column: gx", "column: gyro x", 1), "has the column 'gyro x' nowhere, which is to be x_rad_s"),
         (SAMPLES + "motions: {}", "unknown key, did you mean motion?"),
         (TABLE + "motion: {qw: {column: q, unit: '1'}}", "give motion or table"),

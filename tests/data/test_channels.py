@@ -22,6 +22,7 @@ from rig.observation.observed_run import observe_run
 from rig.page.about import About
 from rig.page.page_state import Shown
 from rig.report.exports.formats import writer_of_readings
+from rig.report.exports.recorded import WithMotion
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken
 from rig.station.view import LiveView
@@ -82,7 +83,7 @@ def test_a_scalar_comes_back_as_it_was_recorded_and_is_no_gyroscope(barometer: R
 @pytest.mark.slow
 def test_a_scalar_is_exported_in_its_unit_on_the_arms_clock(tmp_path: Path) -> None:
     run = beside_a_gyroscope(IN_COUNTS)
-    writer_of_readings("csv")([observe_run(run, run.settings.observation)], tmp_path)
+    writer_of_readings("csv")([WithMotion(observe_run(run, run.settings.observation))], tmp_path)
     header = (tmp_path / "barometer.csv").read_text(encoding="utf-8").splitlines()[0]
     time_s, pressure_pa = np.loadtxt(tmp_path / "barometer.csv", delimiter=",", skiprows=1).T
     assert header == "time_s,pressure_pa" and pressure_pa == pytest.approx(PRESSURE_PA)

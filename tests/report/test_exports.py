@@ -17,6 +17,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.quantity import ACCELERATION
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.data.result_types import ErrorEntry
+from rig.data.run_file import read_run
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
@@ -27,6 +28,7 @@ from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibr
 from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
+from rig.report.exports.recorded import WithMotion, exported
 from support.certified import accelerometer, everything, result
 from support.frozen import RECORDINGS
 from support.paths import FIXTURES
@@ -56,8 +58,8 @@ def sensed() -> ResultDocument:
 
 
 @pytest.fixture(scope="module")
-def recordings() -> tuple[ObservedRun, ...]:
-    return observe_runs(open_run(FIXTURES / "calibration").movement)
+def recordings() -> tuple[WithMotion, ...]:
+    return tuple(map(WithMotion, observe_runs(open_run(FIXTURES / "calibration").movement)))
 
 
 def felt(document: ResultDocument, rate_flange: Array, up_flange: Array) -> tuple[Array, Array]:
@@ -252,7 +254,7 @@ def test_names_stay_apart_where_blanks_are_not_taken() -> None:
 
 @pytest.mark.slow
 def test_csv_solves_to_the_same_calibration(
-    recordings: tuple[ObservedRun, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recordings: tuple[WithMotion, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = {path.name for path in writer_of_readings("csv")(recordings, tmp_path)}
     assert files == {"arm.csv", "gyro.csv", "gyro_sweeps.csv", "README.txt"}
@@ -267,11 +269,11 @@ def test_csv_solves_to_the_same_calibration(
     assert all(f"{name}: " in said for name in files - {"README.txt"}) and "Not here" in said
 
 
-def test_parquet_and_matlab_hold_the_readings(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+def test_parquet_and_matlab_hold_the_readings(recordings: tuple[WithMotion, ...], tmp_path: Path) -> None:
     import pyarrow.parquet
     from scipy.io import loadmat
 
-    stream = recordings[0].stream("gyro")
+    stream = recordings[0].observed.stream("gyro")
     writer_of_readings("parquet")(recordings, tmp_path)
     table = pyarrow.parquet.read_table(tmp_path / "gyro.parquet")
     assert b"raw readings in the sensor's own axes" in table.schema.metadata[b"convention"]
@@ -285,13 +287,13 @@ def test_parquet_and_matlab_hold_the_readings(recordings: tuple[ObservedRun, ...
 
 
 @pytest.mark.slow
-def test_a_ros_2_bag_holds_the_readings(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+def test_a_ros_2_bag_holds_the_readings(recordings: tuple[WithMotion, ...], tmp_path: Path) -> None:
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 
     (path,) = writer_of_readings("ros2")(recordings, tmp_path)
     store = get_typestore(Stores.ROS2_JAZZY)
-    stream = recordings[0].stream("gyro")
+    stream = recordings[0].observed.stream("gyro")
     with Reader(path) as bag:
         (connection,) = bag.connections
         assert connection.topic == "/gyro/imu"
@@ -302,10 +304,12 @@ def test_a_ros_2_bag_holds_the_readings(recordings: tuple[ObservedRun, ...], tmp
     np.testing.assert_allclose(np.diff(since_s), np.diff(stream.time_s), atol=1e-8)
     first: Any = messages[0]
     assert first.orientation_covariance[0] == first.linear_acceleration_covariance[0] == -1
-    noise = np.array([rest.noise_rad_s for rest in recordings[0].sensors["gyro"].rests])
+    noise = np.array([rest.noise_rad_s for rest in recordings[0].observed.sensors["gyro"].rests])
     variance = first.angular_velocity_covariance.reshape(3, 3)
     np.testing.assert_allclose(np.diag(variance), np.mean(noise**2, axis=0))
-    assert "orientation_covariance[0] = -1" in (path / "metadata.yaml").read_text(encoding="utf-8")
+    bag_s_own = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+    said = bag_s_own["custom_data"]["convention"]
+    assert "orientation_covariance[0] = -1" in said and "the arm controller's clock" in said
     with pytest.raises(Refused, match="report_folder"):
         writer_of_readings("ros2")(recordings, tmp_path)
 
@@ -322,11 +326,11 @@ def with_accelerations(observed: ObservedRun) -> ObservedRun:
     return replace(observed, run=replace(observed.run, samples={"gyro": samples}, sensors={"gyro": sensor}))
 
 
-def test_accelerations_are_exported_beside_the_rates(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+def test_accelerations_are_exported_beside_the_rates(recordings: tuple[WithMotion, ...], tmp_path: Path) -> None:
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 
-    felt = [with_accelerations(recordings[0])]
+    felt = [WithMotion(with_accelerations(recordings[0].observed))]
     writer_of_readings("csv")(felt, tmp_path)
     header, first, *_ = (tmp_path / "gyro_acceleration.csv").read_text(encoding="utf-8").splitlines()
     assert header == "time_s,x_m_s2,y_m_s2,z_m_s2" and first.endswith(",0.25,0.5,0.75")
@@ -338,6 +342,65 @@ def test_accelerations_are_exported_beside_the_rates(recordings: tuple[ObservedR
     force = message.linear_acceleration
     assert (force.x, force.y, force.z) == (0.25, 0.5, 0.75)
     assert message.linear_acceleration_covariance[0] == 0  # nothing stood still in attitudes: not known
+
+
+BY_HAND, ELSEWHERE = RECORDINGS / "rig.settings-7" / "by_hand", RECORDINGS / "rig.files-1"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("run", "files", "again"),
+    [
+        pytest.param(
+            BY_HAND,
+            {"gyro.csv", "README.txt"},
+            "--turns --clock-ppm 30 --name gyro",  # as the run says of its crystal
+            id="by hand",
+        ),
+        pytest.param(
+            ELSEWHERE / "sweeps",
+            {"imu.csv", "imu_sweeps.csv", "README.txt"},
+            "--sweeps imu_sweeps.csv",
+            id="sweeps of a file",
+        ),
+        pytest.param(
+            ELSEWHERE / "attitudes",
+            {"imu.csv", "imu_attitudes.csv", "README.txt"},
+            "--attitudes imu_attitudes.csv --up=-z --gravity-m-s2 9.80061 --field-t 47.98e-6 --second-order",
+            id="attitudes of a file",
+        ),
+    ],
+)
+def test_readings_that_no_arm_turned_are_exported_with_what_is_known_of_their_motion(
+    run: Path, files: set[str], again: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", str(run), "--format", "csv", "--out", str(tmp_path)]) == 0
+    assert {Path(line).name for line in capsys.readouterr().out.splitlines()} == files
+    (readings,) = (name for name in files if name.count("_") == 0 and name.endswith(".csv"))
+    options = [str(tmp_path / each) if each.endswith(".csv") else each for each in again.split()]
+    main(["solve", str(tmp_path / readings), *options, "--json"])
+    solved = json.loads(capsys.readouterr().out)
+    first = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    for kind in ("sensors", "accelerometers", "magnetometers"):
+        assert solved.get(kind, {}).keys() == first.get(kind, {}).keys()
+        for name, entry in first.get(kind, {}).items():
+            np.testing.assert_allclose(solved[kind][name]["scale"], entry["scale"], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_readings_of_a_file_are_a_ros_2_bag_where_a_gyroscope_is_among_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from rosbags.rosbag2 import Reader
+
+    run = read_run(ELSEWHERE / "sweeps" / "run.h5")
+    (path,) = writer_of_readings("ros2")(exported([run]), tmp_path)
+    with Reader(path) as bag:
+        assert bag.message_count == len(run.samples["imu"])
+        assert bag.duration * 1e-9 == pytest.approx(np.ptp(run.samples["imu"]["host_time_s"]))
+    still = ["export", str(ELSEWHERE / "attitudes"), "--format", "ros2", "--out", str(tmp_path / "still")]
+    assert main(still) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("rig: nothing_to_export: no gyroscope was recorded")
 
 
 @pytest.mark.one_in(2)

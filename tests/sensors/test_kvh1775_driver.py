@@ -237,7 +237,8 @@ def test_a_gap_nobody_can_count_ends_the_stream(message: str) -> None:
     with kvh_on_a_wire() as wire, streaming(wire, message=message) as (source, collected):
         collected.wait(source, 20)
         wire.order(lambda kvh: setattr(kvh.faults, "lose", 250))
-        assert until_raised(source).name == "kvh_gap_ambiguous"
+        error = until_raised(source)
+        assert error.name == "kvh_gap_ambiguous" and error.what.startswith("sensors.kvh: the KVH 1775 on ")
 
 
 @pytest.mark.slow

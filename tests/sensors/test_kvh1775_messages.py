@@ -22,6 +22,7 @@ from rig.sensors.kvh1775.messages import (
 # ICD 56-0298 Rev. B, p. 51.
 SAMPLE = bytes.fromhex("FE81FF55 37A96A6E 38586C1F B75BF862 BF803E78 BB650D28 3B0A37AC 77 3D 0028 4BFA34D8")
 INTERVAL_US = 1000
+WHERE = "sensors.outer: the KVH 1775 on /dev/ttyUSB1"
 FORMATS: tuple[Format, ...] = ("A", "B", "C")
 
 
@@ -122,7 +123,7 @@ def test_of_a_hundred_thousand_damaged_here_and_there_none_is_wrong_and_no_other
     reader = MessageReader()
     read = [reader.feed(spoilt[at : at + 4096]).messages for at in range(0, len(spoilt), 4096)]
     messages = np.concatenate(read)
-    counter = MessageCounter(INTERVAL_US, timed=name == "B")
+    counter = MessageCounter(WHERE, INTERVAL_US, timed=name == "B")
     numbers, times_us = counter.count(messages)
     whole = MessageReader().feed(sent).messages[numbers]
     assert (messages == whole).all(), "what was accepted is what was sent"
@@ -137,7 +138,7 @@ def test_of_a_hundred_thousand_damaged_here_and_there_none_is_wrong_and_no_other
 def test_losses_below_128_in_a_row_are_counted(name: Format, missing: int) -> None:
     messages = MessageReader().feed(stream(name, 400)).messages
     kept = np.delete(messages, slice(200, 200 + missing))
-    counter = MessageCounter(INTERVAL_US, timed=name == "B", host_jitter_s=0.0)
+    counter = MessageCounter(WHERE, INTERVAL_US, timed=name == "B", host_jitter_s=0.0)
     counter.count(kept[:200])
     numbers, times_us = counter.count(kept[200:], silent_s=(missing + 1) * INTERVAL_US * 1e-6)
     assert counter.lost == missing
@@ -149,18 +150,18 @@ def test_losses_below_128_in_a_row_are_counted(name: Format, missing: int) -> No
 @pytest.mark.parametrize("missing", [128, 129, 255, 256, 1000])
 def test_losses_of_128_and_more_are_refused(name: Format, missing: int) -> None:
     messages = MessageReader().feed(stream(name, 2000)).messages
-    counter = MessageCounter(INTERVAL_US, timed=name == "B", host_jitter_s=0.0)
+    counter = MessageCounter(WHERE, INTERVAL_US, timed=name == "B", host_jitter_s=0.0)
     counter.count(messages[:200])
     with pytest.raises(SensorError) as caught:
         counter.count(messages[200 + missing :], silent_s=(missing + 1) * INTERVAL_US * 1e-6)
-    assert caught.value.name == "kvh_gap_ambiguous"
+    assert caught.value.name == "kvh_gap_ambiguous" and caught.value.what.startswith(f"{WHERE}: ")
 
 
 def test_the_microseconds_are_counted_on_past_their_wrap() -> None:
     start_us = 2**32 - 5 * INTERVAL_US - 17  # 71.6 min after the instrument was switched on
     messages = MessageReader().feed(stream("B", 1000, start_us=start_us)).messages
     assert messages["time_us"][-1] < messages["time_us"][0]
-    counter = MessageCounter(INTERVAL_US, timed=True)
+    counter = MessageCounter(WHERE, INTERVAL_US, timed=True)
     times_us = np.concatenate([counter.count(part)[1] for part in np.array_split(messages, 9)])
     assert times_us.tolist() == [start_us + number * INTERVAL_US for number in range(1000)]
     assert counter.lost == 0
@@ -170,5 +171,5 @@ def test_a_sequence_that_its_microseconds_contradict_is_refused() -> None:
     messages = MessageReader().feed(stream("B", 20)).messages
     messages["time_us"][10:] += 3 * INTERVAL_US
     with pytest.raises(SensorError) as caught:
-        MessageCounter(INTERVAL_US, timed=True).count(messages)
-    assert caught.value.name == "kvh_time_contradicts"
+        MessageCounter(WHERE, INTERVAL_US, timed=True).count(messages)
+    assert caught.value.name == "kvh_time_contradicts" and caught.value.what.startswith(f"{WHERE}: ")

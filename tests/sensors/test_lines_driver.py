@@ -8,9 +8,18 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
-from rig.config.lines_section import SCALAR_UNITS, LineScalarSection
-from rig.data.quantity import ACCELERATION, PRESSURE, RATE, SCALARS, TEMPERATURE
+from rig.config.lines_section import (
+    GAP,
+    LineAccelerationSection,
+    LineFieldSection,
+    LineRateSection,
+    LineScalarSection,
+    LineTimeSection,
+)
+from rig.config.units import UNITS
+from rig.data.quantity import ACCELERATION, FIELD, PRESSURE, RATE, SCALARS, TEMPERATURE
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.source import describe, lines, look
 from rig.sensors.silence import Patience
@@ -99,9 +108,22 @@ def test_a_column_that_nothing_describes_is_refused(columns: Any, scalars: Any, 
         lines_section(columns=columns, scalars=scalars)
 
 
-def test_every_unit_of_what_has_no_axes_is_of_a_quantity_that_is_known() -> None:
-    assert {quantity for quantity, _, _ in SCALAR_UNITS.values()} == {each.name for each in SCALARS}
-    assert set(get_args(LineScalarSection.model_fields["unit"].annotation)) == set(SCALAR_UNITS)
+def units_of(section: type[BaseModel]) -> set[str]:
+    """What the units that a section allows are units of."""
+    return {UNITS[unit].of for unit in get_args(section.model_fields["unit"].annotation) if unit != GAP}
+
+
+def test_every_unit_of_a_column_is_of_a_quantity_that_is_known() -> None:
+    assert units_of(LineScalarSection) == {each.name for each in SCALARS}
+    assert units_of(LineRateSection) == {RATE.name} and units_of(LineAccelerationSection) == {ACCELERATION.name}
+    assert units_of(LineFieldSection) == {FIELD.name} and units_of(LineTimeSection) == {"time"}
+
+
+def test_a_device_that_prints_no_temperature_has_one_that_is_stated() -> None:
+    assert describe("imu", sensor_section("/dev/null")).temperature_stated
+    printed = lines_section(columns=(*SEVEN, "temperature"), temperature=None)
+    section = sensor_section("/dev/null").model_copy(update={"lines": printed})
+    assert not describe("imu", section).temperature_stated
 
 
 def test_a_look_says_what_comes() -> None:

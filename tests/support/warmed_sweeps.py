@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.elsewhere import budget_of, solve_swept
-from rig.analysis.over_temperature import OTHER_SIGN, files_to_reference
+from rig.analysis.over_temperature import files_to_reference
+from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import Line, OverTemperature, Repeated, settled
 from rig.observation.average import Average
@@ -159,6 +160,7 @@ def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemp
     """Polynomials with all of the uncertainty that sweeps of files have."""
     moved, found = files_to_reference(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
     solution = solve_swept(moved, "vector")
+    sign = np.diag(RATE.parameter_signs)
     lines = tuple(
         Line(
             each.name,
@@ -166,7 +168,7 @@ def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemp
             each.distribution,
             each.source,
             each.freedom,
-            OTHER_SIGN @ each.covariance @ OTHER_SIGN,
+            sign @ each.covariance @ sign,
         )
         for each in budget_of(solution, moved).contributors
     )

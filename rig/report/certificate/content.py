@@ -174,6 +174,14 @@ class Certificate:
         return any(hasattr(entry, "attitude_error_rad") for each in self.held_still for entry in each.entries)
 
     @property
+    def temperature_stated(self) -> bool:
+        """Whether how warm the items were was stated, and read of none of them."""
+        found = [each.sensor.bias_at for each in self.gyroscopes]
+        found += [getattr(entry, "found_at", None) for each in self.held_still for entry in each.entries]
+        told = [when for when in found if when is not None and when.temperature_c is not None]
+        return bool(told) and all(when.temperature_stated for when in told)
+
+    @property
     def blocks(self) -> tuple[Block, ...]:
         """What the page prints of each sensor, one after the other; of a reference nothing."""
         asked = outlets(self.result, lambda kind: kind.block)

@@ -17,6 +17,7 @@ from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
 from rig.report.kinds.kind import Measured
 from rig.report.kinds.registry import outlets
+from rig.report.validity_words import told_by
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
@@ -198,7 +199,7 @@ def _result(c: Certificate, item: str, measured: Measured) -> Element:
     site = c.stated.where
     conditions = [
         *(
-            _condition(f"temperature of the item{of}, by its own thermometer", each, r"\degreecelsius")
+            _condition(f"temperature of the item{told_by(of)}", each, r"\degreecelsius")
             for of, each in measured.temperatures_c.items()
         ),
         _condition("ambient temperature", site.ambient_temperature_c, r"\degreecelsius"),

@@ -8,10 +8,10 @@ if TYPE_CHECKING:  # the command line asks for the names alone
     from collections.abc import Sequence
     from pathlib import Path
 
-    from rig.observation.observed_run import ObservedRun
     from rig.report.exports.calibrations import Calibrations
+    from rig.report.exports.recorded import Exported
 
-    ReadingsWriter = Callable[[Sequence[ObservedRun], Path], list[Path]]
+    ReadingsWriter = Callable[[Sequence[Exported], Path], list[Path]]
     CalibrationTexts = Callable[[Calibrations], Mapping[str, str]]
 
 # `module:function`. Of readings: (recordings, folder) → the files written.

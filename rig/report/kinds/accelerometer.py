@@ -28,7 +28,7 @@ from rig.report.kinds.kind import Standard
 from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.triad_entry import OF_ACCELEROMETERS, triad_entry
-from rig.report.validity_words import when_words
+from rig.report.validity_words import warmth, when_words
 from rig.report.when_entry import when_entry
 
 
@@ -110,7 +110,7 @@ def _model(entry: AccelerometerEntry) -> str:
 
 
 def _temperatures_c(entry: AccelerometerEntry) -> dict[str, float | None]:
-    return {"": entry.temperature_c if entry.found_at is None else entry.found_at.temperature_c}
+    return {"": entry.temperature_c} if entry.found_at is None else warmth(entry.found_at)
 
 
 def _further(entry: AccelerometerEntry) -> Iterator[Further]:

@@ -73,6 +73,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         part=sensor.part,
         serial_number=sensor.serial_number,
         full_scale=sensor.channel(quantity).range,
+        temperature_stated=sensor.temperature_stated,
     )
 
 

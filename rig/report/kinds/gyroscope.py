@@ -32,7 +32,7 @@ from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, ta
 from rig.report.kinds.unexplained import of_sweeps_and_rests
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
-from rig.report.validity_words import load_words, speed_words, when_words
+from rig.report.validity_words import load_words, speed_words, warmth, when_words
 from rig.report.when_entry import when_entry
 
 
@@ -149,7 +149,7 @@ def temperatures_c(sensor: SensorEntry) -> dict[str, float | None]:
     """How warm a gyroscope was, by what of it was read then: scale factors come from the sweeps alone."""
     if sensor.scale_at is None or sensor.bias_at is None:
         return {"": sensor.temperature_c}
-    return {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
+    return warmth(sensor.scale_at, " at the scale factors") | warmth(sensor.bias_at, " at the biases")
 
 
 def _beside(sensor: SensorEntry) -> Iterator[str]:

@@ -48,7 +48,7 @@ def _entry(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> M
         hard_iron_t=hard_iron(result.solution),
         field_base_t=result.solution.reference,
         non_orthogonality_freedom=counted(of_field_angles(result)),
-        found_at=when_entry(of_magnetometer(outcome.recordings, [dwell.index for dwell in result.dwells])),
+        found_at=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
         **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 

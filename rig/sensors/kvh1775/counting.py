@@ -22,6 +22,7 @@ class MessageCounter:
     tell how many were lost beyond doubt.
     """
 
+    where: str  # the instrument as messages name it
     interval_us: float
     timed: bool
     host_jitter_s: float = HOST_JITTER_S
@@ -52,7 +53,7 @@ class MessageCounter:
         if self.timed:
             self._check_times(steps, passed_us)
         elif silent_s > (SEQUENCE_NUMBERS + 0.5) * self.interval_us * 1e-6 - self.host_jitter_s:
-            raise _ambiguous(f"nothing readable came for {silent_s:.2f} s")
+            raise self._ambiguous(f"no readable message came for {silent_s:.2f} s")
         self.lost += int(steps.sum()) - len(steps)
         numbers = self._number + np.cumsum(steps)
         times = self._time_us + np.cumsum(passed_us) if self.timed else np.rint(numbers * self.interval_us)
@@ -63,20 +64,19 @@ class MessageCounter:
     def _check_times(self, steps: NDArray[np.int64], passed_us: NDArray[np.int64]) -> None:
         by_time = np.rint(passed_us / self.interval_us).astype(np.int64)
         if (by_time > SEQUENCE_NUMBERS).any():
-            raise _ambiguous(f"{int(by_time.max()) - 1} messages are missing in a row")
+            raise self._ambiguous(f"{int(by_time.max()) - 1} messages are missing in a row")
         if (by_time != steps).any():
             place = int(np.argmax(by_time != steps))
             raise SensorError(
                 "kvh_time_contradicts",
-                f"by its microseconds {by_time[place]} data periods passed between two messages, by their sequence "
-                f"numbers {steps[place]}",
+                f"{self.where}: by its microseconds {by_time[place]} data periods passed between two messages, by "
+                f"their sequence numbers {steps[place]}",
                 "Look at its supply: it may have restarted. Then run again",
             )
 
-
-def _ambiguous(what: str) -> SensorError:
-    return SensorError(
-        "kvh_gap_ambiguous",
-        f"{what}: sequence numbers, which are modulo 128, do not say how many messages of the KVH 1775 were lost",
-        "Check the cable and the load of this computer, then run again",
-    )
+    def _ambiguous(self, what: str) -> SensorError:
+        return SensorError(
+            "kvh_gap_ambiguous",
+            f"{self.where}: {what}; sequence numbers, which are modulo 128, do not say how many were lost",
+            "Check the cable and the load of this computer, then run again",
+        )

@@ -118,7 +118,7 @@ class Kvh1775:
     def start(self, wanted: Wanted) -> None:
         """Start to hand everything to `on_messages`, from the next message on."""
         with self.own_port.news:
-            self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
+            self._counter = MessageCounter(self._where, 1e6 / wanted.rate_hz, timed=wanted.message == "B")
             self._format = wanted.message.encode()
             self.own_port.stream(2 / wanted.rate_hz)
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import SECONDS, LinesSection
+from rig.config.lines_section import LinesSection
 from rig.config.sensor_sections import OwnPortSection
+from rig.config.units import UNITS
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
@@ -140,7 +141,7 @@ class LinesDevice:
         passed = np.diff(printed)
         if self._section.time.wrap:
             passed %= self._section.time.wrap
-        return float(passed.sum()) * SECONDS[self._section.time.unit]
+        return float(passed.sum()) * UNITS[self._section.time.unit].size
 
     def _measured_hz(self) -> float:
         """Samples a second, by the median step of the device's time where that is fine, else by all of it."""
@@ -148,7 +149,7 @@ class LinesDevice:
         if time_section is None or self.counts.samples < 5:
             return float("nan")
         span_s, count = self._span_s(), len(self.seen) - 1
-        unit_s = SECONDS[time_section.unit]
+        unit_s = UNITS[time_section.unit].size
         printed = self.seen[:, self._section.columns.index("time")]
         typical_s = float(np.median(np.diff(printed))) * unit_s
         if span_s <= 0:

@@ -12,19 +12,17 @@ from rig.config.lines_section import (
     ACCELEROMETER,
     GYROSCOPE,
     MAGNETOMETER,
-    SCALAR_UNITS,
-    SECONDS,
     LineAccelerationSection,
     LineFieldSection,
     LineRateSection,
     LinesSection,
 )
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
-from rig.data.channel import Channel, of_thermometer, of_three_axes, stamped
+from rig.config.units import UNITS
+from rig.data.channel import Channel, of_stated_temperature, of_thermometer, of_three_axes, stamped
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.driver import LinesDevice
 from rig.sensors.lines.stamping import COARSE
@@ -32,11 +30,6 @@ from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 
-UNITS = {
-    "rad/s": 1.0, "deg/s": radians(1), "mdeg/s": radians(1e-3), "mrad/s": 1e-3,
-    "m/s2": 1.0, "g": STANDARD_GRAVITY_M_S2, "mg": STANDARD_GRAVITY_M_S2 * 1e-3,
-    "T": 1.0, "uT": 1e-6, "nT": 1e-9, "gauss": 1e-4, "mgauss": 1e-7,
-}  # fmt: skip
 AT_THE_END = 1 - 1e-4  # of the range, where readings count as saturated: a count of 16 bits below it is none
 LookedAt = str | SensorError
 AXES = {RATE: GYROSCOPE, ACCELERATION: ACCELEROMETER, FIELD: MAGNETOMETER}
@@ -124,9 +117,9 @@ def _read(name: str, section: SensorSection) -> Iterator[tuple[str, tuple[Record
         field = _triad(lines, FIELD, lines.field, FIELD_FULL_SCALE_T)
         yield field_name(name), recorded("lines_magnetometer", field)
     for scalar, told in lines.scalars.items():
-        quantity, size, zero = SCALAR_UNITS[told.unit]
-        channel = Channel(quantity, quantity, "<f8", 1.0)
-        place = _Printed((lines.columns.index(scalar),), told.scale * size, zero)
+        unit = UNITS[told.unit]
+        channel = Channel(unit.of, unit.of, "<f8", 1.0)
+        place = _Printed((lines.columns.index(scalar),), told.scale * unit.size, unit.zero)
         yield scalar_name(name, scalar), recorded(f"lines_{channel.measures.sensor}", (channel, place))
 
 
@@ -135,7 +128,7 @@ def stamp_std_s(lines: LinesSection, rate_hz: float) -> float | None:
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5
     if lines.clock == "device" and lines.time is not None and lines.time.unit == "ms" and 1e-3 * rate_hz > COARSE:
-        return SECONDS["ms"] / 12**0.5
+        return UNITS["ms"].size / 12**0.5
     return None
 
 
@@ -172,7 +165,7 @@ def look(name: str, section: SensorSection) -> Iterator[LookedAt]:
 
 def _triad(lines: LinesSection, quantity: Quantity, section: _OfTriad, full_scale: float) -> tuple[Channel, _Printed]:
     """Three axes in steps of the last digit that is printed, where that is stated and fits 32 bits."""
-    unit = section.scale * UNITS[section.unit]
+    unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals
     step = max(step, full_scale / FULL_SCALE_COUNTS)
     channel = of_three_axes(quantity, step, max(int(AT_THE_END * full_scale / step), 1), full_scale)
@@ -181,8 +174,8 @@ def _triad(lines: LinesSection, quantity: Quantity, section: _OfTriad, full_scal
 
 def _thermometer(lines: LinesSection) -> tuple[Channel, _Printed]:
     told = lines.temperature
-    if told.stated_c is not None:  # a thermometer whose steps are so wide that it shows no change
-        return of_thermometer(told.stated_within_k, told.stated_c), _Printed(())
+    if told.stated_c is not None:
+        return of_stated_temperature(told.stated_c, told.stated_within_k), _Printed(())
     step = 0.0 if told.decimals is None else told.scale * 10.0**-told.decimals
     place = lines.columns.index("temperature")
     return of_thermometer(max(step, DEGREES_PER_COUNT), 0.0), _Printed((place,), told.scale, told.offset_c)

@@ -6,7 +6,8 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import LONGEST_GAP_S, SECONDS, LinesSection, LineTimeSection
+from rig.config.lines_section import LONGEST_GAP_S, LinesSection, LineTimeSection
+from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 
@@ -97,7 +98,7 @@ class Stamper:
         return passed_s, steps
 
     def _passed_s(self, printed: Array, column: LineTimeSection) -> Array:
-        unit_s, wrap = SECONDS[column.unit], column.wrap
+        unit_s, wrap = UNITS[column.unit].size, column.wrap
         before = printed[0] if self._last_time is None else self._last_time
         passed = np.diff(printed, prepend=before)
         if wrap:
@@ -142,7 +143,7 @@ class Stamper:
     def _is_coarse(self) -> bool:
         """Whether the device's time is printed in steps that are no small part of the interval between samples."""
         time = self.section.time
-        return time is not None and time.unit != "s" and SECONDS[time.unit] * self.rate_hz > COARSE
+        return time is not None and time.unit != "s" and UNITS[time.unit].size * self.rate_hz > COARSE
 
     def _jump(self, row: Array) -> str:
         columns = self.section.columns

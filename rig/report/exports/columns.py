@@ -1,0 +1,34 @@
+"""Tables of columns, as exports write them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rig.data.channel import Channel
+from rig.data.run_file import RunData
+from rig.estimation.arrays import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns (n,) by name, which carries the unit, and what they mean."""
+
+    name: str
+    columns: Mapping[str, Array]
+    said: str
+
+
+def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_s: Array, meaning: str) -> Table:
+    """What a sensor of a recording read by these of its channels, at times (n,), and the `meaning` of it."""
+    recorded, columns = run.sensors[sensor], {"time_s": time_s}
+    for each in channels:
+        values = each.values(run.samples[sensor])
+        columns |= split(each.measures.columns, values.reshape(len(time_s), -1))
+    whose = f"{sensor}, {recorded.part} {recorded.serial_number}, {recorded.mode} readings"
+    if recorded.has_axes:
+        whose += " in the sensor's own axes"
+    return Table(sensor, columns, f"{whose}. {meaning}")
+
+
+def split(names: Sequence[str], columns: Array) -> dict[str, Array]:
+    """The columns of an array (n, k) by name."""
+    return {name: columns[:, i] for i, name in enumerate(names)}
