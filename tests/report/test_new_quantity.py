@@ -105,6 +105,7 @@ def test_the_terminal_says_it(document: ResultDocument) -> None:
     assert line.endswith(" °/√h (U, k = 2 to 2.23)")
 
 
+@pytest.mark.slow
 def test_both_certificates_state_it_with_u(document: ResultDocument) -> None:
     page = " ".join(read(certificate(document)).text.split())
     assert "gyro, density of noise: x 0.344 ± 0.028 °/√h, y 0.688 ± 0.034 °/√h, z " in page
@@ -137,6 +138,7 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
     assert found.expanded[:2].tolist() == pytest.approx([2 * STDS[0], 2 * STDS[1]]) and found.expanded[2] > 2 * STDS[2]
 
 
+@pytest.mark.slow
 def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (of,) = (each for each in followed(document) if (each.sensor, each.quantity) == ("gyro", "rate"))
     assert [each.name for each in of.parameters if each.name in DENSITY.parameters] == ["bow_x", "bow_y", "bow_z"]

@@ -26,7 +26,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """The unit of such numbers: in SI, in print and as D-SI writes it, and the one that they are `shown` in."""
+    """The unit of such numbers: that of SI in print and as D-SI writes it, and the one that they are `shown` in."""
 
     si: str
     d_si: str

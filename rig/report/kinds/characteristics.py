@@ -82,7 +82,7 @@ NON_ORTHOGONALITY: Final = Characteristic(
     ANGLES,
     always("rad", r"\radian", Unit("°", pi / 180)),
     named("non_orthogonality", "rad"),
-    Series("nonorth_", "the angle between {} and {}"),
+    Series("nonorth_", "the angle between {} and {}"),  # nonorth_yz, nonorth_zx, nonorth_xy
     {"terminal": LINES, "certificate": BLOCK, "page": NO_ROW, "exports": "it is in the matrix of the readings"},
 )
 G_SENSITIVITY: Final = Characteristic(

@@ -122,7 +122,7 @@ def scale_and_bias(
 
 
 def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
-    """Those of what was found beside scale and bias, by its standard deviations and their degrees of freedom."""
+    """The parameters of characteristics, by their standard deviations and the degrees of freedom of these."""
     for each in characteristics:
         of, known = each.characteristic, each.known
         sign = -1 if of.opposite else 1
