@@ -31,7 +31,7 @@ from rig.report.exports.formats import OF_CALIBRATIONS, texts_of_calibrations
 from rig.report.kinds import characteristics, registry
 from rig.report.kinds.characteristic import OUTLETS, Characteristic, Series, Units, named
 from rig.report.kinds.followed import BIASES, SCALES
-from rig.report.kinds.kind import ResultKind
+from rig.report.kinds.kind import ResultKind, Without
 from rig.report.kinds.registry import followed, kinds
 from rig.report.table import print_result
 from support.certified import LABORATORY, certificate, everything, over_temperature, read
@@ -184,3 +184,10 @@ def test_no_two_characteristics_of_a_kind_share_a_name(kind: ResultKind[Any]) ->
     names = [name for each in kind.characteristics for name in (each.name, *each.parameters)]
     assert len(set(names)) == len(names)
     assert all(each in characteristics.every_characteristic() for each in kind.characteristics)
+
+
+@pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.name)
+def test_an_outlet_that_a_kind_has_not_tells_none_of_its_characteristics(kind: ResultKind[Any]) -> None:
+    through = {"certificate": kind.block, "digital certificate": kind.measured, "history": kind.followed}
+    for outlet in [outlet for outlet, of in through.items() if isinstance(of, Without)]:
+        assert all(outlet in each.elsewhere for each in kind.characteristics)
