@@ -5,7 +5,8 @@ from math import pi
 
 from rig.data.installed_kinds import quantities
 from rig.history.series import Change
-from rig.report.kinds.followed import ANGLES, is_scale
+from rig.report.kinds.characteristics import every_characteristic
+from rig.report.kinds.followed import BIASES, SCALES, is_scale
 from rig.report.rounding import figures
 
 PERCENT, PPM = 1e-2, 1e-6
@@ -25,23 +26,11 @@ def change_in_short(change: Change) -> str:
 
 def name_in_words(name: str) -> str:
     """A parameter of the history in words, as they stand within a sentence; a name that is not known stays."""
-    if name in ANGLES:
-        return f"the angle between {name[-2]} and {name[-1]}"
-    words = {
-        "k": ("the mean scale factor", "the scale factor of {}"),
-        "b": ("", "the bias of {}"),
-        "d": ("", "the change between repeats of the bias of {}"),
-        "s": ("", "the slope over temperature of the bias of {}"),
-        "e": ("the Earth's rate", "the Earth's rate along {}"),
-    }
-    alone, of_axis = words.get(name[:1], ("", ""))
-    if len(name) == 1 and alone:
-        return alone
-    if len(name) == 2 and of_axis:
-        return of_axis.format(name[1])
-    if len(name) == 3 and name[0] == "g":
-        return f"what an acceleration along {name[2]} adds to the rate of {name[1]}"
-    return name
+    if name in SCALES:
+        return f"the scale factor of {name[1]}" if name[1:] else "the mean scale factor"
+    if name in BIASES:
+        return f"the bias of {name[1]}"
+    return next((each.parameters[name] for each in every_characteristic() if name in each.parameters), name)
 
 
 def _times(change: Change) -> str:

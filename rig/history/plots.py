@@ -12,7 +12,8 @@ from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.tables import title_of
 from rig.report.exports.names import plain_names
 from rig.report.figures import save
-from rig.report.kinds.followed import CHANGES, EARTH, SCALE_SLOPES, SLOPES
+from rig.report.kinds.characteristics import every_characteristic
+from rig.report.kinds.followed import BIASES, SCALES
 from rig.study.style import style
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 # Of the figure's width and height. Letting the layout find them takes as long as drawing does.
 MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
-SHOWN = ("kx", "ky", "kz", "bx", "by", "bz", *CHANGES, *SLOPES, *SCALE_SLOPES, *EARTH[1:])
 ACROSS = 3
 
 
@@ -34,7 +34,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
         while name in names:  # the same sensor at another range
             name += "_"
         names.add(name)
-        shown = [trends[each] for each in SHOWN if each in trends]
+        shown = [trends[each] for each in _drawn() if each in trends]
         if not shown:
             continue
         with style():
@@ -51,6 +51,12 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
             save(figure, folder, name)
         written += [folder / f"{name}.png", folder / f"{name}.svg"]
     return written
+
+
+def _drawn() -> list[str]:
+    """The parameters that are drawn, in their order."""
+    beside = (each.parameters for each in every_characteristic() if each.series is not None and each.series.drawn)
+    return list(dict.fromkeys([*SCALES[1:], *BIASES, *(name for each in beside for name in each)]))
 
 
 def _draw_values(axes: "Axes", trend: Trend) -> None:

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from rig.config.limits import Kind
 from rig.data.installed_kinds import quantities
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.index import SAME, unlike
+from rig.report.kinds.followed import BIASES, SCALES, Followed
 from rig.report.kinds.registry import followed
 
 ROUNDING = 1e-15  # of what is zero but for the last digits: no quantity of a result is so small
@@ -26,9 +28,18 @@ def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
     checks = {check.name: _said(check) for check in given.checks}
     rows += [check.name for check in claimed.checks if checks.get(check.name) != _said(check)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
-    there = {(each.sensor, each.quantity) for each in followed(claimed)}
-    found = [each for each in followed(given) if each.quantity in quantities() or (each.sensor, each.quantity) in there]
+    there = {(each.sensor, each.quantity): each for each in followed(claimed)}
+    found = [_said_before(each, there.get((each.sensor, each.quantity))) for each in followed(given)]
+    found = [each for each in found if each.quantity in quantities() or (each.sensor, each.quantity) in there]
     return [*rows, *unlike(claimed, found), *numbers]
+
+
+def _said_before(given: Followed, claimed: Followed | None) -> Followed:
+    """What is followed without the characteristics that a claim does not state: later versions know more of them."""
+    if claimed is None:
+        return given
+    names = {*SCALES, *BIASES, *(each.name for each in claimed.parameters)}
+    return replace(given, parameters=tuple(each for each in given.parameters if each.name in names))
 
 
 def _said(check: CheckEntry) -> tuple[bool, str, Kind]:

@@ -22,7 +22,8 @@ from rig.history.engine import WRITES, engine_of
 from rig.history.entering import enter_run, note_place, now_utc
 from rig.history.finished import Finished, Recording
 from rig.history.issued import Issued
-from rig.report.kinds.followed import ORDER, Parameter
+from rig.report.kinds.characteristics import every_characteristic
+from rig.report.kinds.followed import BIASES, SCALES, Parameter
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands
 
@@ -333,10 +334,16 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
         for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(some))):
             number, name, *values = row
             found.setdefault(number, {})[name] = Parameter(name, *values)
-    return {number: dict(sorted(each.items(), key=_place)) for number, each in found.items()}
+    order = _order()
+    places = {name: place for place, name in enumerate(order)}
+
+    def place_of(parameter: tuple[str, Parameter]) -> tuple[int, str]:
+        return places.get(parameter[0], len(order)), parameter[0]
+
+    return {number: dict(sorted(each.items(), key=place_of)) for number, each in found.items()}
 
 
-def _place(parameter: tuple[str, Parameter]) -> tuple[int, str]:
-    """Where a parameter stands among the others: as in `ORDER`, what is not there after them."""
-    name, _ = parameter
-    return (ORDER.index(name) if name in ORDER else len(ORDER)), name
+def _order() -> list[str]:
+    """The parameters in the order in which they stand; one that is none of them comes last."""
+    beside = (name for each in every_characteristic() for name in each.parameters)
+    return list(dict.fromkeys([*SCALES, *BIASES, *beside]))

@@ -10,7 +10,7 @@ from rig.history.spark import picture
 from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
-from rig.report.kinds.followed import Parameter, is_scale
+from rig.report.kinds.followed import BIASES, SCALES, Parameter, is_scale
 from rig.report.rounding import figures, plus_minus
 
 PPM = 1e6
@@ -60,7 +60,7 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
         yield f"drift, spread, chart and recall need {FEWEST} calibrations; there are {fewest}"
     elif all(trend.line is None for trend in trends.values()):
         yield f"drift and recall need {DRIFT_DAYS:g} days from the first calibration to the last"
-    calibrated = [trend.last for name, trend in trends.items() if name[0] in "kb"]
+    calibrated = [trend.last for name, trend in trends.items() if name in (*SCALES, *BIASES)]
     if calibrated and all(parameter.std_combined is None for parameter in calibrated):
         yield "U is that of noise alone: no result of this sensor has a budget"
     for trend in trends.values():
@@ -191,6 +191,6 @@ def _signed(value: float, decimals: int) -> str:
 
 
 def _effect(name: str, effect: RigEffect) -> str:
-    size, unit = (PPM, " ppm") if is_scale(name) else (1.0, " rad/s" if name[0] == "b" else "")
+    size, unit = (PPM, " ppm") if is_scale(name) else (1.0, " rad/s" if name in BIASES else "")
     certain = " *" if abs(effect.value) > effect.expanded else ""
     return f"{plus_minus(effect.value * size, effect.expanded * size)}{unit}{certain}"

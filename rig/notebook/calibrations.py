@@ -1,7 +1,7 @@
 """One sensor's calibration: its numbers ± U, and what it makes of readings of one's own."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,8 +23,18 @@ NOISE_TEXT = "± U: two standard deviations of noise; no more is known"
 
 
 @dataclass(frozen=True, eq=False)
+class Beside:
+    """Numbers found beside scale factors and biases, by their `labels`: `values` and `expanded`, U, in an SI `unit`."""
+
+    labels: tuple[str, ...]
+    values: Array
+    expanded: Array
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
 class Calibration:
-    """Scale factors and biases of one sensor, with their uncertainties.
+    """Scale factors and biases of one sensor, with their uncertainties, and what was found `beside` them, by name.
 
     A gyroscope's reading m is corrected as g = K (m + b), an accelerometer's or a magnetometer's as M (m − b); `apply`
     does it. Arrays are in SI units: a bias in rad/s, m/s² or T. `entry` is all that `result.json` has of it.
@@ -33,6 +43,7 @@ class Calibration:
     name: str
     found: Finding[Any]
     shown: Shown
+    beside: Mapping[str, Beside] = field(default_factory=dict)
 
     @property
     def entry(self) -> Any:
@@ -127,12 +138,12 @@ class Calibration:
 
 def rows(shown: Shown) -> Iterator[tuple[str, ...]]:
     """The rows of a table under `HEADINGS`, axis by axis with U."""
-    for i, axis in enumerate("xyz"[: len(shown.numbers.values)]):
+    for i, label in enumerate(shown.labels[: len(shown.numbers.values)]):
         scale = ("–", "–")
         if shown.scale is not None:
             scale = f"{shown.scale.values[i]:.6f}", f"{shown.scale.expanded[i]:.6f}"
         number, width = f"{shown.numbers.values[i]:+.6f}", f"{shown.numbers.expanded[i]:.6f}"
-        yield f"{shown.name} {axis}", *scale, number, width, shown.unit.name
+        yield f"{shown.name} {label}".rstrip(), *scale, number, width, shown.unit.name
 
 
 def _few(values: Any, form: str) -> str:

@@ -6,15 +6,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
-from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, rows
+from rig.notebook.calibrations import HEADINGS, U_TEXT, Beside, Calibration, rows
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
-from rig.report.kinds.registry import outlets, shown
+from rig.report.kinds.finding import Finding
+from rig.report.kinds.registry import outlets, shown, terms_of
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
@@ -32,11 +35,25 @@ class Result(Mapping[str, Calibration]):
     @cached_property
     def _calibrations(self) -> dict[str, Calibration]:
         found = (
-            Calibration(shown.name, finding, shown)
+            Calibration(shown.name, finding, shown, self._beside(finding))
             for _, show, finding in outlets(self.document, lambda kind: kind.shown)
             if (shown := show(finding)).scale is not None
         )
         return {each.name: each for each in found}
+
+    def _beside(self, of: Finding[Any]) -> dict[str, Beside]:
+        """What was found of a sensor's quantity beside its scale and bias, by whatever kind of result."""
+        of_it = of.sensor, of.quantity
+        found = (each for each in terms_of(self.document) if (each.finding.sensor, each.finding.quantity) == of_it)
+        return {
+            term.name: Beside(
+                tuple(term.characteristic.labels),
+                np.array(term.known.values),
+                np.array(term.expanded.widths),
+                term.units.si,
+            )
+            for term in found
+        }
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:

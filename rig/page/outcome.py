@@ -33,6 +33,7 @@ def outcome_rows(result: ResultDocument, parts: Mapping[str, str]) -> list[Row]:
             {
                 "name": found.name,
                 "part": parts.get(found.sensor, ""),
+                "labels": list(found.labels),
                 "unit": found.unit.name,
                 "scale": None if found.scale is None else _numbers(found.scale, 1.0, scale),
                 "bias": _numbers(found.numbers, 0.0, None if bias is None else bias / found.unit.size),

@@ -116,11 +116,12 @@ def _parameters_so_far(name: str, partial: SoFar) -> Row:
 
 def _row(shown: Shown) -> Row:
     of = COMBINED if shown.combined else NOISE_ONLY
-    return {**_row_of(shown.name, shown.unit, shown.numbers, shown.scale, of=of), "missing": None}
+    row = _row_of(shown.name, shown.unit, shown.numbers, shown.scale, of=of)
+    return {**row, "labels": list(shown.labels), "missing": None}
 
 
 def _row_of(name: str, unit: Unit, bias: Three | None, scale: Three | None, *, of: str) -> Row:
-    row: Row = {"sensor": name, "unit": unit.name, "of": of}
+    row: Row = {"sensor": name, "labels": list(RATE.axes), "unit": unit.name, "of": of}
     for what, each in (("scale", scale), ("bias", bias)):
         row[what] = None if each is None else [float(value) for value in each.values]  # rounded on the screen alone
         row[f"{what}_u"] = None if each is None else rounded(tuple(each.expanded))

@@ -2,27 +2,16 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
 from rich.table import Table
 
 from rig.data.quantity import Quantity
-from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import SensorAxes
-from rig.report.expanded import expanded, factor_words
+from rig.report.expanded import factor_words
+from rig.report.kinds.characteristic import Term
 from rig.station.plain_text import plain
-
-
-class Skewed(Protocol):
-    """What says how its axes lie to each other."""
-
-    @property
-    def non_orthogonality_std_rad(self) -> Sequence[float]: ...
-    @property
-    def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
-
 
 FEWEST_DECIMALS = 5
 
@@ -68,10 +57,11 @@ def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> i
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
 
-def skew_known(skewed: Skewed) -> str:
-    """U of the angles between the axes, the largest, in degrees, and what k is."""
-    widths = expanded(skewed.non_orthogonality_std_rad, skewed.non_orthogonality_freedom).widths
-    return f"{np.degrees(max(widths)):.2g}, {factor_words(skewed.non_orthogonality_freedom)}"
+def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
+    """A characteristic's numbers in a line behind what it is called there, with the largest U."""
+    _, values, widths = zip(*term.printed, strict=True)
+    unit, words = term.units.shown.name, factor_words(term.known.freedom)
+    return f"{lead}: {triple(values, form)} {unit} (± {max(widths):{width}}, {words})"
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:

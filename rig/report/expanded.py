@@ -32,8 +32,3 @@ def factor_words(freedom: Sequence[Freedom] | None) -> str:
     factors = expanded([1.0] * len(freedom), freedom).factors
     low, high = f"{min(factors):.3g}", f"{max(factors):.3g}"
     return f"k = {low}" if low == high else f"k = {low} to {high}"
-
-
-def flat(freedom: Sequence[Sequence[Freedom]] | None) -> list[Freedom] | None:
-    """Degrees of freedom of a matrix, row by row."""
-    return None if freedom is None else [each for row in freedom for each in row]

@@ -11,9 +11,12 @@ from rich.table import Table
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.certificate.writer import PAGE
 from rig.report.ending import ending
+from rig.report.expanded import factor_words
+from rig.report.kinds.characteristic import Term, terms
 from rig.report.kinds.kind import said
 from rig.report.kinds.registry import kinds
 from rig.report.mounts import mount_lines
+from rig.report.rounding import plus_minus
 from rig.station.plain_text import plain, say
 
 ROUNDING = 1e-12
@@ -71,12 +74,21 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
     """Print what was found, of one sensor alone if one is named: values, budgets, and what stands beside."""
     for kind in kinds():
         for found in kind.found(result):
-            for each in said(kind.printed, found) if sensor in (None, found.sensor) else ():
+            if sensor not in (None, found.sensor):
+                continue
+            for each in (*said(kind.printed, found), *map(_beside, terms(kind.characteristics, found, "terminal"))):
                 console.print(plain(each) if isinstance(each, str) else each)
         for line in kind.unsolved(result):
             console.print(plain(line))
     for line in mount_lines(result):
         console.print(plain(line))
+
+
+def _beside(term: Term) -> str:
+    """A characteristic in a line: each of its numbers ± U."""
+    unit = "" if term.units.shown.name == "1" else f" {term.units.shown.name}"
+    numbers = "  ".join(f"{label} {plus_minus(value, u)}".lstrip() for label, value, u in term.printed)
+    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.known.freedom)})"
 
 
 def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:

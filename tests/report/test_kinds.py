@@ -1,8 +1,7 @@
 """Every kind of result is shown everywhere, or says why it is not."""
 
 import io
-from dataclasses import fields, replace
-from xml.etree.ElementTree import tostring
+from dataclasses import fields
 
 import pytest
 from rich.console import Console
@@ -10,10 +9,8 @@ from rich.console import Console
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument
 from rig.page.rows import parameter_rows
-from rig.report.certificate import dcc_results
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.header import calibration_header
-from rig.report.kinds.followed import Further, followed_beside, known
 from rig.report.kinds.kind import ResultKind, Without
 from rig.report.kinds.registry import followed, kinds
 from rig.report.table import print_result
@@ -48,18 +45,6 @@ def test_the_terminal_shows_every_kind(document: ResultDocument) -> None:
     for said in ("gyro: ", "gyro, accelerometer: ", "compass, magnetometer as mounted: ", "Earth's rate found"):
         assert said in text
     assert "gyro, gyroscope: bias by repeat" in text
-
-
-def test_a_quantity_beside_scale_and_bias_is_said_once_for_certificate_and_history() -> None:
-    said = Further("creep", "xyz", (-1e-3, 2e-3, 0.0), (1e-4, 2e-4, 0.0), None, r"\one",
-                   prefix="creep_", followed_in="1", opposite=True)  # fmt: skip
-    (element,) = dcc_results.beside([said])
-    assert "creep" in (text := tostring(element, encoding="unicode")) and "-0.001" in text
-    found = list(followed_beside([said, replace(said, prefix="")]))
-    assert [(each.name, each.value, each.unit) for each in known(found)] == [
-        ("creep_x", 1e-3, "1"),
-        ("creep_y", -2e-3, "1"),
-    ]
 
 
 def test_the_page_shows_every_kind_that_has_numbers(document: ResultDocument) -> None:

@@ -184,6 +184,7 @@ def look(plan: Plan, sweeps: int) -> Look:
     parameters = [
         {
             "sensor": name,
+            "labels": [*"xyz"],
             "unit": "rad/s",
             "scale": [1.17776, 1.15521, 1.14266] if known else None,
             "scale_u": [0.00175, 0.00169, 0.00161] if known else None,

@@ -57,7 +57,7 @@ function table(row, past) {
         make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.normalised_error[i] > 1 ? "bad" : "" })] : [])];
   };
   const head = ["axis", ...heading("scale", ""), ...heading("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
-  const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: LETTERS[i] ?? "" }), ...cells("scale", i), ...cells("bias", i)));
+  const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: row.labels[i] }), ...cells("scale", i), ...cells("bias", i)));
   return make("div", { className: "wide" }, make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body)));
 }
 

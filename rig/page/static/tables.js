@@ -98,7 +98,7 @@ export function parameters(rows) {
   fill("parameters", rows.flatMap((p) => {
     if (!p.scale && !p.bias) return [spanning(row([p.sensor, [p.missing ?? "", "words"]], "new-sensor"), 7)];
     const digits = p.scale || p.missing ? warranted(p.bias_u) : 2;
-    const axes = [..."xyz"].map((axis, i) =>
+    const axes = p.labels.map((axis, i) =>
       row([
         i === 0 ? p.sensor : "", axis,
         p.scale ? fixed(p.scale[i], 5) : "–", [p.scale_u ? fixed(p.scale_u[i], 5) : "–", "u"],

@@ -46,15 +46,6 @@ def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
     return rows_of(entry.scale, entry.bias_m_s2, spread, too=1000 / entry.gravity_m_s2)
 
 
-def second_order_rows(entry: AccelerometerEntry) -> list[tuple[str, Pair]]:
-    """φ of each axis in s²/m with U; none where it was not looked for."""
-    if entry.second_order_s2_m is None or entry.second_order_std_s2_m is None:
-        return []
-    widths = expanded(entry.second_order_std_s2_m, entry.second_order_freedom).widths
-    each = zip(AXES, entry.second_order_s2_m, widths, strict=True)
-    return [(axis, pair(value, width)) for axis, value, width in each]
-
-
 def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
     """A magnetometer's axes with U; the bias in µT."""
     return rows_of(entry.scale, entry.bias_t, expanded_uncertainties(entry.budget, entry.covariance), size=MICRO)

@@ -17,6 +17,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.statements import Stated
+from rig.report.kinds.characteristic import Term, terms
 from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard, Without
 from rig.report.kinds.registry import kinds, outlets, shown
@@ -56,10 +57,11 @@ class HeldStill:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What of a result a macro of a template prints, which `place` names: `template:macro`."""
+    """What of a result a macro of a template prints, which `place` names: `template:macro`; then what is `beside`."""
 
     place: str
     found: Finding[Any]
+    beside: tuple[Term, ...]
 
     @property
     def template(self) -> str:
@@ -185,7 +187,11 @@ class Certificate:
     def blocks(self) -> tuple[Block, ...]:
         """What the page prints of each sensor, one after the other; of a reference nothing."""
         asked = outlets(self.result, lambda kind: kind.block)
-        blocks = [Block(place, finding) for _, place, finding in asked if not finding.known]
+        blocks = [
+            Block(place, finding, (*terms(kind.characteristics, finding, "certificate"),))
+            for kind, place, finding in asked
+            if not finding.known
+        ]
         order = list(dict.fromkeys(block.found.sensor for block in blocks))
         return tuple(sorted(blocks, key=lambda block: order.index(block.found.sensor)))
 

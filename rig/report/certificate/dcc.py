@@ -5,6 +5,7 @@ which PTB's rules want to be one of ISO 3166-1.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
@@ -12,9 +13,11 @@ from rig.config.sensor_catalogue import has_own_port
 from rig.data.result_file import CheckEntry, ProvenanceEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
-from rig.report.certificate.tables import kind
+from rig.report.certificate.dcc_results import beside
+from rig.report.certificate.tables import kind as kind_of_part
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
+from rig.report.kinds.characteristic import terms
 from rig.report.kinds.kind import Measured
 from rig.report.kinds.registry import outlets
 from rig.report.validity_words import told_by
@@ -105,9 +108,11 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
 
 
 def _measured(c: Certificate) -> Iterator[Measured]:
-    """Everything that was measured, kind by kind."""
-    asked = outlets(c.result, lambda kind: kind.measured)
-    yield from filter(None, (measure(finding, c.reversals) for _, measure, finding in asked))
+    """Everything that was measured, kind by kind, and what was found beside."""
+    for kind, measure, finding in outlets(c.result, lambda kind: kind.measured):
+        if (each := measure(finding, c.reversals)) is not None:
+            more = beside(terms(kind.characteristics, finding, "digital certificate"))
+            yield replace(each, results=[*each.results, *more])
 
 
 def _keys(items: Iterable[Measured]) -> dict[tuple[str, str], str]:
@@ -134,7 +139,7 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         "item",
         text("name", name),
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
-        words("model", kind(part)),
+        words("model", kind_of_part(part)),
         dcc("identifications", _identified("manufacturer", serial, "serial number"),
             None if c.elsewhere or has_own_port(part)
             else _identified("other", c.provenance.board_unique_id, "board it is on")),

@@ -10,7 +10,7 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.result_file import SensorEntry, VerificationEntry
-from rig.data.result_types import ErrorEntry, Freedom, Matrix6, ToldFromEntry, WhenEntry
+from rig.data.result_types import Freedom, Matrix6, ToldFromEntry, WhenEntry
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
@@ -19,12 +19,11 @@ from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
 from rig.report.expanded import Expanded, expanded, factor_words
-from rig.report.kinds.followed import Further
+from rig.report.kinds.characteristic import Term
 from rig.report.told_words import told_words
 from rig.report.validity_words import load_words, speed_words, when_words
 
-ONE, ANGLE, PER_FORCE = r"\one", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
-PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
+ONE, ANGLE = r"\one", r"\radian"
 Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
@@ -62,11 +61,12 @@ def magnetometer(entry: MagnetometerEntry, turned: ReversalEntry | None) -> Iter
     yield from _relative(entry, [*entry.scale, *entry.bias_t], FIELD.d_si, said, ", as mounted")
 
 
-def beside(further: Iterable[Further]) -> Iterator[Element]:
+def beside(characteristics: Iterable[Term]) -> Iterator[Element]:
     """What was found of a sensor beside scale and bias, with U by its standard deviations."""
-    for each in further:
-        said = f"{each.said} {SOLUTION}" if each.said else SOLUTION
-        yield _spread(each.name, said, each.labels, (each.values, each.stds, each.freedom), each.unit)
+    for each in characteristics:
+        of, known = each.characteristic, each.known
+        said = f"{remark} {SOLUTION}" if (remark := of.remark(each.finding.entry)) else SOLUTION
+        yield _spread(each.name, said, of.labels, (known.values, known.stds, known.freedom), each.units.d_si)
 
 
 def _reversed(entry: ReversalEntry) -> Iterator[Element]:
@@ -90,7 +90,7 @@ def _reversed(entry: ReversalEntry) -> Iterator[Element]:
 
 
 def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
-    """The bias of each repeat, and over temperature where it could be told."""
+    """The bias of each repeat."""
     labels = [str(number) for number in range(1, len(entry.repeats) + 1)]
     for i, axis in enumerate(AXES):
         values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in entry.repeats), strict=True)
@@ -98,11 +98,6 @@ def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
 deviation of {entry.common_std[i]!r} {entry.unit}. ± U of what differs"
         freedom = None if entry.freedom is None else [entry.freedom[i]] * len(labels)
         yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
-    slope = entry.over_temperature
-    if not isinstance(slope, ErrorEntry):
-        low, high = slope.range_c
-        said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
-        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), of.d_si + KELVIN)
 
 
 def over_temperature(entry: OverTemperatureEntry, of: Quantity) -> Iterator[Element]:

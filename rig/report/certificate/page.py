@@ -10,6 +10,7 @@ from rig.report import expanded, printed_budget, rounding, temperature_words, to
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, temperature_curves, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
+from rig.report.kinds import characteristics
 from rig.report.kinds.kind import OWN_TEMPLATES
 from rig.report.kinds.registry import kinds
 
@@ -38,6 +39,7 @@ def _template() -> "Template":
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": quantities()}
+    environment.globals["characteristics"] = characteristics
     for module in MODULES:
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

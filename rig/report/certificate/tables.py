@@ -8,12 +8,12 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.motion_file import NOT_STATED
-from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
+from rig.data.result_file import CheckEntry, SensorEntry, VerificationEntry
 from rig.report.expanded import expanded
+from rig.report.kinds.characteristic import Term
 from rig.report.rounding import percent, rounded
 
 AXES = ("x", "y", "z")
-ANGLES = ("yz", "zx", "xy")
 JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %
 DEG = math.degrees(1)
 FINE_DEG_S = 1e-3
@@ -127,24 +127,9 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
     return f"{max(abs(error[axis]) for error in errors):.5f}" if errors else "–"
 
 
-def skew_rows(angles_rad: Sequence[float], widths_rad: Sequence[float]) -> list[tuple[str, Pair]]:
-    """Angles by which the axes are off right ones, in degrees, with U."""
-    each = zip(ANGLES, angles_rad, widths_rad, strict=True)
-    return [(name, pair(DEG * angle, DEG * width)) for name, angle, width in each]
-
-
-def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
-    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with U; none if not looked for."""
-    if vector.g_sensitivity_rad_s_per_m_s2 is None or vector.g_sensitivity_std_rad_s_per_m_s2 is None:
-        return []
-    freedom = vector.g_sensitivity_freedom or (None, None, None)
-    rows = zip(
-        AXES, vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, freedom, strict=True
-    )  # gravity points down where the specific force points up
-    return [
-        (axis, [pair(-g, width) for g, width in zip(row, expanded(stds, known).widths, strict=True)])
-        for axis, row, stds, known in rows
-    ]
+def pairs(term: Term) -> list[tuple[str, Pair]]:
+    """A characteristic's numbers by their labels, in the unit that they are shown in, with U."""
+    return [(label, pair(value, width)) for label, value, width in term.printed]
 
 
 def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:

@@ -89,6 +89,7 @@ def _lines(calibrations: Calibrations, autopilot: Autopilot, form: Callable[[str
         yield from (f"# {line}" for line in calibrations.origin(each))
         number = fields.index(each.sensor) if each.quantity == FIELD else places[each.sensor]
         yield from (form(name, value) for name, value in named(number, each))
+    yield from (f"# Lost: {name}: there is no parameter for it" for name in calibrations.beside)
     yield from (f"# {printable(line)}" for kind in kinds() for line in kind.unsolved(calibrations.result))
 
 

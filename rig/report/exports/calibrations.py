@@ -13,7 +13,7 @@ from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.kinds.corrected import Corrected
-from rig.report.kinds.registry import outlets
+from rig.report.kinds.registry import outlets, terms_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +54,15 @@ class Calibrations:
 
     @property
     def elsewhere(self) -> tuple[str, ...]:
-        """What was calibrated and belongs to none of the IMUs."""
+        """What no file of an IMU has a place for: sensors that belong to none, and what is `beside`."""
         held = [each for imu in self.imus for each in (imu.gyroscope, imu.accelerometer)]
-        return tuple(each.name for each in self.sensors if each not in held)
+        return (*(each.name for each in self.sensors if each not in held), *self.beside)
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """What was found beside scale and bias, and no format knows."""
+        found = (term for term in terms_of(self.result, "exports") if not term.finding.known)
+        return tuple(printable(f"{term.whose}, {term.name}") for term in found)
 
     def origin(self, sensor: Corrected) -> Iterator[str]:
         """Whose calibration it is, when and how warm it was found, and by what."""

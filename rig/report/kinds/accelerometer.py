@@ -15,17 +15,16 @@ from rig.estimation.imu import MODEL
 from rig.estimation.own_errors import NONLINEARITY
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.triads import Alignment
-from rig.report.axes import triple
+from rig.report.axes import line_of, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
-from rig.report.certificate.tables import AXES
 from rig.report.elsewhere_entries import accelerometers_elsewhere
 from rig.report.entry import counted, entry
-from rig.report.expanded import expanded, factor_words
-from rig.report.kinds.followed import Further
+from rig.report.kinds.characteristics import ACCELEROMETERS, SECOND_ORDER
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard
-from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
+from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.triad_entry import OF_ACCELEROMETERS, triad_entry
 from rig.report.validity_words import warmth, when_words
@@ -70,8 +69,9 @@ def _held_out(held: HeldOut) -> HeldOutEntry:
     return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
 
 
-def _lines(entry: AccelerometerEntry) -> Iterator[str]:
+def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
     """What stands below the table."""
+    entry = finding.entry
     swept = "" if entry.laid_down is not None else f", {entry.sweeps} sweeps"
     yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{swept}"
     if entry.found_at is not None:
@@ -80,12 +80,9 @@ def _lines(entry: AccelerometerEntry) -> Iterator[str]:
         yield "k by the readings at 1 g up and down, b at 0 g"
     yield from assumed_lines(entry.budget)
     yield from told_lines(entry.told_from)
-    yield from attitude_lines(entry, ACCELERATION)
+    yield from attitude_lines(finding)
     if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
-        terms = triple(entry.second_order_s2_m, "+.2e")
-        widths = expanded(entry.second_order_std_s2_m, entry.second_order_freedom).widths
-        words = factor_words(entry.second_order_freedom)
-        yield f"second order: {terms} s²/m (± {max(widths):.1e}, {words})"
+        yield line_of(SECOND_ORDER.of(finding), "second order", "+.2e", ".1e")
     if entry.lever_arm_m is not None and entry.lever_arm_std_m is not None:
         lever = triple(np.multiply(1e3, entry.lever_arm_m), "+.1f")
         yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(entry.lever_arm_std_m):.1f})"
@@ -113,13 +110,6 @@ def _temperatures_c(entry: AccelerometerEntry) -> dict[str, float | None]:
     return {"": entry.temperature_c} if entry.found_at is None else warmth(entry.found_at)
 
 
-def _further(entry: AccelerometerEntry) -> Iterator[Further]:
-    yield angles(entry)
-    if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
-        known = entry.second_order_std_s2_m, entry.second_order_freedom
-        yield Further("second order", AXES, entry.second_order_s2_m, *known, dcc_results.PER_FORCE)
-
-
 def _method(swept: bool) -> str:
     felt = ", and felt in the sweeps" if swept else ""
     held = f"Accelerometers are held still in known attitudes to gravity{felt}"
@@ -130,7 +120,7 @@ ACCELEROMETER = triad_kind(
     ACCELERATION,
     "accelerometers",
     _entries,
-    Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c, _further),
+    Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c),
     header=accelerometer_lines,
     block="at_rest.html.j2:accelerometer",
     standard=Standard(
@@ -140,4 +130,5 @@ ACCELEROMETER = triad_kind(
         known="gravity",
         method=_method,
     ),
+    characteristics=ACCELEROMETERS,
 )

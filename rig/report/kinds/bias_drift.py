@@ -15,14 +15,15 @@ from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry, Vector3
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.bias_by_repeat import FALSE_ALARM, largest_change_std
+from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.report.budget_table import heading_of
 from rig.report.certificate import dcc_results
 from rig.report.entry import counted
 from rig.report.expanded import expanded, factor_words
+from rig.report.kinds.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import CHANGES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.followed import Followed
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
 from rig.report.kinds.unexplained import of_repeats
 from rig.station.plain_text import plain
 
@@ -95,27 +96,19 @@ def _found(document: ResultDocument) -> Iterator[Finding[DriftEntry]]:
 
 def _printed(finding: Finding[DriftEntry]) -> Iterator[Table | str]:
     yield drift_table(finding.sensor, finding.quantity, finding.entry)
-    yield from _lines(finding.quantity, finding.entry)
+    yield from _lines(finding)
 
 
 def _shown(finding: Finding[DriftEntry]) -> Shown:
     """The largest change that there was."""
-    entry, unit = finding.entry, finding.quantity.drift
-    widths = expanded(_change_std(entry), entry.freedom).widths
-    change, known_to = ([each / unit.size for each in values] for values in (entry.largest_change, widths))
-    noun, three = "largest change of the bias", Three(change, known_to)
-    name = f"{finding.quantity.beside(finding.sensor)}: {noun}"
-    return Shown(finding.sensor, finding.quantity, name, unit, three, combined=True, noun=noun)
+    return row_of(LARGEST_CHANGE.of(finding), finding.quantity.beside(finding.sensor))
 
 
 def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed | None:
     """What is followed of a drift, in results that say whose bias it is."""
-    entry, slope = finding.entry, finding.entry.over_temperature
+    entry = finding.entry
     if entry.part is None or entry.serial_number is None or entry.full_scale is None:
         return None
-    followed = [*parameters(CHANGES, entry.largest_change, _change_std(entry), entry.freedom, entry.unit)]
-    if not isinstance(slope, ErrorEntry):
-        followed += parameters(SLOPES, slope.slope, slope.std, slope.freedom, f"{entry.unit}/K")
     return Followed(
         finding.sensor,
         f"{finding.quantity} bias drift",
@@ -124,7 +117,6 @@ def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followe
         entry.full_scale,
         "bias_by_repeat",
         float(np.mean([repeat.temperature_c for repeat in entry.repeats])),
-        known(followed),
     )
 
 
@@ -132,12 +124,6 @@ def _measured(finding: Finding[DriftEntry], _: object) -> Measured:
     entry, of = finding.entry, finding.quantity
     name, results = f"bias by repeat of {finding.sensor}, {of}", dcc_results.bias_drift(entry, of)
     return Measured(of.sensor, finding.sensor, entry.part, entry.serial_number, name, results)
-
-
-def _change_std(entry: DriftEntry) -> list[float]:
-    bias, std = (np.array([getattr(each.held, name) for each in entry.repeats]) for name in ("bias", "std"))
-    stds: list[float] = largest_change_std(bias, std).tolist()
-    return stds
 
 
 def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
@@ -161,9 +147,9 @@ def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
     return table
 
 
-def _lines(quantity: Quantity, entry: DriftEntry) -> Iterator[str]:
+def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
     """What stands below the table."""
-    shown = quantity.drift
+    entry, quantity, shown = finding.entry, finding.quantity, finding.quantity.drift
     unit, size = shown.name, shown.size
     if entry.moves:
         for move in entry.moves:
@@ -190,8 +176,7 @@ def _lines(quantity: Quantity, entry: DriftEntry) -> Iterator[str]:
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
     else:
-        widths = expanded(slope.std, slope.freedom).widths
-        terms = "  ".join(f"{a / size:+.3g} ± {b / size:.1g}" for a, b in zip(slope.slope, widths, strict=True))
+        terms = "  ".join(f"{a:+.3g} ± {b:.1g}" for _, a, b in DRIFT_SLOPE.of(finding).printed)
         low, high = slope.range_c
         words = factor_words(slope.freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
@@ -214,4 +199,5 @@ BIAS_DRIFT = ResultKind(
     standard=Without("it hangs on that of the sensor whose bias it is"),
     corrected=Without("it corrects nothing; `rig export --at-temperature` takes its slopes"),
     unexplained=of_repeats,
+    characteristics=DRIFTS,
 )

@@ -2,17 +2,15 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, SensorEntry
 from rig.report.certificate import dcc_results
-from rig.report.expanded import expanded
+from rig.report.kinds.characteristics import EARTH_RATE, EARTHS_RATES
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import EARTH, Followed, known, parameters
+from rig.report.kinds.followed import Followed
 from rig.report.kinds.gyroscope import temperatures_c
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
 
 
 def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
@@ -31,18 +29,11 @@ def _of(finding: Finding[SensorEntry]) -> EarthRateEntry:
 
 def _shown(finding: Finding[SensorEntry]) -> Shown:
     """The Earth's rate in the axes of the arm's base."""
-    entry, unit = _of(finding), RATE.drift
-    widths = expanded(_stds(entry), entry.freedoms(3)).widths
-    noun = "the Earth's rate in the arm's base"
-    name = f"{finding.sensor}: {noun}"
-    rates, known_to = ([each / unit.size for each in values] for values in (entry.rate_rad_s, widths))
-    three = Three(rates, known_to)
-    return Shown(finding.sensor, RATE, name, unit, three, combined=True, noun=noun)
+    return row_of(EARTH_RATE.of(finding))
 
 
 def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
-    entry, sensor = _of(finding), finding.entry
-    values, stds = (entry.norm_rad_s, *entry.rate_rad_s), (entry.norm_std_rad_s, *_stds(entry))
+    sensor = finding.entry
     return Followed(
         finding.sensor,
         "Earth's rate",
@@ -51,7 +42,6 @@ def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
         sensor.range_rad_s or 0.0,
         sensor.estimator,
         sensor.temperature_c,
-        known([*parameters(EARTH, values, stds, entry.freedoms(4), RATE.unit)]),
     )
 
 
@@ -65,13 +55,8 @@ def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
-def _stds(entry: EarthRateEntry) -> list[float]:
-    stds: list[float] = np.sqrt(np.diag(entry.covariance_rad2_s2)).tolist()
-    return stds
-
-
 AMONG = Without("it stands among the lines of its gyroscope")
-EARTH_RATE = ResultKind(
+EARTHS_RATE = ResultKind(
     name="Earth's rate",
     key="sensors",
     entries=Without("it is part of its gyroscope's entry"),
@@ -86,4 +71,5 @@ EARTH_RATE = ResultKind(
     standard=Without("it hangs on that of its gyroscope"),
     corrected=Without("it is the place's, not the sensor's"),
     unexplained=Without("it is told by what its gyroscope's picture shows"),
+    characteristics=EARTHS_RATES,
 )

@@ -1,10 +1,7 @@
 """What a history keeps of a result: parameters with their uncertainties, by sensor. Pure.
 
-Names: kx ky kz scale factors, k their mean, bx by bz biases; nonorth_yz nonorth_zx nonorth_xy the angles between axes
-less 90°; gxx … gzz what an acceleration adds to a rate (first letter the gyroscope's axis); dx dy dz the largest change
-of a bias between repeats, sx sy sz its slope over temperature, tx ty tz that of a scale factor; e ex ey ez the Earth's
-rate found and its parts in the axes of the base. The mean is one of its own because a gyroscope's only standard of
-size, the clock, moves all alike.
+Names: kx ky kz scale factors, k their mean, bx by bz biases; characteristics (`characteristics.py`) name the others.
+The mean is one of its own because a gyroscope's only standard of size, the clock, moves all alike.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,13 +17,9 @@ if TYPE_CHECKING:
     from rig.data.budget_entries import BudgetEntry
     from rig.data.quantity import Quantity
     from rig.data.result_file import ResultDocument
-    from rig.data.result_types import Freedom
+    from rig.report.kinds.characteristic import Term
 
-ANGLES = ("nonorth_yz", "nonorth_zx", "nonorth_xy")
-SENSITIVITIES = tuple(f"g{row}{column}" for row in "xyz" for column in "xyz")
-CHANGES, SLOPES, EARTH = ("dx", "dy", "dz"), ("sx", "sy", "sz"), ("e", "ex", "ey", "ez")
-SCALE_SLOPES = ("tx", "ty", "tz")
-ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *SENSITIVITIES, *CHANGES, *SLOPES, *SCALE_SLOPES, *EARTH)
+SCALES, BIASES = ("k", "kx", "ky", "kz"), ("bx", "by", "bz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,31 +55,11 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Further:
-    """What was found of a sensor beside scale and bias: a kind says it once, for the digital certificate and a history.
-
-    Values, standard deviations and their degrees of freedom by `labels`, in the `unit` as D-SI writes it, under a name
-    and what is `said` before ± U. A history follows it under `prefix` and label, in the unit `followed_in`; not where
-    there is no prefix. `opposite` where it keeps the values with the other sign.
-    """
-
-    name: str
-    labels: Sequence[str]
-    values: Sequence[float]
-    stds: Sequence[float]
-    freedom: "Sequence[Freedom] | None"
-    unit: str
-    said: str = ""
-    prefix: str = ""
-    followed_in: str = ""
-    opposite: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Followed:
     """What one sensor's result in a run is followed by, under the name of a `quantity`.
 
-    `full_scale` is in the unit of its biases, 0 where the result does not say it.
+    `full_scale` is in the unit of its biases, 0 where the result does not say it. Characteristics join the `parameters`
+    of the kind's own.
     """
 
     sensor: str
@@ -96,7 +69,7 @@ class Followed:
     full_scale: float
     estimator: str
     temperature_c: float | None
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[Parameter, ...] = ()
 
 
 class Calibrated(Protocol):
@@ -119,7 +92,7 @@ def nominal(name: str) -> float:
 
 def is_scale(name: str) -> bool:
     """Whether a parameter of this name is a scale factor, whose changes are fractions."""
-    return name in ("k", "kx", "ky", "kz")
+    return name in SCALES
 
 
 def scale_and_bias(
@@ -148,24 +121,15 @@ def scale_and_bias(
         )
 
 
-def parameters(
-    names: Sequence[str], values: Sequence[float], stds: Sequence[float], freedom: "Sequence[Freedom] | None", unit: str
-) -> Iterator[Parameter]:
-    """Others by their standard deviations and the degrees of freedom of these."""
-    from rig.report.expanded import expanded
-
-    factors = expanded([1.0] * len(names), freedom).factors
-    for name, value, std, factor in zip(names, values, stds, factors, strict=True):
-        yield Parameter(name, value, std, None, unit, coverage_factor=None if factor == COVERAGE_FACTOR else factor)
-
-
-def followed_beside(further: Iterable[Further]) -> Iterator[Parameter]:
-    """The parameters of what was found beside scale and bias, as far as a history follows it."""
-    for each in further:
-        if each.prefix:
-            values = [-value for value in each.values] if each.opposite else each.values
-            names = [each.prefix + label for label in each.labels]
-            yield from parameters(names, values, each.stds, each.freedom, each.followed_in)
+def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
+    """The parameters of characteristics, by their standard deviations and the degrees of freedom of these."""
+    for each in characteristics:
+        of, known = each.characteristic, each.known
+        sign = -1 if of.opposite else 1
+        rows = zip(of.parameters, known.values, known.stds, each.expanded.factors, strict=True)
+        for name, value, std, factor in rows:
+            counted = None if factor == COVERAGE_FACTOR else factor
+            yield Parameter(name, sign * value, std, None, each.units.si, coverage_factor=counted)
 
 
 def known(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 from rich.table import Table
@@ -16,19 +15,17 @@ from rig.data.result_file import BoardEntry, EstimateEntry, ResultDocument, Sens
 from rig.data.result_types import ErrorEntry, Role
 from rig.estimation.arrays import in_units_of
 from rig.estimation.six_observation import PARAMETERS
-from rig.report.axes import decimals, matrix_lines, skew_known, triple
+from rig.report.axes import decimals, line_of, matrix_lines, triple
 from rig.report.c_functions import gyroscope_lines
 from rig.report.certificate import dcc_results
-from rig.report.certificate.tables import AXES
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.elsewhere_entries import rates_in_attitudes, turned
-from rig.report.expanded import flat
 from rig.report.hand_entry import by_hand_lines
+from rig.report.kinds.characteristics import GYROSCOPES, NON_ORTHOGONALITY
 from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed, Further
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Without
-from rig.report.kinds.triad import angles, followed_of, item_words, shown_of, tables, unsolved_lines
+from rig.report.kinds.triad import followed_of, item_words, shown_of, tables, unsolved_lines
 from rig.report.kinds.unexplained import of_sweeps_and_rests
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
@@ -69,7 +66,7 @@ def _printed(finding: Finding[SensorEntry]) -> Iterator[Table | str]:
     sensor, reference = finding.entry, " (known)" if finding.known else ""
     title = f"{finding.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
     yield from tables(title, RATE, sensor)
-    yield from _beside(sensor)
+    yield from _beside(finding)
 
 
 def _shown(finding: Finding[SensorEntry]) -> Shown:
@@ -78,44 +75,13 @@ def _shown(finding: Finding[SensorEntry]) -> Shown:
     return replace(shown_of(finding), held_at=held_at, model=finding.entry.model)
 
 
-def _followed(finding: Finding[SensorEntry], document: ResultDocument) -> Followed:
-    return followed_of(finding, document, _further(finding.entry))
-
-
-def _further(sensor: SensorEntry) -> Iterator[Further]:
-    """What the vector model found beside scale and bias: the axes, and what an acceleration adds.
-
-    A history keeps what the accelerations of gravity add, which point down; certificates say it of specific forces.
-    """
-    vector = sensor.vector_model
-    if isinstance(vector, ErrorEntry):
-        return
-    yield angles(vector)
-    if vector.g_sensitivity_rad_s_per_m_s2 is None or vector.g_sensitivity_std_rad_s_per_m_s2 is None:
-        return
-    yield Further(
-        "g-sensitivity",
-        [axis + along for axis in AXES for along in AXES],
-        [-each for row in vector.g_sensitivity_rad_s_per_m_s2 for each in row],
-        [each for row in vector.g_sensitivity_std_rad_s_per_m_s2 for each in row],
-        flat(vector.g_sensitivity_freedom),
-        dcc_results.PER_ACCELERATION,
-        said="What a specific force along the flange's axis (second letter) adds to the reading of an axis (first "
-        "letter).",
-        prefix="g",
-        followed_in="rad/s per m/s²",
-        opposite=True,
-    )
-
-
 def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     """The item's results; nothing of a reference."""
     sensor = finding.entry
     if finding.known:
         return None
     name = f"calibration of gyroscope {finding.sensor}"
-    results = chain(dcc_results.gyroscope(sensor), dcc_results.beside(_further(sensor)))
-    warm = temperatures_c(sensor)
+    results, warm = dcc_results.gyroscope(sensor), temperatures_c(sensor)
     return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
@@ -152,8 +118,9 @@ def temperatures_c(sensor: SensorEntry) -> dict[str, float | None]:
     return warmth(sensor.scale_at, " at the scale factors") | warmth(sensor.bias_at, " at the biases")
 
 
-def _beside(sensor: SensorEntry) -> Iterator[str]:
+def _beside(finding: Finding[SensorEntry]) -> Iterator[str]:
     """What stands beside a gyroscope's values: speeds, the other estimators, what the vector model says of the axes."""
+    sensor = finding.entry
     yield from _speeds(sensor)
     if sensor.scale_at is not None and sensor.bias_at is not None:
         yield f"scale: {when_words(sensor.scale_at)}"
@@ -181,8 +148,7 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
             covariance = np.array(vector.matrix_covariance)[:9, :9]
             yield from matrix_lines(np.array(vector.matrix), covariance, max(sensor.budget.factors[:3]))
         else:
-            skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
-            yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
+            yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.3f")
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 
@@ -287,7 +253,7 @@ GYROSCOPE = ResultKind(
     found=_found,
     printed=_printed,
     shown=_shown,
-    followed=_followed,
+    followed=followed_of,
     header=gyroscope_lines,
     unsolved=lambda document: unsolved_lines(document, RATE),
     figures=Without("its residuals are on the certificate and in the notebook"),
@@ -295,5 +261,6 @@ GYROSCOPE = ResultKind(
     measured=_measured,
     corrected=_corrected,
     unexplained=of_sweeps_and_rests,
+    characteristics=GYROSCOPES,
     standard=Without("its standards are time and angle, of which every certificate speaks"),
 )

@@ -14,6 +14,7 @@ from rig.data.magnetometer_entries import ReversalEntry
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.report.kinds.characteristic import Characteristic, Term
 from rig.report.kinds.corrected import Corrected
 from rig.report.kinds.finding import EntryT, Finding
 from rig.report.kinds.followed import Followed
@@ -32,7 +33,7 @@ class Without:
 
 @dataclass(frozen=True, slots=True)
 class Three:
-    """Values x, y, z, of fewer axes fewer, and their expanded uncertainties."""
+    """Values x, y, z, of fewer axes fewer, or by other labels, and their expanded uncertainties."""
 
     values: Sequence[float]
     expanded: Sequence[float]
@@ -44,7 +45,8 @@ class Shown:
 
     They are of a `sensor` and what it measures. `combined` tells whether U holds all that is known, else it is two
     standard deviations of noise. `held_at` says at what the numbers hold ("at ±60.0 °/s") and `model` what they are of
-    ("g = K (m + b)"), where a run's end says that; `noun` is what numbers without scale factors are.
+    ("g = K (m + b)"), where a run's end says that; `noun` is what numbers without scale factors are, and `labels` are
+    those of the numbers.
     """
 
     sensor: str
@@ -57,6 +59,7 @@ class Shown:
     held_at: str = ""
     model: str = ""
     noun: str = "bias"
+    labels: Sequence[str] = "xyz"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,8 @@ class ResultKind(Generic[EntryT]):
       `templates`.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor; `standard`
       what both certificates say of traceability.
+    - `characteristics` are what entries state beside scale and bias: terminal, page, notebook, both certificates,
+      history and exports go through them after what the kind itself says.
     - `corrected` is how exports to other programs put the readings of one right; None of a reference. `unexplained` is
       what the model leaves of its means, for pictures; None of one that has none.
     """
@@ -128,6 +133,15 @@ class ResultKind(Generic[EntryT]):
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
     in_short: Callable[[Finding[EntryT]], Iterable[str]] = lambda _: ()
+    characteristics: tuple[Characteristic, ...] = ()
+
+
+def row_of(term: Term, whose: str | None = None, noun: str | None = None) -> Shown:
+    """The row of a characteristic, under the name of its sensor and its own unless others are given."""
+    finding, whose, noun = term.finding, whose or term.whose, noun or term.name
+    labels, values, widths = zip(*term.printed, strict=True)
+    of = finding.sensor, finding.quantity, f"{whose}: {noun}", term.units.shown, Three(values, widths)
+    return Shown(*of, combined=True, noun=noun, labels=labels)
 
 
 def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:

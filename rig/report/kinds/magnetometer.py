@@ -19,9 +19,10 @@ from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
-from rig.report.kinds.followed import Further
+from rig.report.kinds.characteristics import MAGNETOMETERS
+from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard
-from rig.report.kinds.triad import Words, angles, attitude_lines, method_lines, triad_kind
+from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.triad_entry import OF_MAGNETOMETERS, attitudes_entry
 from rig.report.validity_words import when_words
@@ -53,8 +54,9 @@ def _entry(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> M
     )  # fmt: skip
 
 
-def _lines(entry: MagnetometerEntry) -> Iterator[str]:
+def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
     """What stands below the table."""
+    entry = finding.entry
     field_ut = entry.field_t / FIELD.bias.size
     yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; no limit judges it"
     if entry.found_at is not None:
@@ -68,7 +70,7 @@ def _lines(entry: MagnetometerEntry) -> Iterator[str]:
         yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
         yield from _tests(entry)
     yield f"field in the {base}: {triple(np.divide(entry.field_base_t, FIELD.bias.size), '+.3f')} µT"
-    yield from attitude_lines(entry, FIELD)
+    yield from attitude_lines(finding)
     yield from method_lines(entry, FIELD)
     yield from (f"warning: {warning}" for warning in entry.warnings)
 
@@ -88,15 +90,11 @@ def _tests(entry: MagnetometerEntry) -> Iterator[str]:
         yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
 
 
-def _further(entry: MagnetometerEntry) -> Iterator[Further]:
-    yield angles(entry)
-
-
 MAGNETOMETER = triad_kind(
     FIELD,
     "magnetometers",
     _entries,
-    Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}, _further),
+    Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}),
     header=magnetometer_lines,
     block="at_rest.html.j2:magnetometer",
     standard=Standard(
@@ -106,4 +104,5 @@ MAGNETOMETER = triad_kind(
         known="a field of stated size",
         method=lambda _: "Magnetometers are held in known attitudes to a field of stated size.",
     ),
+    characteristics=MAGNETOMETERS,
 )

@@ -1,29 +1,25 @@
 """Scale and bias as polynomials of temperature."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.data.installed_kinds import quantities
 from rig.data.motion_file import Item
-from rig.data.quantity import Unit
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.data.temperature_entries import OverTemperatureEntry
-from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.certificate import dcc_results
+from rig.report.kinds.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import SCALE_SLOPES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Three, Without
+from rig.report.kinds.followed import Followed
+from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
 from rig.report.rounding import plus_minus
 from rig.report.temperature_c_functions import temperature_lines
 from rig.report.temperature_entry import temperature_entry
 from rig.report.temperature_words import about_lines, shown_rows
 from rig.station.plain_text import plain
-
-SCALE_SLOPE, BIAS_SLOPE = slice(3, 6), slice(15, 18)  # of the covariance
 
 
 def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, OverTemperatureEntry]]:
@@ -63,32 +59,14 @@ def _printed(finding: Finding[OverTemperatureEntry]) -> Iterator[Table | str]:
 
 
 def _shown(finding: Finding[OverTemperatureEntry]) -> Shown:
-    """The slopes at the reference."""
-    entry, unit = finding.entry, finding.quantity.drift
-    _, bias = _slopes(entry)
-    noun = f"change per kelvin at {entry.reference_c:g} °C"
-    name = f"{finding.quantity.beside(finding.sensor)}: {noun}"
-    three, per_kelvin = Three(*([each / unit.size for each in values] for values in bias)), f"{unit.name}/K"
-    return Shown(finding.sensor, finding.quantity, name, Unit(per_kelvin, unit.size), three, combined=True, noun=noun)
-
-
-def _slopes(entry: OverTemperatureEntry) -> tuple[tuple[Sequence[float], Sequence[float]], ...]:
-    """Slopes of scale and of bias, with their U."""
-    stds = np.sqrt(np.diag(np.array(entry.covariance)).clip(min=0.0))
-    return tuple(
-        (cubic[1], (COVERAGE_FACTOR * stds[part]).tolist())
-        for cubic, part in ((entry.scale, SCALE_SLOPE), (entry.bias, BIAS_SLOPE))
-    )
+    """The slopes of the bias at the reference."""
+    noun = f"change per kelvin at {finding.entry.reference_c:g} °C"
+    return row_of(BIAS_SLOPE_AT_REFERENCE.of(finding), finding.quantity.beside(finding.sensor), noun)
 
 
 def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Followed | None:
     """The slopes at the reference; scale and bias there are those of the sensor's calibration."""
     entry = finding.entry
-    scale, bias = ((values, [each / COVERAGE_FACTOR for each in expanded]) for values, expanded in _slopes(entry))
-    rows = [
-        *parameters(SLOPES, *bias, None, f"{entry.unit}/K"),
-        *parameters(SCALE_SLOPES, *scale, None, "1/K"),
-    ]
     return Followed(
         finding.sensor,
         f"{finding.quantity} over temperature",
@@ -97,7 +75,6 @@ def _followed(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> Foll
         entry.full_scale or 0.0,
         "polynomials",
         entry.reference_c,
-        known(rows),
     )
 
 
@@ -122,4 +99,5 @@ OVER_TEMPERATURE = ResultKind(
     standard=Without("it hangs on that of the sensor whose curve it is"),
     corrected=Without("exports that know polynomials take its entries as they are"),
     unexplained=Without("its curves are drawn instead, with their points"),
+    characteristics=POLYNOMIALS,
 )

@@ -1,6 +1,7 @@
 """Every kind of result, in the order in which they are shown: a new one is a file and a line here."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any, Final, TypeVar
 
@@ -8,18 +9,19 @@ from rig.data.installed_kinds import installed_kinds
 from rig.data.result_file import ResultDocument
 from rig.report.kinds.accelerometer import ACCELEROMETER
 from rig.report.kinds.bias_drift import BIAS_DRIFT
-from rig.report.kinds.earth_rate import EARTH_RATE
+from rig.report.kinds.characteristic import Outlet, Term, terms
+from rig.report.kinds.earth_rate import EARTHS_RATE
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed
+from rig.report.kinds.followed import Followed, known, parameters
 from rig.report.kinds.gyroscope import GYROSCOPE
-from rig.report.kinds.kind import ResultKind, Shown, Without
+from rig.report.kinds.kind import ResultKind, Shown, Without, row_of
 from rig.report.kinds.magnetometer import MAGNETOMETER
 from rig.report.kinds.over_temperature import OVER_TEMPERATURE
 from rig.report.kinds.verification import VERIFICATION
 
 OutletT = TypeVar("OutletT")
 OF_THE_RIG: Final[tuple[ResultKind[Any], ...]] = (
-    GYROSCOPE, EARTH_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, OVER_TEMPERATURE, VERIFICATION,
+    GYROSCOPE, EARTHS_RATE, ACCELEROMETER, MAGNETOMETER, BIAS_DRIFT, OVER_TEMPERATURE, VERIFICATION,
 )  # fmt: skip
 
 
@@ -38,12 +40,26 @@ def outlets(
             yield from ((kind, outlet, finding) for finding in kind.found(document))
 
 
+def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
+    """Every characteristic in a result, kind by kind; those that an outlet takes where one is named."""
+    for kind in kinds():
+        for finding in kind.found(document):
+            yield from terms(kind.characteristics, finding, outlet)
+
+
 def shown(document: ResultDocument) -> Iterator[Shown]:
-    """The rows of page and notebook: of every sensor what was found, kind by kind."""
-    return (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
+    """The rows of page and notebook: of every sensor what was found, kind by kind, then what stands beside."""
+    yield from (show(finding) for _, show, finding in outlets(document, lambda kind: kind.shown))
+    yield from map(row_of, terms_of(document, "page"))
 
 
 def followed(document: ResultDocument) -> tuple[Followed, ...]:
     """All that a result says of sensors for a history to keep, references too."""
-    asked = outlets(document, lambda kind: kind.followed)
-    return tuple(each for _, follow, finding in asked if (each := follow(finding, document)) is not None)
+    return tuple(_followed(document))
+
+
+def _followed(document: ResultDocument) -> Iterator[Followed]:
+    for kind, follow, finding in outlets(document, lambda kind: kind.followed):
+        if (each := follow(finding, document)) is not None:
+            more = known([*parameters(terms(kind.characteristics, finding, "history"))])
+            yield replace(each, parameters=(*each.parameters, *more))

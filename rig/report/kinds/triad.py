@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -17,13 +16,13 @@ from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.report.axes import scale_and_bias_table, skew_known, triple
+from rig.report.axes import line_of, scale_and_bias_table, triple
 from rig.report.budget_table import budget_table, expanded_heading
-from rig.report.certificate import dcc_results
-from rig.report.certificate.tables import ANGLES
+from rig.report.kinds.characteristic import Characteristic
+from rig.report.kinds.characteristics import NON_ORTHOGONALITY
 from rig.report.kinds.corrected import Corrected, noise_of
 from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Calibrated, Followed, Further, followed_beside, known, scale_and_bias
+from rig.report.kinds.followed import Calibrated, Followed, known, scale_and_bias
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Three
 from rig.report.kinds.unexplained import of_attitudes
 
@@ -32,16 +31,14 @@ from rig.report.kinds.unexplained import of_attitudes
 class Words:
     """What is said of one such sensor, by its entry: behind its name, its model, lines below its table.
 
-    Of the digital certificate its scale and bias, with what turning it over has told, and how warm it was; `further`
-    is what was found beside.
+    Of the digital certificate its scale and bias, with what turning it over has told, and how warm it was.
     """
 
     title: str
     model: Callable[[Any], str]
-    lines: Callable[[Any], Iterator[str]]
+    lines: Callable[[Finding[Any]], Iterator[str]]
     digital: Callable[[Any, ReversalEntry | None], Iterator[Element]]
     temperatures_c: Callable[[Any], Mapping[str, float | None]]
-    further: Callable[[Any], Iterator[Further]]
 
 
 def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
@@ -57,23 +54,14 @@ def shown_of(finding: Finding[Any]) -> Shown:
     axes = len(entry.scale)
     bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
     scale, combined = Three(entry.scale, expanded[:axes]), entry.budget is not None
-    return Shown(finding.sensor, quantity, quantity.of(finding.sensor), quantity.bias, bias, combined, scale)
+    name, unit = quantity.of(finding.sensor), quantity.bias
+    return Shown(finding.sensor, quantity, name, unit, bias, combined, scale, labels=quantity.axes)
 
 
-def angles(entry: Any) -> Further:
-    """How far the axes are from right angles."""
-    of = entry.non_orthogonality_rad, entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom
-    name = "angles between the axes less a right one"
-    return Further(name, ANGLES, *of, dcc_results.ANGLE, prefix="nonorth_", followed_in="rad")
-
-
-def followed_of(finding: Finding[Any], document: ResultDocument, further: Iterable[Further]) -> Followed:
-    """Scale, bias and what was found beside as a history keeps them."""
+def followed_of(finding: Finding[Any], document: ResultDocument) -> Followed:
+    """Scale and bias as a history keeps them."""
     quantity, entry = finding.quantity, finding.entry
-    followed = [
-        *scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document),
-        *followed_beside(further),
-    ]
+    followed = [*scale_and_bias(finding.sensor, quantity, entry, bias_of(quantity, entry), document)]
     full_scale: float = getattr(entry, quantity.named("range")) or 0.0
     temperature_c: float | None = getattr(entry, "temperature_c", None)
     of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
@@ -96,13 +84,13 @@ def item_words(entry: Any) -> str:
     return " ".join(told) or "part and serial number not stated"
 
 
-def attitude_lines(entry: Any, quantity: Quantity) -> Iterator[str]:
+def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
     """How far the axes are from right angles, and the attitudes from what they were taken to be.
 
     And, where a file told the attitudes, what laying down did and what was left out.
     """
-    skew = triple(np.degrees(entry.non_orthogonality_rad), "+.4f")
-    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(entry)})"
+    entry, quantity = finding.entry, finding.quantity
+    yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.4f")
     if entry.attitude_error_rad is not None:
         known = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
         yield f"attitude error found: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{known}"
@@ -164,6 +152,7 @@ def triad_kind(
     header: Callable[[Finding[Any], Mapping[str, Array]], Iterable[str]],
     block: str,
     standard: Standard,
+    characteristics: tuple[Characteristic, ...],
 ) -> ResultKind[Any]:
     """The kind of a sensor that attitudes calibrate, whose entries stand at `key`; its `words` are its own."""
 
@@ -182,14 +171,11 @@ def triad_kind(
         entry = finding.entry
         title = f"{quantity.of(finding.sensor)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
-        yield from words.lines(entry)
-
-    def followed(finding: Finding[Any], document: ResultDocument) -> Followed:
-        return followed_of(finding, document, words.further(finding.entry))
+        yield from words.lines(finding)
 
     def measured(finding: Finding[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
         entry, name = finding.entry, f"calibration of {quantity.sensor} {finding.sensor}"
-        results = chain(words.digital(entry, turned.get(finding.sensor)), dcc_results.beside(words.further(entry)))
+        results = words.digital(entry, turned.get(finding.sensor))
         warm = words.temperatures_c(entry)
         return Measured(quantity.sensor, finding.sensor, entry.part, entry.serial_number, name, results, warm)
 
@@ -201,7 +187,7 @@ def triad_kind(
         unsolved=unsolved,
         printed=printed,
         shown=shown_of,
-        followed=followed,
+        followed=followed_of,
         header=header,
         figures="rig.report.attitude_figures:write_attitude_figures",
         block=block,
@@ -209,4 +195,5 @@ def triad_kind(
         standard=standard,
         corrected=_corrected,
         unexplained=of_attitudes,
+        characteristics=characteristics,
     )
