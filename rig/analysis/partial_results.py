@@ -4,13 +4,13 @@ Whoever looks on is told this. The result comes from `rig.analysis.outcome` when
 otherwise: of uncertainty there is the noise alone here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rig.analysis.calibration import solve_vector
-from rig.data.quantity import ACCELERATION, RATE
+from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -18,69 +18,117 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.arm_motion import motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
+from rig.observation.field import field_mean
 from rig.observation.known_motion import Motion
+from rig.observation.mean import Mean, ReadAtRest
 from rig.observation.observe import Observation, each_sweep, observe_sensor
+from rig.observation.observed_run import one_clock, times_s
+from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)
-class SoFar:
-    """What a sensor's run tells yet: each finished sweep's observation or the Fault it ends in, by the sweep's index.
+class Turned:
+    """What a run tells of a gyroscope yet: each finished sweep's observation or the Fault it ends in, by its index.
 
-    `dwells` are the same of what its accelerometer read in each finished dwell; `gravity_m_s2` is the site's, None in
-    recordings of before there was one. The `solution` is the vector model's, or the Fault that says what is missing
-    yet. `bias_rad_s` (3,) is that of the rests alone, with its standard deviation, None without rests.
+    The `solution` is the vector model's, or the Fault that says what is missing yet. `bias_rad_s` (3,) is that of the
+    rests alone, with its standard deviation, None without rests.
     """
 
     sweeps: Mapping[int, Observation | Fault]
-    dwells: Mapping[int, DwellReading | Fault]
-    gravity_m_s2: float | None
     solution: VectorSolution | Fault
     bias_rad_s: tuple[Array, Array] | None
 
 
-Seen = tuple[dict[int, Observation | Fault], dict[int, DwellReading | Fault], Sequence[Average]]  # and the rests
+@dataclass(frozen=True, slots=True)
+class SoFar:
+    """What a run tells yet: of each gyroscope, and what others read in each finished dwell."""
+
+    gyroscopes: Mapping[str, Turned]
+    at_rest: Sequence[ReadAtRest]
 
 
-def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
-    """What recordings of raw readings hold, by sensor; a sweep or dwell that several hold counts in the last one."""
-    if not runs:
-        return {}
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What one recording holds of a gyroscope, and of the accelerometer in it; no `clock` where none is found."""
+
+    clock: TimeBase | None
+    sweeps: Mapping[int, Observation | Fault]
+    dwells: Mapping[int, DwellReading | Fault]
+    rests: Sequence[Average]
+
+
+def so_far(runs: Sequence[RunData]) -> SoFar:
+    """What recordings of raw readings hold; a sweep or dwell that several hold counts in the last one."""
     sweeps: dict[str, dict[int, Observation | Fault]] = {}
     rests: dict[str, list[Average]] = {}
-    dwells: dict[str, dict[int, DwellReading | Fault]] = {}
+    at_rest: dict[tuple[str, str, int], ReadAtRest] = {}
     for run in runs:
         try:
             motion = motion_of(run)
         except Fault:
             continue  # nothing has moved yet
-        for name in run.measuring(RATE):
-            turned, dwelt, rested = _seen(run, name, motion)
-            sweeps.setdefault(name, {}).update(turned)
-            dwells.setdefault(name, {}).update(dwelt)
-            rests.setdefault(name, []).extend(rested)
-    site = runs[-1].settings.site
-    return {
-        name: SoFar(
-            dict(sorted(found.items())),
-            dict(sorted(dwells[name].items())),
-            None if site is None else site.gravity_m_s2,
-            _solution(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
-            _bias(rests[name]),
-        )
-        for name, found in sweeps.items()
-    }
+        seen = {name: _seen(run, name, motion) for name in run.measuring(RATE)}
+        for name, each in seen.items():
+            sweeps.setdefault(name, {}).update(each.sweeps)
+            rests.setdefault(name, []).extend(each.rests)
+        for read in (*_accelerations(run, seen), *_fields(run, seen)):
+            at_rest[read.sensor, read.quantity.name, read.index] = read
+    return SoFar(
+        {
+            name: Turned(
+                dict(sorted(found.items())),
+                _solution(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
+                _bias(rests[name]),
+            )
+            for name, found in sweeps.items()
+        },
+        sorted(at_rest.values(), key=lambda read: (read.sensor, read.index)),
+    )
 
 
-def _seen(run: RunData, name: str, motion: Motion) -> Seen:
+def _seen(run: RunData, name: str, motion: Motion) -> _Seen:
     sensor = run.sensors[name]
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
     except Fault as fault:  # of the sensor as a whole: its clock is not found
         dwelt = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
-        return dict.fromkeys(finished_sweeps(run), fault), dict.fromkeys(dwelt, fault), ()
+        return _Seen(None, dict.fromkeys(finished_sweeps(run), fault), dict.fromkeys(dwelt, fault), ())
     turned, rests = _observed(run, name, stream, motion)
-    return turned, each_dwell(run, stream, motion, run.settings.observation), rests
+    return _Seen(stream.clock, turned, each_dwell(run, stream, motion, run.settings.observation), rests)
+
+
+def _accelerations(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
+    site = run.settings.site
+    gravity_m_s2 = None if site is None else site.gravity_m_s2
+    for name, each in seen.items():
+        for index, dwell in each.dwells.items():
+            words, reading = ("", dwell) if isinstance(dwell, Fault) else (dwell.name, dwell.reading)
+            yield ReadAtRest(name, ACCELERATION, index, words, reading, gravity_m_s2)
+
+
+def _fields(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
+    """What magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
+    site = run.settings.site
+    expected_t = None if site is None else site.magnetic_field_t
+    for name in run.measuring(FIELD):
+        other = next((each for each in seen if seen[each].dwells and one_clock(run, name, each)), None)
+        if other is None:
+            continue
+        clock = seen[other].clock
+        time_s = np.empty(0) if clock is None else times_s(run, name, {other: clock}, other)
+        for index, dwell in seen[other].dwells.items():
+            words = "" if isinstance(dwell, Fault) else dwell.name
+            yield ReadAtRest(name, FIELD, index, words, _field(run, name, time_s, dwell), expected_t)
+
+
+def _field(run: RunData, name: str, time_s: Array, dwell: DwellReading | Fault) -> Mean | Fault:
+    if isinstance(dwell, Fault):
+        return dwell
+    try:
+        return field_mean(run, name, time_s, dwell, run.settings.observation)
+    except Fault as fault:
+        return fault
 
 
 def _observed(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rig.data.channel import Channel
 from rig.data.quantity import FIELD
+from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -39,17 +40,26 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
     other = beside(recording, name)
     if other is None:
         return ()
-    channel, inside = recording.run.sensors[name].channel(FIELD), partial(_inside, recording, name, other)
+    time_s = recording.time_s(name, other)
     return tuple(
         Held(
             dwell.index,
             dwell.name,
-            _mean(channel, inside(dwell.window), f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds),
+            field_mean(recording.run, name, time_s, dwell, thresholds),
             dwell.attitude,
             dwell.window,
         )
         for dwell in recording.sensors[other].dwells
     )
+
+
+def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:
+    """The mean reading of a magnetometer in a dwell, tesla; `time_s` (n,) are its samples' times on the arm's clock.
+
+    Raises Fault `lost_samples`, `saturation`.
+    """
+    inside = _inside(run.samples[name], time_s, dwell.window)
+    return _mean(run.sensors[name].channel(FIELD), inside, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
 
 
 def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
@@ -72,7 +82,10 @@ def field_tests(
     other = beside(recording, name)
     if other is None:
         return ()
-    channel, inside = recording.run.sensors[name].channel(FIELD), partial(_inside, recording, name, other)
+    channel, inside = (
+        recording.run.sensors[name].channel(FIELD),
+        partial(_inside, recording.run.samples[name], recording.time_s(name, other)),
+    )
     windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
     return tuple(
         _mean(channel, inside(window), f"a field test of {name}", thresholds)
@@ -99,8 +112,7 @@ def _mean(channel: Channel, inside: NDArray[Any], where: str, thresholds: Observ
     return even_mean(channel.values(inside), channel.resolution)
 
 
-def _inside(recording: ObservedRun, name: str, other: str, window: Window) -> NDArray[Any]:
-    """The samples (n,) of `name` in a window of the arm's clock, by the sensor `other` that is stamped with it."""
-    ends = np.searchsorted(recording.time_s(name, other), [window.start_s, window.end_s])
-    inside: NDArray[Any] = recording.run.samples[name][slice(*ends.tolist())]
+def _inside(samples: NDArray[Any], time_s: Array, window: Window) -> NDArray[Any]:
+    """The samples (n,) in a window of the arm's clock, by their times (n,) on it."""
+    inside: NDArray[Any] = samples[slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())]
     return inside

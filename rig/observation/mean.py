@@ -7,6 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import Quantity
+from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import Left, left_of
 from rig.observation.tapered_weights import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
@@ -41,6 +43,21 @@ class Held:
     reading: Mean
     attitude: Array
     window: Window
+
+
+@dataclass(frozen=True, slots=True)
+class ReadAtRest:
+    """What was read of a `quantity` in one dwell, by its `index` and name, or the Fault for which there is no mean.
+
+    `expected` is the size that it is known to have there, in SI units, None where that was not said.
+    """
+
+    sensor: str
+    quantity: Quantity
+    index: int
+    dwell: str
+    reading: Mean | Fault
+    expected: float | None
 
 
 def by_axis(freedom: Iterable[Array | float]) -> Array:

@@ -296,7 +296,7 @@ def _values(sensors: tuple[SensorSamples, ...]) -> dict[str, tuple[float, ...]]:
 def _row(made: ObservationMade | AttitudeRead) -> dict[str, Any]:
     if isinstance(made, ObservationMade):
         return observation_row(made.sensor, made.observation)
-    return dwell_row(made.sensor, made.reading, made.gravity_m_s2)
+    return dwell_row(made.read)
 
 
 def _turn(sweep: Sweep) -> dict[str, Any]:

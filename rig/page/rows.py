@@ -1,19 +1,19 @@
 """Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rig.analysis.partial_results import SoFar
-from rig.data.quantity import ACCELERATION, RATE, Unit
+from rig.analysis.partial_results import SoFar, Turned
+from rig.data.quantity import RATE, Unit
 from rig.data.result_file import ResultDocument
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
-from rig.observation.acceleration import DwellReading
+from rig.observation.mean import ReadAtRest
 from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
 from rig.report.kinds.kind import Shown, Three
@@ -57,30 +57,31 @@ def along(axis_flange: Sequence[float] | Array) -> float:
     return float(np.max(np.abs(axis_flange)))
 
 
-def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> Row:
-    """What an accelerometer read in an attitude: the size of it stands beside gravity."""
-    mean, size = dwell.reading.mean, float(np.linalg.norm(dwell.reading.mean))
+def dwell_row(read: ReadAtRest) -> Row:
+    """What was read in an attitude: the size of it stands beside the one that is expected, in the unit on a screen."""
+    quantity, reading = read.quantity, read.reading
+    row: Row = {"sensor": quantity.of(read.sensor), "sweep": read.index, "by": "host", "dwell": read.dwell}
+    if isinstance(reading, Fault):
+        return {**row, "refused": str(reading)}
+    mean, size, unit = reading.mean, float(np.linalg.norm(reading.mean)), quantity.reading
     axis, sign = nearest_axis(mean)
     return {
-        "sensor": ACCELERATION.of(sensor),
-        "sweep": dwell.index,
-        "by": "host",
-        "dwell": dwell.name,
-        "axis": axis,
-        "sign": sign,
-        "size_m_s2": size,
-        "std_m_s2": float(np.sqrt(mean**2 @ dwell.reading.variance)) / size if size else None,
-        "gravity_m_s2": gravity_m_s2,
-        "samples": dwell.reading.samples,
+        **row,
+        "towards": f"{'+' if sign > 0 else '−'}{axis} {quantity.towards}",
+        "size": size / unit.size,
+        "std": float(np.sqrt(mean**2 @ reading.variance)) / size / unit.size if size else None,
+        "expected": None if read.expected is None else read.expected / unit.size,
+        "unit": unit.name,
+        "samples": reading.samples,
         "refused": None,
     }
 
 
-def look_of(sensors: Mapping[str, SoFar]) -> Look:
+def look_of(partial: SoFar) -> Look:
     """What is known of a run that goes on."""
+    sensors = partial.gyroscopes
     observations = [_sweep(name, sweep, each) for name, one in sensors.items() for sweep, each in one.sweeps.items()]
-    for name, one in sensors.items():
-        observations += [_dwell(name, index, each, one.gravity_m_s2) for index, each in one.dwells.items()]
+    observations += map(dwell_row, partial.at_rest)
     return Look(observations, [_parameters_so_far(name, one) for name, one in sensors.items()])
 
 
@@ -95,13 +96,7 @@ def _sweep(sensor: str, sweep: int, observation: Observation | Fault) -> Row:
     return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(observation)}
 
 
-def _dwell(sensor: str, index: int, reading: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
-    if isinstance(reading, DwellReading):
-        return dwell_row(sensor, reading, gravity_m_s2)
-    return {"sensor": ACCELERATION.of(sensor), "sweep": index, "by": "host", "dwell": "", "refused": str(reading)}
-
-
-def _parameters_so_far(name: str, partial: SoFar) -> Row:
+def _parameters_so_far(name: str, partial: Turned) -> Row:
     solution = partial.solution
     if isinstance(solution, VectorSolution):
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()

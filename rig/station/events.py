@@ -13,7 +13,7 @@ from rig.data.events import Event
 from rig.errors import RigError
 from rig.motion.state import Report, State
 from rig.motion.steps import Plan, Step
-from rig.observation.acceleration import DwellReading
+from rig.observation.mean import ReadAtRest
 from rig.observation.observe import Observation
 
 
@@ -203,11 +203,9 @@ class ObservationMade:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRead:
-    """The host has averaged what the accelerometer in `sensor` read in a dwell: once a phase is judged, every one."""
+    """The host has averaged what a sensor read in a dwell: once a phase is judged, every one."""
 
-    sensor: str
-    reading: DwellReading
-    gravity_m_s2: float
+    read: ReadAtRest
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ def until(run: RunData, sweeps: int) -> RunData:
 @pytest.mark.slow
 def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     for sweeps in range(1, 7):
-        found = so_far([until(run, sweeps)])["gyro"]
+        found = so_far([until(run, sweeps)]).gyroscopes["gyro"]
         assert sorted(found.sweeps) == list(range(sweeps))
         assert all(isinstance(each, Observation) for each in found.sweeps.values())
         assert isinstance(found.solution, VectorSolution) == (sweeps >= 5)
@@ -49,12 +49,12 @@ def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     third = list(swept(run))[2].window
     times_s = on_the_arms_clock(samples, run.sensors["gyro"], motion_of(run)).time_s
     samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
-    found = so_far([replace(run, samples={"gyro": samples})])["gyro"]
+    found = so_far([replace(run, samples={"gyro": samples})]).gyroscopes["gyro"]
     refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]
     assert [fault.name for fault in refused] == ["saturation"] and len(found.sweeps) == 6
     assert isinstance(found.solution, VectorSolution)
 
 
 def test_nothing_is_told_of_a_recording_that_has_only_begun(run: RunData) -> None:
-    assert so_far([replace(run, states=run.states[:2], events=())]) == {}
-    assert so_far([replace(run, events=())])["gyro"].sweeps == {}
+    assert so_far([replace(run, states=run.states[:2], events=())]).gyroscopes == {}
+    assert so_far([replace(run, events=())]).gyroscopes["gyro"].sweeps == {}

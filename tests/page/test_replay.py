@@ -74,7 +74,7 @@ def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
 def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
     """Rounded twice, its last digit there would be another than at the terminal."""
     found = so_far([run])
-    solution = found["gyro"].solution
+    solution = found.gyroscopes["gyro"].solution
     (parameters,) = look_of(found).parameters
     assert isinstance(solution, VectorSolution)
     assert parameters["scale"] == solution.scale.tolist() and parameters["bias"] == solution.bias_rad_s.tolist()

@@ -15,14 +15,9 @@ import pytest
 import yaml
 
 from rig.analysis.analyses import calibrated
-from rig.analysis.partial_results import so_far
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
-from rig.page.about import About
-from rig.page.page_state import Shown
-from rig.page.rows import look_of
-from rig.runner.phases import observations_of
 from support.commands import configuration, rig, rig_here, wait_for_log
 from support.stated import solved_otherwise
 from support.worlds import merge
@@ -121,33 +116,6 @@ def test_a_worse_limit_fails_the_verdict(imu: Finished) -> None:
     judged = rig_here("solve", out, "--set", "limits.acceleration_verification_m_s2=1e-6", "--json")
     failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
     assert judged.returncode == 1 and failed == ["gyro.acceleration_verification"]
-
-
-@pytest.mark.thorough
-def test_the_page_shows_what_was_read_in_every_attitude(in_attitudes: Finished) -> None:
-    out, result, *_ = in_attitudes
-    run = read_run(out / "run.h5")
-    shown = Shown(About("", ""))
-    shown.look(look_of(so_far([run])))
-    as_they_came = shown.sections["observations"]
-    assert [(row["sensor"], row["sweep"]) for row in as_they_came] == [("gyro, accelerometer", n) for n in range(18)]
-    for row in as_they_came:
-        assert row["dwell"].startswith("dwell at ") and row["refused"] is None
-        assert row["gravity_m_s2"] == result["accelerometers"]["gyro"]["gravity_m_s2"]
-        assert abs(row["size_m_s2"] - row["gravity_m_s2"]) < 1.0 and 0 < row["std_m_s2"] < 0.01
-    for event in observations_of(calibrated([run])):
-        shown.take(event)
-    assert shown.sections["observations"] == as_they_came
-
-
-def test_a_dwell_that_is_refused_says_why_on_the_page(in_attitudes: Finished) -> None:
-    run = read_run(in_attitudes[0] / "run.h5")
-    samples = run.samples["gyro"].copy()
-    samples["acceleration_counts"][len(samples) // 2 :] = 32767
-    rows = look_of(so_far([replace(run, samples={"gyro": samples})])).observations
-    refused = [row["sweep"] for row in rows if row["refused"]]
-    assert 0 < len(refused) < len(rows) == 18 and refused == list(range(refused[0], 18))
-    assert rows[-1]["refused"].startswith("saturation: in dwell 17 ")
 
 
 def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:

@@ -41,11 +41,11 @@ SHAKEN = "arm_moved_in_dwell: in dwell 7 (dwell at 0 -90 0) a joint moved by 0.3
 UPRIGHT = {
     "sensor": "reference, accelerometer",
     "by": "host",
-    "axis": "z",
-    "sign": 1,
-    "size_m_s2": 9.8142,
-    "std_m_s2": 0.0004,
-    "gravity_m_s2": 9.80665,
+    "towards": "+z up",
+    "size": 9.8142,
+    "std": 0.0004,
+    "expected": 9.80665,
+    "unit": "m/s²",
     "samples": 1000,
     "refused": None,
 }

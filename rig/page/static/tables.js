@@ -76,15 +76,15 @@ export function observations(rows) {
   }));
 }
 
-/** What accelerometers read in attitudes: the size of it beside gravity, and the axis nearest to upwards. */
+/** What was read in attitudes: the size of it beside that of gravity or of the field, and the axis nearest to it. */
 function dwells(rows) {
   fill("dwells", rows.map((d, i) => {
     const kind = i && rows[i - 1].sweep !== d.sweep ? "new-sensor" : "";
-    if (d.refused) return spanning(row([d.sweep, [d.sensor, "words"], [`✗ refused: ${d.refused}`, "words bad"]], kind), 5);
+    if (d.refused) return spanning(row([d.sweep, [d.sensor, "words"], [`✗ refused: ${d.refused}`, "words bad"]], kind), 6);
     return row([
-      d.sweep, [d.sensor, "words"], [`${d.dwell}, ${d.sign > 0 ? "+" : "−"}${d.axis} up`, "words"],
-      fixed(d.size_m_s2, 4) + (d.std_m_s2 ? ` ± ${(2 * d.std_m_s2).toFixed(4)}` : ""), fixed(d.gravity_m_s2, 4),
-      fixed(d.gravity_m_s2 && d.size_m_s2 / d.gravity_m_s2, 5), count(d.samples),
+      d.sweep, [d.sensor, "words"], [`${d.dwell}, ${d.towards}`, "words"],
+      fixed(d.size, 4) + (d.std ? ` ± ${(2 * d.std).toFixed(4)}` : ""), fixed(d.expected, 4), d.unit,
+      fixed(d.expected && d.size / d.expected, 5), count(d.samples),
     ], kind);
   }));
 }
