@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from starlette.routing import Route
 
 ADDRESS, PORT = "127.0.0.1", 8137
-LAST_NEWS_S = 2.0  # for browsers to take what was shown last
-ENDING_S = 5.0
+LAST_NEWS_S = 4.0  # for browsers to take what was shown last
+ENDING_S = 8.0
 SHORTEST_TOKEN = 22  # characters of base64, 128 bits
 AT_ONCE = 8  # connections accepted between two looks at those that are there
 WAITING = 128  # … and as many may wait for that

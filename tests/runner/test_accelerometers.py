@@ -113,9 +113,9 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
 
 def test_a_worse_limit_fails_the_verdict(imu: Finished) -> None:
     out, *_ = imu
-    judged = rig_here("solve", out, "--set", "limits.acceleration_verification_m_s2=1e-6", "--json")
+    judged = rig_here("solve", out, "--set", "limits.acceleration_bias_m_s2=1e-6", "--json")
     failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
-    assert judged.returncode == 1 and failed == ["gyro.acceleration_verification"]
+    assert judged.returncode == 1 and failed == ["gyro.acceleration_bias"]
 
 
 def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
