@@ -254,7 +254,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite the file of a killed run, which only SWMR readers open, so that any HDF5 tool does. The content stays.
 
-    Call it only when nobody writes the file any more. Raises Refused as `read_run` does.
+    Call it only when nobody writes the file any more. Raises Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
