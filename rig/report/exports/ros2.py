@@ -1,5 +1,7 @@
 """A ROS 2 bag of `sensor_msgs/Imu`, a topic for each sensor, written without ROS."""
 
+import shutil
+import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -27,13 +29,24 @@ SAID = (
 
 
 def write_bag(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
-    """The folder `bag`, which must not be there. Raises Refused `report_folder`."""
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_typestore
-
+    """The folder `bag`, which must not be there: whole, or not at all. Raises Refused `report_folder`, OSError."""
     path = folder / BAG
     if path.exists():
         raise Refused("report_folder", f"{path} is there already", "Choose another with --out")
+    try:
+        _write(recordings, path)
+    except BaseException as error:
+        shutil.rmtree(path, ignore_errors=True)
+        if isinstance(error, sqlite3.Error):  # which the bag is written with
+            raise OSError(f"{error}: {path}") from error
+        raise
+    return [path]
+
+
+def _write(recordings: Sequence[ObservedRun], path: Path) -> None:
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_JAZZY)
     message = store.types["sensor_msgs/msg/Imu"].__msgtype__
     with Writer(path, version=FORMAT) as bag:
@@ -43,7 +56,6 @@ def write_bag(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
             for recording in recordings:
                 for stamp, imu in _messages(store.types, recording, name, plain):
                     bag.write(connection, stamp, store.serialize_cdr(imu, message))
-    return [path]
 
 
 def _messages(types: Mapping[str, Any], recording: ObservedRun, name: str, frame: str) -> Iterator[tuple[int, Any]]:
