@@ -12,7 +12,7 @@ from pathlib import Path
 from rig.batch.batch import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.config.written_file import opened_to_append
-from rig.data.checked import checked
+from rig.data.checked import checked, parsed
 from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
 from rig.errors import Refused
 
@@ -56,7 +56,11 @@ def opened(out: Path | None, parent: Path, entry: Begun) -> Journal:
             raise _not_gone_on_with(out, f"it was begun {begun}")
         return journal
     folder = empty_folder(out) if out is not None else folder_of_its_own(parent, "batch")
-    _append(folder / JOURNAL, entry)
+    try:
+        _append(folder / JOURNAL, entry)
+    except OSError as error:
+        (folder / JOURNAL).unlink(missing_ok=True)  # half an entry begins no batch, and would be in the way of one
+        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     return Journal(folder, state_of([entry]))
 
 
@@ -89,14 +93,18 @@ def _not_gone_on_with(folder: Path, why: str) -> Refused:
 
 def _entries(text: bytes) -> Iterator[Entry]:
     for line in text.splitlines():
-        said = json.loads(line)
+        said = parsed(line)
         kind = _KINDS[said.pop("entry")]
         yield checked(kind, said, "entry")
 
 
 def _append(path: Path, entry: Entry) -> None:
     line = json.dumps({"entry": _NAMES[type(entry)], **asdict(entry)}, ensure_ascii=False) + "\n"
-    with os.fdopen(opened_to_append(path), "ab") as file:
-        file.write(line.encode())
-        file.flush()
-        os.fsync(file.fileno())
+    try:
+        with os.fdopen(opened_to_append(path), "ab") as file:
+            file.write(line.encode())
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk does not say of which file
+        raise

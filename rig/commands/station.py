@@ -99,7 +99,7 @@ def _carried_out(options: Namespace, configured: "Configured", operator: "Asked"
                 text = f"{why} between two parts; the batch is kept in {folder}. Go on with: {same}"
                 present.event(Interrupted(text))
                 raise KeyboardInterrupt(text) from None
-    except Fault:
+    except (Fault, OSError):
         say(f"the batch is kept in {folder}; go on with: {same}", sys.stderr)
         raise
     batch = journal.batch

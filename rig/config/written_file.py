@@ -24,9 +24,11 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
         with open(part, "xb", opener=_alone) as file:
             yield file
         part.replace(path)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             part.unlink()
+        if isinstance(error, OSError) and error.filename is None:
+            error.filename = str(path)  # a full disk does not say of which file
         raise
 
 

@@ -59,12 +59,28 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 def parsed(content: str | bytes, most: int = MOST_RECORDED) -> Any:
     """The value of JSON that anybody may have written, its texts printable.
 
-    Raises ValueError for a number that cannot be measured and for over `most` values; RecursionError.
+    Raises ValueError for a number that cannot be measured, a key that stands twice, over `most` values; RecursionError.
     """
     content = content.encode() if isinstance(content, str) else content
     if sum(map(content.count, SEPARATORS)) > most:
         raise ValueError(f"it holds over {most} values")
-    return seen(json.loads(content, parse_float=_measured, parse_int=_measured, parse_constant=_measured))
+    found = json.loads(
+        content,
+        parse_float=_measured,
+        parse_int=_measured,
+        parse_constant=_measured,
+        object_pairs_hook=_each_once,
+    )
+    return seen(found)
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of a JSON file. Raises ValueError where a key stands twice, of which each reader takes another."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(f"the key {quote(next(key for key in keys if keys.count(key) > 1))} stands there twice")
+    return found
 
 
 def _measured(text: str) -> int | float:

@@ -69,6 +69,8 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 def reason(error: Exception) -> str:
     """Why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
+    if isinstance(error, OSError) and error.filename is not None:
+        error = OSError(error.strerror)  # whoever tells it names the file
     text = " ".join(str(error).split())
     if cut := re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", text):
         return f"it is cut short: {cut[1]} of its {cut[2]} bytes are there"

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.written_file import PART
+from rig.config.written_file import write_new
 from rig.data.checked import parsed, seen
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recorded_turner import RecordedTurner, turner_of
@@ -110,15 +110,21 @@ def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
-    """Write a whole run file beside its place and move it there, so that a kill leaves all or nothing.
+    """Write a whole run file beside its place and move it there, so that a kill or a full disk leaves all or nothing.
 
-    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it.
+    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it. Raises OSError.
+    """
+    write_new(path, _image(contents, "latest" if swmr else None))
+
+
+def _image(contents: Contents, libver: str | None) -> bytes:
+    """The bytes of a whole run file.
+
+    The library makes them in memory: where it cannot write, it tries again at the end and breaks down the process.
     """
     import h5py
 
-    whole = path.with_name(path.name + PART)
-    whole.unlink(missing_ok=True)
-    with h5py.File(whole, "x", libver="latest" if swmr else None) as file:  # not through a link that came to lie there
+    with h5py.File("in memory", "w", libver=libver, driver="core", backing_store=False) as file:
         file.attrs.update(schema=contents.schema, **contents.texts)
         _dataset(file, states_name(contents.schema), contents.states, CHUNK_ROWS)
         _dataset(file, "events", contents.events, CHUNK_BYTES)
@@ -126,7 +132,9 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
             _dataset(file, name, rows, CHUNK_ROWS)
         for name, rows in contents.samples.items():
             _dataset(file, f"samples/{name}", rows, CHUNK_ROWS).attrs.update(contents.described[name])
-    whole.replace(path)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+        return image
 
 
 def append(dataset: Any, rows: NDArray[Any]) -> None:

@@ -1,7 +1,7 @@
 """Readings that were recorded elsewhere, and how they were moved, as a file of whoever turned the sensor tells it."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
@@ -26,11 +26,16 @@ TIME = "time_s"
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The columns of a file: those `needed`, those of which there is `one_of`, groups of others that may be there."""
+    """The columns of a file: those `needed`, those of which there is `one_of`, groups of others that may be there.
+
+    `between` are numbers that some must be above, and others that they may reach, where there is `one_row`.
+    """
 
     needed: tuple[str, ...]
     one_of: tuple[str, ...] = ()
     optional: tuple[tuple[str, ...], ...] = ()
+    one_row: bool = False
+    between: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def check(self, columns: Columns) -> None:
         """Raises ValueError for columns, or numbers, that are no such file's."""
@@ -43,6 +48,11 @@ class Header:
         for name, column in columns.items():
             if not (np.abs(column) < LARGEST_NUMBER).all():
                 raise ValueError(f"a value of its {name} is not a number, or cannot have been measured")
+            if self.one_row and len(column) != 1:
+                raise ValueError(f"it has {len(column)} rows of {name}, not one")
+            above, most = self.between.get(name, (-LARGEST_NUMBER, LARGEST_NUMBER))
+            if not ((column > above) & (column <= most)).all():
+                raise ValueError(f"its {name} is not above {above:g} and {most:g} at most")
 
 
 def samples_header(needed: Collection[Quantity] = ()) -> Header:
@@ -64,9 +74,19 @@ MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
             (),
             (("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"), ("attitude_std_rad",)),
         ),
-        "turns": Header(
-            ("clock_ppm", "box_rad", "closure", "gravity_m_s2"), (), (("first_face",),)
-        ),  # one row, no file
+        "turns": Header(  # what is said in a command, no file
+            ("clock_ppm", "box_rad", "closure", "gravity_m_s2"),
+            (),
+            (("first_face",),),
+            one_row=True,
+            between={
+                "clock_ppm": (0, 1e5),
+                "box_rad": (0, 0.2),
+                "closure": (-1, 1),
+                "gravity_m_s2": (0, LARGEST_NUMBER),
+                "first_face": (-1, 5),
+            },
+        ),
     }
 )
 

@@ -21,6 +21,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.config.regular_file import UnfitFile, open_regular_file
 from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, checked, parsed
 from rig.data.events import Event, Recorded, from_lines, to_line
@@ -40,6 +41,7 @@ from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 from rig.motion.state import State
 
+RECORDING_MAX_BYTES = 1 << 40  # more than a disk full of days
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
 READ_TICK_S = 0.1
@@ -254,7 +256,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite the file of a killed run, which only SWMR readers open, so that any HDF5 tool does. The content stays.
 
-    Call it only when nobody writes the file any more. Raises Refused as `read_run` does.
+    Call it only when nobody writes the file any more. Raises Refused as `read_run` does; OSError.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
@@ -263,9 +265,7 @@ def make_plain(path: Path) -> None:
 
 def _contents(path: Path, timeout_s: float | None) -> Contents:
     """What the file holds, read by a process that can be ended: see `rig.data.extract`."""
-    if not path.is_file():
-        why = f"{path} is no regular file" if path.exists() else f"there is no file {path}"
-        raise Refused("no_run_file", why, "Give the path of a run.h5")
+    _refuse_unreadable(path)
     if timeout_s is None:
         timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
     # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
@@ -297,6 +297,19 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
     return contents
+
+
+def _refuse_unreadable(path: Path) -> None:
+    try:
+        with open_regular_file(path, RECORDING_MAX_BYTES):
+            return
+    except FileNotFoundError:
+        why = f"there is no file {path}"
+    except UnfitFile as error:
+        why = f"{path} cannot be read: {error}"
+    except OSError as error:
+        why = f"{path} cannot be read: {error.strerror}"
+    raise Refused("no_run_file", why, "Give the path of a run.h5 that you may read")
 
 
 def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:

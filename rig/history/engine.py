@@ -1,5 +1,7 @@
 """The database behind a history: SQLite in a file, or PostgreSQL."""
 
+import os
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +48,25 @@ def _of_file(file: Path, label: str) -> Engine:
             engine = _sqlite(beside)
             try:
                 _bring_up_to_date(engine, label)
+                with engine.connect() as connection:  # raises on a full disk, where closing would leave half a history
+                    connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
             finally:
                 engine.dispose()
-    return _sqlite(file)
+    return _sqlite(file) if os.access(file, os.W_OK) and os.access(file.parent, os.W_OK) else _only_read(file)
+
+
+def _only_read(file: Path) -> Engine:
+    """The engine of a file that this user may only read, in a folder in which nothing can be laid beside it.
+
+    Whoever writes it has a log beside it; without one it stays as it is while it is read, so that nothing is locked.
+    """
+    log = file.with_name(f"{file.name}-wal")
+    address = f"{file.absolute().as_uri()}?mode=ro{'' if log.exists() else '&immutable=1'}"
+
+    def connect() -> sqlite3.Connection:
+        return sqlite3.connect(address, uri=True, timeout=WAIT_S, check_same_thread=False)
+
+    return create_engine(URL.create("sqlite", database=str(file)), creator=connect)
 
 
 def _sqlite(file: Path) -> Engine:

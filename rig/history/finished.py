@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
+from rig.data.run_file import RECORDING_MAX_BYTES
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CHUNK_BYTES = 1 << 20
-RECORDING_MAX_BYTES = 1 << 40  # more than a disk full of days
 PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 
 

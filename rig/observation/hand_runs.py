@@ -136,7 +136,8 @@ def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted
         if ends_s is not None:
             refused.seams.append(ends_s + BETWEEN_S / 2)
         readings = readings_of(run.sensors[name], samples, shift_s)
-        check_readings(*readings[:2])
+        time_s, *measured = readings
+        check_readings(time_s, np.column_stack([each for each in measured if each is not None]))
         segmenter.feed(*readings)
         ends_s = shift_s + board_s[1]
         for recorded in run.events:

@@ -1,5 +1,6 @@
 """A run as it was recorded, and judged again by the procedure that judged it when it ended."""
 
+import os
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -62,7 +63,8 @@ def open_run(path: Path, script: Path | None = None, *, only: Container[str] | N
     )
     raw, repeated = (tuple(map(read_run, files)) for files in (raw_files, repeated_files[-1:]))
     if not raw and not repeated:
-        raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
+        why = "holds no run.h5" if os.access(path, os.R_OK | os.X_OK) else "cannot be read: Permission denied"
+        raise Refused("no_run", f"{path} {why}", "Give a run folder or a run file")
     return RecordedRun(path, raw, repeated, script=named)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from types import TracebackType
-from typing import Any, Self, TextIO
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +65,8 @@ class ReadingsFile:
         self._channels = [each for each in sensor.channels if each.quantity in told]
         columns = [column for each in self._channels for column in each.measures.columns]
         self._count = SensorCount(name, sensor)
-        self._file: TextIO = path.open("x", encoding="utf-8", newline="\n")
-        self._file.write(",".join(["time_s", *columns]) + "\n")
+        self._file = path.open("xb", buffering=0)
+        self._write(",".join(["time_s", *columns]) + "\n")
         self._format = ",".join(["%.6f", *["%.9g"] * len(columns)])
         self._began_s: float | None = None
         self.lasts_s = 0.0  # from the first reading to the last, by their clock
@@ -92,8 +92,18 @@ class ReadingsFile:
         self.lasts_s = float(time_s[-1]) - self._began_s
         self._count.add(samples)
         rows = np.column_stack([time_s, *(each.values(samples) for each in self._channels)])
-        np.savetxt(self._file, rows, self._format)
-        self._file.flush()
+        self._write("".join(f"{self._format % tuple(row)}\n" for row in rows))
+
+    def _write(self, lines: str) -> None:
+        """Whole lines, or none: half a number would pass for another one. Raises OSError with the file's name."""
+        whole_bytes = self._file.tell()
+        rest = memoryview(lines.encode())
+        try:
+            while rest:  # a disk that is nearly full takes a part of it
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._file.truncate(whole_bytes)
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
 
 
 def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, Recorded]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from rig.config.written_file import opened_to_append
+from rig.errors import Refused
 from rig.errors.quoting import printable_lines
 from rig.station.events import RunEvent
 from rig.station.words import line, reason
@@ -31,8 +32,15 @@ class Log:
 
 @contextmanager
 def log(path: Path) -> Iterator[Log]:
-    """The log at `path`, for the length of the `with` block; what is there already stays. Raises OSError."""
-    file = os.fdopen(opened_to_append(path), "a", encoding="utf-8")
+    """The log at `path`, for the length of the `with` block; what is there already stays.
+
+    Raises Refused `run_folder` where it cannot be written: then the recording beside it cannot either.
+    """
+    try:
+        file = os.fdopen(opened_to_append(path), "a", encoding="utf-8")
+    except OSError as error:
+        what = f"{path} cannot be written: {error.strerror or error}"
+        raise Refused("run_folder", what, "Make room there, or copy the folder to where you may write") from error
     try:
         yield Log(file)
     finally:

@@ -1,7 +1,8 @@
 """Writes a study's report: its table, its findings and its plot."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -30,13 +31,27 @@ def write(report: Report, folder: Path, name: str, table_format: Format) -> tupl
         folder / f"{name}.svg",
         folder / f"{name}.png",
     )
-    if table_format == "parquet":
-        _write_parquet(report.columns, paths[0])
-    else:
-        _write_csv(report.columns, paths[0])
-    _write_csv(_findings(report.findings), paths[1])
+    with _written(paths[0]):
+        if table_format == "parquet":
+            _write_parquet(report.columns, paths[0])
+        else:
+            _write_csv(report.columns, paths[0])
+    with _written(paths[1]):
+        _write_csv(_findings(report.findings), paths[1])
     _write_plots(report, paths[2:])
     return paths
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    """A file that is whole, or gone, after this block. Raises Refused `study_folder`."""
+    try:
+        yield
+    except OSError as error:
+        with suppress(OSError):
+            path.unlink()
+        what = f"{path} cannot be written: {error.strerror or error}"
+        raise Refused("study_folder", what, "Choose another with --out") from error
 
 
 def _findings(findings: Sequence[Finding]) -> Columns:
@@ -84,4 +99,5 @@ def _write_plots(report: Report, paths: Sequence[Path]) -> None:
         for path in paths:
             # Without the date the same study gives the same file.
             metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=80, metadata=metadata)
+            with _written(path):
+                figure.savefig(path, dpi=80, metadata=metadata)

@@ -2,9 +2,11 @@
 
 import csv
 import gc
+import json
 import os
 import pty
 import shlex
+import sys
 from argparse import ArgumentParser
 from dataclasses import replace
 from io import StringIO
@@ -30,6 +32,7 @@ from rig.plans.script_file import ScriptFile
 from rig.runner.phases import Run
 from rig.station.events import Prompt
 from rig.station.station import Stations, always_yes
+from support.full_disk import full_disk
 
 AT = "2026-11-25T08:00:00+00:00"
 BEGUN = Begun("A. Person", "W-17", AT)
@@ -127,6 +130,29 @@ def test_a_journal_of_somebody_elses_leads_nowhere_else(line: str, tmp_path: Pat
         file.write(f"{line}\n")
     with pytest.raises(Refused, match="no_batch"):
         resumed(tmp_path / "batch")
+
+
+def test_what_texts_of_somebody_elses_journal_hide_is_shown(tmp_path: Path) -> None:
+    hidden = "G\x1b[31m\nverdict: PASS"
+    (tmp_path / JOURNAL).write_text(
+        "".join(
+            json.dumps(each) + "\n"
+            for each in (
+                {"entry": "batch_begun", "operator": hidden, "work_order": "", "at_utc": AT},
+                {"entry": "part_begun", "serial": hidden, "folder": "01-G", "at_utc": AT},
+            )
+        ),
+        encoding="utf-8",
+    )
+    batch = resumed(tmp_path).batch
+    assert {batch.begun.operator, batch.parts[0].serial} == {r"G\x1b[31m\nverdict: PASS"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
+def test_a_batch_that_cannot_be_begun_leaves_nothing_in_its_way(tmp_path: Path) -> None:
+    with full_disk(20), pytest.raises(Refused, match=r"run_folder: .*too large: '.*batch\.jsonl'"):
+        opened(tmp_path / "batch", tmp_path, BEGUN)
+    assert opened(tmp_path / "batch", tmp_path, BEGUN).batch.begun == BEGUN
 
 
 def test_nothing_is_written_through_a_link_in_a_batch_folder(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from rig.analysis.analyses import calibrated
 from rig.data.run_file import read_run
 from rig.data.silence import crowding
 from rig.errors import Fault, Refused
+from support.as_nobody import as_nobody
 from support.full_disk import full_disk
 from support.paths import FIXTURES
 
@@ -284,3 +285,9 @@ def test_of_provenance_more_may_be_said_than_this_version_knows(recording: Path)
     with h5py.File(recording, "r+") as file:
         provenance(operator={"name": "R. Feynman"})(file)
     assert read_run(recording).provenance == read_run(RECORDING).provenance
+
+
+def test_a_file_that_may_not_be_read_is_not_said_to_be_damaged(recording: Path) -> None:
+    recording.chmod(0)
+    with as_nobody(), pytest.raises(Refused, match=r"no_run_file: .*run\.h5 cannot be read: Permission denied"):
+        read_run(recording)

@@ -17,6 +17,7 @@ import pytest
 
 from rig.data.events import from_lines
 from rig.data.extract import extract, reason
+from rig.data.motion_file import MOTIONS
 from rig.data.recorded_turner import turner_of
 from rig.data.run_file import read_run
 from rig.data.settings import settings_from_json
@@ -26,6 +27,7 @@ from support.frozen import RECORDINGS
 pytestmark = pytest.mark.usefixtures("read_by_system")
 
 RECORDING = RECORDINGS / "rig.settings-7" / "six_observation" / "run.h5"
+SAID_BY_HAND = {"clock_ppm": [50.0], "box_rad": [0.003], "closure": [1.0], "gravity_m_s2": [9.81], "first_face": [4.0]}
 MEMORY_BYTES = 1_000_000_000
 TIMEOUT_S = 60.0
 # The most that a process of its own saw one of its children use, in kilobytes: a worker of pytest has had many.
@@ -252,3 +254,24 @@ def test_rows_that_cannot_be_reckoned_with_are_refused(
         change(file)
     with pytest.raises(Refused, match=complaint):
         read_run(recording)
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({name: [] for name in SAID_BY_HAND}, "it has 0 rows of clock_ppm, not one"),
+        ({name: value * 2 for name, value in SAID_BY_HAND.items()}, "it has 2 rows of clock_ppm, not one"),
+        ({"clock_ppm": [0.0]}, "its clock_ppm is not above 0"),
+        ({"box_rad": [-0.003]}, "its box_rad is not above 0"),
+        ({"box_rad": [1.0]}, "and 0.2 at most"),
+        ({"closure": [7.0]}, "its closure is not above -1 and 1 at most"),
+        ({"gravity_m_s2": [-9.81]}, "its gravity_m_s2 is not above 0"),
+        ({"first_face": [6.0]}, "its first_face is not above -1 and 5 at most"),
+        ({"first_face": [-1.0]}, "its first_face is not above -1 and 5 at most"),
+    ],
+)
+def test_what_nobody_said_of_a_session_by_hand_is_refused(changes: dict[str, list[float]], complaint: str) -> None:
+    columns = {name: np.array(value) for name, value in {**SAID_BY_HAND, **changes}.items()}
+    with pytest.raises(ValueError, match=complaint):
+        MOTIONS["turns"].check(columns)
+    MOTIONS["turns"].check({name: np.array(value) for name, value in SAID_BY_HAND.items()})

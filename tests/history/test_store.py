@@ -1,6 +1,7 @@
 """A history: what is entered is found again, nothing is lost, nothing stands there twice, nothing is taken away."""
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
@@ -341,3 +342,30 @@ def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(hist
     (effect,) = effects(quiet)["k"]
     sign = 1 if effect.rig == "bench B" else -1
     assert abs(sign * effect.value - 4e-5) < 3 * effect.std < 4e-5
+
+
+def test_a_history_that_may_only_be_read_is_read_and_nothing_is_laid_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In somebody else's folder, or on a medium that takes no more."""
+    file = tmp_path / "history.sqlite"
+    with open_history(str(file)) as history:
+        history.enter(finished_run(FIXTURES / "verified"))
+    before = file.read_bytes()
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
+    with open_history(str(file)) as history:
+        assert [*tmp_path.iterdir()] == [file] and len(history.calibrations()) == 2 and not [*history.broken()]
+    with pytest.raises(Refused, match=r"history_unreachable: .* readonly database"), open_history(str(file)) as history:
+        history.void(1, "no reason")
+    assert [*tmp_path.iterdir()] == [file] and file.read_bytes() == before
+
+
+def test_a_history_that_is_only_read_while_another_writes_it_is_as_that_one_left_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "history.sqlite"
+    with open_history(str(file)) as written:
+        written.enter(finished_run(FIXTURES / "verified"))  # in the log beside the file so far
+        monkeypatch.setattr(os, "access", lambda *_: False)
+        with open_history(str(file)) as history:
+            assert len(history.calibrations()) == 2

@@ -9,7 +9,8 @@ from rig.analysis.analyses import calibrated_by_hand
 from rig.data.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
 from rig.data.run_file import read_run
 from rig.errors import Fault
-from rig.estimation.by_hand.session import Handled, Move, Rest
+from rig.estimation.by_hand.session import Handled, Move, Rest, Told
+from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
 from rig.observation.hand_runs import NotCounted, turned_face
 from support.frozen import RECORDINGS
@@ -75,6 +76,23 @@ def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     assert [turned_face(face, quarter) for face in ("+x", "+y", "-z")] == ["-y", "+x", "-z"]
     assert all(turned_face(turned_face(face, quarter), quarter.T) == face for face in FACES)
+
+
+def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
+    run = read_run(RECORDINGS / "rig.settings-7" / "by_hand" / "run.h5")
+    channels = run.sensors["gyro"].channels
+    told = tuple(replace(each, type="<f8") if each.quantity == "acceleration" else each for each in channels)
+    sensor = replace(run.sensors["gyro"], channels=told)
+    for reading, name in ((0.0, "zero_reading"), (np.nan, "not_finite"), (np.inf, "not_finite")):
+        samples = run.samples["gyro"].astype(sensor.sample_dtype)
+        samples["acceleration_counts"][len(samples) // 2 :] = reading
+        with pytest.raises(Fault, match=f"{name}: "):
+            calibrated_by_hand([replace(run, samples={"gyro": samples}, sensors={"gyro": sensor})])
+
+
+def test_more_rests_than_memory_has_room_for_are_refused() -> None:
+    with pytest.raises(Fault, match="too_many_moves: there are 301 rests"):
+        solve_by_hand(session(301), Told(clock_ppm=50.0, box_rad=0.003))
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,15 @@ def test_what_contradicts_itself_is_refused_by_its_place(
         assert printed.startswith("rig: not_a_result: ") and why in printed and printed.count("\n") == 1
 
 
+def test_a_key_that_stands_twice_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One reader takes the first verdict, another the last."""
+    folder = forged("rig.settings-7/six_observation", lambda document: None, tmp_path)
+    text = (folder / "result.json").read_text(encoding="utf-8")
+    (folder / "result.json").write_text(text.replace("{", '{"verdict": "fail", ', 1), encoding="utf-8")
+    assert main(["show", str(folder)]) == 2
+    assert "rig: not_a_result: " in (said := capsys.readouterr().err) and "'verdict' stands there twice" in said
+
+
 def test_nesting_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "result.json").write_text('{"checks": ' + "[" * 100_000, encoding="utf-8")
     assert main(["show", str(tmp_path)]) == 2

@@ -20,6 +20,7 @@ from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 LOOSE = 3.0  # times what is stated of hands: faces that repeat no better may be other faces
+MOST_RESTS = 300  # their equations together fill a gigabyte; a session has some twenty
 ENOUGH = 0.02  # U (k = 2) of the scale, beyond which nothing has been told
 REAL_HANDS = 5e-4  # of the scale: by so much (1 u) recordings of real hands have been seen to disagree with themselves
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
@@ -96,11 +97,16 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
     """The solution of a session.
 
     Raises Fault `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
-    `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`; Refused
-    `first_face_not_told`.
+    `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`, `zero_reading`,
+    `too_many_moves`; Refused `first_face_not_told`.
     """
     if len(session.rests) < 2:
         raise too_few(session, None)
+    if len(session.rests) > MOST_RESTS:
+        what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
+        raise Fault("too_many_moves", what, "Give the recording in pieces")
+    if session.acceleration is not None:
+        refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
     check_axes(session)
     found: Fit | None = None
     try:

@@ -1,6 +1,8 @@
 """A ROS 2 bag of `sensor_msgs/Imu`, a topic for each sensor, written without ROS."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import shutil
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
@@ -26,15 +28,29 @@ SAID = (
 
 
 def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """The folder `bag`, which must not be there. Raises Refused `report_folder`, `nothing_to_export`."""
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_typestore
+    """The folder `bag`, which must not be there: whole, or not at all.
 
+    Raises Refused `report_folder`, `nothing_to_export`, OSError.
+    """
     path = folder / BAG
     if path.exists():
         raise Refused("report_folder", f"{path} is there already", "Choose another with --out")
     if not (gyroscopes := recordings[0].run.measuring(RATE)):
         raise Refused("nothing_to_export", "no gyroscope was recorded", "Export its readings as csv")
+    try:
+        _write(recordings, gyroscopes, path)
+    except BaseException as error:
+        shutil.rmtree(path, ignore_errors=True)
+        if isinstance(error, sqlite3.Error):  # which the bag is written with
+            raise OSError(f"{error}: {path}") from error
+        raise
+    return [path]
+
+
+def _write(recordings: Sequence[Exported], gyroscopes: Iterable[str], path: Path) -> None:
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_JAZZY)
     message = store.types["sensor_msgs/msg/Imu"].__msgtype__
     with Writer(path, version=FORMAT) as bag:
@@ -44,7 +60,6 @@ def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
             for recording in recordings:
                 for stamp, imu in _messages(store.types, recording, name, plain):
                     bag.write(connection, stamp, store.serialize_cdr(imu, message))
-    return [path]
 
 
 def _messages(types: Mapping[str, Any], recording: Exported, name: str, frame: str) -> Iterator[tuple[int, Any]]:
