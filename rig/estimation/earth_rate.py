@@ -26,7 +26,7 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import expected_bias_process
+from rig.estimation.bias_process import bias_process
 from rig.estimation.common_errors import CommonErrors
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.nonlinearity import curvature
@@ -185,7 +185,7 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
     own = seen.variances_rad2_s2 + of_the_speed(seen.rates_rad_s, timed, solution.matrix) ** 2
     design = design_matrix(seen.rates_rad_s, gravity)
     means = seen.means_rad_s - errors.readings_rad_s
-    bias = expected_bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
+    bias = bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
     shared = bias.covariance(seen.windows_s)
     solution, errors = solve(shared)
     return _Fit(solution, errors, own + np.diag(shared)[:, None])

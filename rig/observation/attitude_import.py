@@ -28,13 +28,13 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
+from rig.observation.csv_windows import MIN_SAMPLES, check_complete, overlapping, scatter_of
 from rig.observation.fixes import Turning
 from rig.observation.placements import Placements, find_placements
 from rig.observation.sample_files import attitudes_in
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
