@@ -97,7 +97,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
     Raises Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `wrong_unit`, `mirrored_axis`.
     """
     recorded = Recorded(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
-    settled = _settle(recorded, State(start, np.zeros(3), 0.0), None)
+    settled = _settle(recorded, State(start, np.zeros(3), 0.0))
     for _ in range(SETTINGS_ASIDE):
         odd = _odd(settled)
         if not odd.any() or odd.sum() > _may_be_odd(fixes):
@@ -105,7 +105,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         joined = recorded.fixes.joined.copy()
         joined[np.flatnonzero(joined)[odd]] = False
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
-        settled = _settle(recorded, settled.state, None)
+        settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
     return _found(settled, int(fixes.joined.sum() - recorded.fixes.joined.sum()))
 
@@ -119,8 +119,9 @@ class _Settled:
     iterations: int
 
 
-def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
+def _settle(recorded: Recorded, state: State) -> _Settled:
     """Solve by Gauss–Newton; the sizes are found anew while the parameters still move much."""
+    sizes: Sizes | None = None
     for iteration in range(1, PASSES + 1):
         there = seen(recorded, state)
         if iteration == 2:
@@ -128,7 +129,8 @@ def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
             there = seen(recorded, state)
         model = MixedModel(drift_model(there, recorded.fixes))
         if iteration == 1:
-            _check_told(model.mixed)
+            told = _conditioning(model.mixed)
+            refusals.check_conditioning(told, BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
         if sizes is None or iteration <= SIZED:
             sizes = model.likeliest(*_expected(model, recorded.fixes), start=sizes)
         solved = model.solve(sizes)
@@ -175,11 +177,6 @@ def _odd(settled: _Settled) -> NDArray[np.bool_]:
 
 def _may_be_odd(fixes: Fixes) -> float:
     return max(SOME_ODD, MOST_ODD * float(fixes.joined.sum()))
-
-
-def _check_told(mixed: Mixed) -> None:
-    """Raises Fault `rank_deficient`, `ill_conditioned`."""
-    refusals.check_conditioning(_conditioning(mixed), BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:

@@ -86,7 +86,6 @@ class OverTemperature:
     `lag_s` and `lag_std_s` are the thermometer's, `hysteresis` (6,) how far a warming sensor is from the mean of both
     ways in the middle of the range, and its standard deviation; None where it did not go both ways.
     `zero` (3,) is what the axes read at the reference where nothing is felt.
-    `centre` (2, 3, 3) are the mean powers (orders 1 to 3, by axis) at which k and c are uncorrelated with their mean.
     """
 
     reference_c: float
@@ -95,7 +94,6 @@ class OverTemperature:
     scale: Array
     bias: Array
     lines: tuple[Line, ...]
-    centre: Array
     zero: Array
     lag_s: float
     lag_std_s: float
@@ -194,7 +192,7 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
         lines.append(Line(HYSTERESIS, "A", "rectangular", "half of what warming and cooling differ by", np.inf,
                           fits.in_units(_of_loop(*loop))))  # fmt: skip
     found = OverTemperature(
-        reference_c, range_c, best, scale, bias, tuple(lines), centre, fits.zero, chosen.lag_s, chosen.lag_std_s,
+        reference_c, range_c, best, scale, bias, tuple(lines), fits.zero, chosen.lag_s, chosen.lag_std_s,
         None if loop is None else (loop[0] * fits.in_scale, loop[1] * fits.in_scale), fits.process, fits.repeats,
     )  # fmt: skip
     return replace(found, lines=(*lines, _gradient(found, gradient_k)))
