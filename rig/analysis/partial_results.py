@@ -16,9 +16,8 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
-from rig.observation.arm_motion import motion_of
+from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
-from rig.observation.known_motion import Motion
 from rig.observation.observe import Observation, each_sweep, observe_sensor
 from rig.observation.windows import finished_dwells, finished_sweeps
 
@@ -72,7 +71,7 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
     }
 
 
-def _seen(run: RunData, name: str, motion: Motion) -> Seen:
+def _seen(run: RunData, name: str, motion: ArmMotion) -> Seen:
     sensor = run.sensors[name]
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
@@ -84,7 +83,7 @@ def _seen(run: RunData, name: str, motion: Motion) -> Seen:
 
 
 def _observed(
-    run: RunData, name: str, stream: Stream, motion: Motion
+    run: RunData, name: str, stream: Stream, motion: ArmMotion
 ) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
     thresholds = run.settings.observation
     found = each_sweep(run, stream, motion, thresholds)
