@@ -7,11 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations

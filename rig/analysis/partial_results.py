@@ -6,13 +6,14 @@ otherwise: of uncertainty there is the noise alone here.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rig.analysis.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
@@ -100,12 +101,9 @@ def _solution(
     sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array
 ) -> VectorSolution | Fault:
     observations = [each for _, each in sorted(sweeps.items()) if isinstance(each, Observation)]
-    try:
-        if not observations:
-            raise Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
-        return solve_vector(observations, rests, mounting)
-    except Fault as fault:
-        return fault
+    if not observations:
+        return Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
+    return or_fault(partial(solve_vector, observations, rests, mounting))
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, across
 from rig.estimation.bias_process import BiasProcess
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
@@ -290,8 +290,6 @@ def _tilted(seen: Seen, angle_rad: float) -> Array:
     for joint in sorted(set(seen.joints) - {None}, key=str):
         swept = np.array([each == joint for each in seen.joints])
         axis = seen.turns_rad_s[swept][0] / np.linalg.norm(seen.turns_rad_s[swept][0])
-        first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        first /= np.linalg.norm(first)
-        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in (first, np.cross(axis, first))])
+        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in across(axis)])
         patterns.extend(np.where(swept[:, None], tilts, 0.0))
     return np.array(patterns)

@@ -9,11 +9,12 @@ warming. Matrix and bias are their means over the stretches, and as uncertain as
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_drift import (
@@ -258,8 +259,4 @@ def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
         told = 1e-9 * EARTH_PRECISION * np.eye(3)
     spread = np.asarray(np.linalg.inv(told), dtype=np.float64)
     rate = spread @ information @ rate_rad_s
-    try:
-        check_earth_seen(rate, spread)
-    except Fault as fault:
-        return fault
-    return EarthSeen(rate, spread)
+    return or_fault(partial(check_earth_seen, rate, spread)) or EarthSeen(rate, spread)

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
@@ -54,13 +55,8 @@ def each_dwell(
     """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
     if not stream.sensor.measures(ACCELERATION):
         return {}
-    found: dict[int, DwellReading | Fault] = {}
-    for each in dwelt(run):
-        try:
-            found[each.dwell.index] = _dwell_reading(run, stream, motion, each, settings)
-        except Fault as fault:
-            found[each.dwell.index] = fault
-    return found
+    read = partial(_dwell_reading, run, stream, motion, settings=settings)
+    return {each.dwell.index: or_fault(partial(read, each)) for each in dwelt(run)}
 
 
 def accelerations(stream: Stream, inside: slice) -> Array:

@@ -12,13 +12,14 @@ Nothing doubtful is averaged: whatever does not belong into a calibration raises
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
@@ -128,13 +129,8 @@ def each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> dict[int, Observation | Fault]:
     """Every finished sweep's observation, or why there is none, by the sweep's index."""
-    found: dict[int, Observation | Fault] = {}
-    for finished in swept(run):
-        try:
-            found[finished.sweep.index] = _revolution(run, stream, motion, finished, settings)
-        except Fault as fault:
-            found[finished.sweep.index] = fault
-    return found
+    seen = partial(_revolution, run, stream, motion, settings=settings)
+    return {each.sweep.index: or_fault(partial(seen, each)) for each in swept(run)}
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:
