@@ -20,7 +20,8 @@ def beyond_u(changes: Iterable[Change]) -> list[Change]:
 def change_in_short(change: Change) -> str:
     """The change of one parameter in as few words as a line has room for; U is that of such a change."""
     name = name_in_words(change.name).removeprefix("the ")
-    return f"{name} changed by {_size(change)}, {_times(change)} U"
+    times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
+    return f"{name} changed by {_size(change)}, {times} U"
 
 
 def name_in_words(name: str) -> str:
@@ -42,10 +43,6 @@ def name_in_words(name: str) -> str:
     if len(name) == 3 and name[0] == "g":
         return f"what an acceleration along {name[2]} adds to the rate of {name[1]}"
     return name
-
-
-def _times(change: Change) -> str:
-    return f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
 
 
 def _size(change: Change) -> str:
