@@ -195,7 +195,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     while time.monotonic() < deadline_s:
         try:
             # In this order: a drive that is away shows no image either, and with it comes what may have failed.
-            back = not copied.exists() and _is_mounted(drive)
+            back = not copied.exists() and _code(drive) is not None
             if failure.exists():
                 raise BoardError(
                     "flash_failed",
@@ -246,10 +246,6 @@ def refuse_other_drive(drive: Path) -> None:
             f"{drive} is not the drive of a Nucleo-L432KC: {seen}",
             "Name the drive called NODE_L432KC",
         )
-
-
-def _is_mounted(drive: Path) -> bool:
-    return _code(drive) is not None
 
 
 def _code(drive: Path) -> str | None:

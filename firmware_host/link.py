@@ -162,7 +162,7 @@ class BoardLink:
                 if frames:
                     self._reads_without_frame = 0
                     self.frames_seen += len(frames)
-                for streamed, together in groupby(frames, _streamed):
+                for streamed, together in groupby(frames, lambda frame: frame.name in protocol.SAMPLES):
                     if streamed:
                         self._on_stream(together, host_time_s)
                     else:
@@ -181,8 +181,3 @@ class BoardLink:
         if request is not None:
             request.answer = frame
             request.answered.set()
-
-
-def _streamed(frame: Frame) -> bool:
-    """Whether a frame belongs to the stream, which nobody asks for one by one."""
-    return frame.name in protocol.SAMPLES

@@ -1,15 +1,11 @@
 """Prints the table of parts as a C header of the firmware: `make -C firmware_host/firmware header`."""
 
-from firmware_host.parts import BOARD_PARTS, GYROSCOPES, BoardPart
+from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 
 
 def _pin(pin: str) -> str:
     """Port and number of a pin: "PA11" is "A, 11"."""
     return f"{pin[1]}, {int(pin[2:])}"
-
-
-def _entry(part: BoardPart) -> str:
-    return f"X({part.driver}, {_pin(part.select)}, {_pin(part.data_ready)})"
 
 
 def parts_header() -> str:
@@ -25,16 +21,14 @@ def parts_header() -> str:
             "",
             "/* Of each sensor: its driver, port and pin of its select, port and pin of its data-ready line. */",
             "#define SENSORS(X) \\",
-            *(f"    {entry}{end}" for entry, end in _with_ends([_entry(part) for part in BOARD_PARTS.values()])),
+            " \\\n".join(
+                f"    X({part.driver}, {_pin(part.select)}, {_pin(part.data_ready)})" for part in BOARD_PARTS.values()
+            ),
             "",
             "#endif",
             "",
         ]
     )
-
-
-def _with_ends(entries: list[str]) -> list[tuple[str, str]]:
-    return [(entry, " \\" if entry is not entries[-1] else "") for entry in entries]
 
 
 if __name__ == "__main__":

@@ -8,13 +8,13 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.analysis.accelerometer_errors import mean_temperature_c, pieces_of, sheet_of, with_errors
-from rig.analysis.calibration import SensorResult, or_fault
+from rig.analysis.calibration import SensorResult
 from rig.analysis.reference_budgets import accelerometer_budget
 from rig.analysis.triad import BESIDE, Triad, check_mounted, check_seen, known_gravity, seen_in
 from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.accelerometer import specific_force
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Movement, Sweeps
 from rig.estimation.arrays import Array

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.observation.observe import Observation
 
 MIN_INDEPENDENCE = 1e-3  # least over greatest information about a turn; revolutions about one axis alone have none
@@ -52,10 +52,7 @@ class RelativeRotation:
     @property
     def vector_rad(self) -> Array:
         """(3,) rotation vector, rad: its direction is the axis of the turn, its length the angle."""
-        from scipy.spatial.transform import Rotation
-
-        vector: Array = Rotation.from_matrix(self.matrix).as_rotvec()
-        return vector
+        return rotation_vectors(self.matrix)
 
 
 def mean_rates(observations: Sequence[Observation], calibration: Calibration | None = None) -> MeanRates:
@@ -96,6 +93,6 @@ def relative_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -
     return RelativeRotation(
         matrix=matrix,
         std_rad=np.sqrt(np.diag(covariance)),
-        from_nominal_rad=Rotation.from_matrix(matrix @ nominal.T).as_rotvec(),
+        from_nominal_rad=rotation_vectors(matrix @ nominal.T),
         residuals_rad_s=sensor.rate_rad_s - expected.rate_rad_s,
     )

@@ -7,18 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
-from rig.observation.arm_motion import motion_of
+from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Stream, between, on_the_arms_clock
 from rig.observation.csv_samples import Samples
-from rig.observation.known_motion import Motion
 from rig.observation.observe import standing
 from rig.observation.steadiness import check_at_rest, whole_stretches
 from rig.observation.windows import rested
@@ -86,7 +84,7 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     )
 
 
-def _stretches(run: RunData, stream: Stream, motion: Motion) -> Iterator[slice]:
+def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
     """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
     for window in rested(run):
         still = standing(motion, window)

@@ -7,7 +7,6 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
 from rig.analysis.estimators import estimator_among
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.installed_kinds import OfKind
@@ -17,7 +16,7 @@ from rig.analysis.triad import Triad, check_mounted, check_seen, known_field, kn
 from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.settings import Elsewhere, Site
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
@@ -197,8 +196,4 @@ def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolutio
 
 def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
     """Why what a gyroscope's rates leave over is not the Earth's rate: as in a run, it must be seen to a tenth."""
-    try:
-        check_earth_seen(solution.reference, solution.covariance[REFERENCE, REFERENCE])
-    except Fault as fault:
-        return fault
-    return None
+    return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

@@ -9,13 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
 from rig.analysis.triad import known_gravity
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.bias_over_temperature import BiasOverTemperature, bias_over_temperature

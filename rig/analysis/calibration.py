@@ -1,9 +1,8 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from rig.analysis.vector_inputs import known_of, see, unknown_of
 from rig.data.motion_file import Item
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, or_fault
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Unknown, budget
@@ -32,8 +31,6 @@ from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_sweeps
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,14 +265,6 @@ def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> Levenberg
         np.array([observation.average.variance_rad2_s2 for observation in observations]),
         speed_std_rad_s=[observation.speed_std_rad_s for observation in observations],
     )
-
-
-def or_fault(solve: Callable[[], Result]) -> Result | Fault:
-    """What `solve` returns, or the Fault it ends in: for a result that stands beside another."""
-    try:
-        return solve()
-    except Fault as fault:
-        return fault
 
 
 def _check_recordings(runs: Sequence[RunData]) -> None:

@@ -16,7 +16,7 @@ from rig.data.settings import Uncertainty
 from rig.observation.coloured_noise import widening
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import NOMINAL_DRIFT
-from rig.observation.windows import swept
+from rig.observation.windows import inside, swept
 
 # A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
@@ -133,8 +133,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     scatter, count = [], 0
     sweeps = [(each, finished) for each in recordings for finished in swept(each.run)]
     for recording, finished in sweeps:
-        motion, window = recording.motion, finished.window
-        time_s = motion.time_s[slice(*np.searchsorted(motion.time_s, [window.start_s, window.end_s]))]
+        motion = recording.motion
+        time_s = motion.time_s[inside(motion.time_s, finished.window)]
         steps = np.diff(motion.angle(finished.sweep, time_s), n=ORDER)
         even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
         steps = steps[even < EVEN_S]

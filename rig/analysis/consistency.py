@@ -37,7 +37,7 @@ from rig.analysis.suspected import (
 )
 from rig.analysis.suspicion import Consistency, Statistic, Suspected, basis, explained, told_by, unlike_the_others
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, likeliest_bias_process
+from rig.estimation.bias_process import BiasProcess, bias_process, likeliest
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +168,8 @@ def _wandering(pieces: Pieces, felt: Array, steady: Array, scatter: Scatter) -> 
     common = scatter.common_rad2_s2.reshape(3, count, 3, count)[each, :, each]
     left = pieces.means_rad_s - felt
     known = scatter.instability_rad_s
-    return likeliest_bias_process(
-        steady, left, scatter.variances_rad2_s2, pieces.times_s, common, instability_rad_s=known
+    return bias_process(
+        steady, left, scatter.variances_rad2_s2, pieces.times_s, common, instability_rad_s=known, chosen=likeliest
     )
 
 

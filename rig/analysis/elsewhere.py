@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.by_hand import solved_by_hand
-from rig.analysis.calibration import SensorResult, or_fault, solve_observations, solve_six_observation, solve_vector
+from rig.analysis.calibration import SensorResult, solve_observations, solve_six_observation, solve_vector
 from rig.analysis.check import Check, fitness
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
@@ -19,7 +19,7 @@ from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, or_fault
 from rig.estimation import known_turns, triaxial
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.estimate import Estimate

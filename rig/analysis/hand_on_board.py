@@ -74,7 +74,8 @@ def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[T
 
 def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> TakenMove:
     assert report.before is not None and report.after is not None, "taken moves are between faces"
-    times_us, rates, marks = readings.times_us, readings.rates, _marks(report)
+    times_us, rates = readings.times_us, readings.rates
+    marks = [report.rest_us, report.move_us, report.after_us, report.end_us]
     first, begin, end, last = np.searchsorted(times_us, marks).tolist()
     there = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
     if not there or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
@@ -89,10 +90,6 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Take
         follows=follows,
         settled=report.settled,
     )
-
-
-def _marks(report: HandReport) -> list[int]:
-    return [report.rest_us, report.move_us, report.after_us, report.end_us]
 
 
 def _unverified(what: str) -> Fault:

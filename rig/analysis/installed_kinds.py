@@ -4,14 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from rig.analysis.calibration import or_fault
 from rig.analysis.check import Check
 from rig.data.installed_kinds import InstalledKind, installed_kinds
 from rig.data.motion_file import Item
 from rig.data.quantity import Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.observation.observed_run import ObservedRun
 from rig.observation.placed_on_arm import placements_on_arm
 

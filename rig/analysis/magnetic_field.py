@@ -11,13 +11,12 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
 from rig.analysis.triad import BESIDE, Triad, check_mounted, known_field, seen_in
 from rig.data.quantity import FIELD
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import FieldDrift, Uniformity, field_drift, uniformity

@@ -10,12 +10,12 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.calibration import observe_recordings, or_fault
+from rig.analysis.calibration import observe_recordings
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.vector_inputs import see
 from rig.config.stage_section import rotation_by
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained, explain
 from rig.observation.observed_run import ObservedRun

@@ -6,20 +6,20 @@ otherwise: of uncertainty there is the noise alone here.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rig.analysis.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
-from rig.observation.arm_motion import motion_of
+from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
 from rig.observation.field import field_mean
-from rig.observation.known_motion import Motion
 from rig.observation.mean import Mean, ReadAtRest
 from rig.observation.observe import Observation, each_sweep, observe_sensor
 from rig.observation.observed_run import one_clock, times_s
@@ -87,7 +87,7 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
     )
 
 
-def _seen(run: RunData, name: str, motion: Motion) -> _Seen:
+def _seen(run: RunData, name: str, motion: ArmMotion) -> _Seen:
     sensor = run.sensors[name]
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
@@ -125,14 +125,11 @@ def _fields(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
 def _field(run: RunData, name: str, time_s: Array, dwell: DwellReading | Fault) -> Mean | Fault:
     if isinstance(dwell, Fault):
         return dwell
-    try:
-        return field_mean(run, name, time_s, dwell, run.settings.observation)
-    except Fault as fault:
-        return fault
+    return or_fault(partial(field_mean, run, name, time_s, dwell, run.settings.observation))
 
 
 def _observed(
-    run: RunData, name: str, stream: Stream, motion: Motion
+    run: RunData, name: str, stream: Stream, motion: ArmMotion
 ) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
     thresholds = run.settings.observation
     found = each_sweep(run, stream, motion, thresholds)
@@ -149,12 +146,9 @@ def _solution(
     sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array
 ) -> VectorSolution | Fault:
     observations = [each for _, each in sorted(sweeps.items()) if isinstance(each, Observation)]
-    try:
-        if not observations:
-            raise Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
-        return solve_vector(observations, rests, mounting)
-    except Fault as fault:
-        return fault
+    if not observations:
+        return Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
+    return or_fault(partial(solve_vector, observations, rests, mounting))
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:

@@ -5,10 +5,9 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
 from rig.analysis.inverted import solved_in
 from rig.data.quantity import ACCELERATION, Quantity
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import Placed

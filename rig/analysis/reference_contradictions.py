@@ -43,10 +43,6 @@ class Place:
     dwell: int | None = None
 
 
-def _at_sweep(index: int) -> Place:
-    return Place(DISTURBED_SWEEP, sweep=index)
-
-
 def _at_dwell(index: int) -> Place:
     return Place(DISTURBED_DWELL, dwell=index)
 
@@ -106,7 +102,10 @@ def of_accelerometer(
             times_s=np.array([each.window_s for each in pieces]).mean(axis=1),
             second_order=solution.second_order_s2_m is not None,
         ),
-        pieces=[(_at_dwell if each.stood.wrist is None else _at_sweep)(each.number) for each in pieces],
+        pieces=[
+            _at_dwell(each.number) if each.stood.wrist is None else Place(DISTURBED_SWEEP, sweep=each.number)
+            for each in pieces
+        ],
         flicker_counts=flicker_m_s2 / channel.unit_per_count,
     )
 

@@ -68,7 +68,7 @@ class OnPage:
                 number, text = json.loads(said)["number"], json.loads(said)["text"]
             except (ValueError, TypeError, KeyError):
                 number, text = None, None
-            if type(number) is not int or not isinstance(text, str) or len(text) > LONGEST or not _typed(text):
+            if type(number) is not int or not isinstance(text, str) or len(text) > LONGEST or not text.isprintable():
                 return PlainTextResponse('wanted: {"number": 1, "text": "what was typed"}\n', 400)
             if not self.takes(number, text):
                 return PlainTextResponse("that is not asked any more\n", 409)
@@ -101,8 +101,3 @@ def on_page(present: Present, address: Address) -> Iterator[tuple[OnPage, str]]:
                 yield voice, url
         finally:
             voice.hear(last(present.now))
-
-
-def _typed(text: str) -> bool:
-    """Whether a keyboard could have sent it as one line."""
-    return not text or text.isprintable()

@@ -52,8 +52,9 @@ class Terminal:
 class Asked:
     """The operator, by a `voice`; an empty number ends the batch. Nobody is asked where there is no voice.
 
-    The numbers of a list are taken one after the other where there is one. `asking` is held while something is asked
-    between two runs, and told what, as "to mount the part".
+    Not `attended`, nobody can say that a doubt is none. The numbers of a list are taken one after the other where there
+    is one: one that is not run stands in the table, one that was typed is typed again. `asking` is held while something
+    is asked between two runs, and told what, as "to mount the part".
     """
 
     voice: Voice | None
@@ -78,7 +79,7 @@ class Asked:
         return self._answer("number", text, *([f"{why}."] if why else [])) or None
 
     def mounted(self, part: Part) -> bool:
-        """Whether it is; "no" puts it aside."""
+        """Whether the part is mounted; "no" puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
         with self._asking("to mount the part"):
             while (said := self._answer("mount", text).lower()) not in ("", *YES, *NO):
@@ -86,22 +87,22 @@ class Asked:
         return said not in NO
 
     def goes_on(self, doubt: Doubt) -> bool:
-        """Whether the operator says yes."""
+        """Whether it is right all the same."""
         with self._asking("whether to go on all the same"):
             return self._agrees("doubt", "Go on all the same? yes or no:", f"{doubt.why}.")
 
     def tries_again(self, part: Part, error: RigError) -> bool:
-        """Whether the operator wants it again."""
+        """Whether a part that was refused, or ended in a fault, is tried again; "no" puts it aside."""
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Whether the operator says go, or yes to something else; what nobody is asked was agreed to before."""
+        """Whether what a run announces may be done: the operator says so, or was not to be asked, and agreed before."""
         if to_do == Prompt(()).to_do:
             return self.voice is None or self._agrees("go", f"Type go to {to_do}:", *announcement)
         return self.voice is None or self._agrees("doubt", f"Type yes to {to_do}, or no:", *announcement)
 
     def hears(self, part: Part) -> None:
-        """Told on stdout, a line for each part."""
+        """What became of a part is told on stdout, a line for each."""
         ended = part.ended
         if ended is None:
             return

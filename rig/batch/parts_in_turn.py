@@ -10,48 +10,12 @@ from typing import Protocol
 from rig.batch import label, table
 from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Outcome, Part, PartBegun, PartEnded, doubt_of
 from rig.batch.journal import Journal
+from rig.batch.operators import Asked
 from rig.config.station_section import StationSection
 from rig.config.written_file import write_new
-from rig.errors import Fault, Refused, RigError
+from rig.errors import Fault, Refused
 
 LABELS = "labels"
-
-
-class Operator(Protocol):
-    """Whoever names the parts and is asked; not `attended`, nobody can say that a doubt is none.
-
-    Where the numbers are `listed`, one that is not run stands in the table; one that was typed is typed again.
-    """
-
-    @property
-    def attended(self) -> bool: ...
-
-    @property
-    def listed(self) -> bool: ...
-
-    def next_part(self, done: Sequence[Part], why: str = "") -> str | None:
-        """The next serial number; None where no part follows. `why` the number before was not taken, is told."""
-        ...
-
-    def mounted(self, part: Part) -> bool:
-        """Whether the part is mounted; False puts it aside."""
-        ...
-
-    def goes_on(self, doubt: Doubt) -> bool:
-        """Whether it is right all the same."""
-        ...
-
-    def tries_again(self, part: Part, error: RigError) -> bool:
-        """Whether a part that was refused, or ended in a fault, is tried again; False puts it aside."""
-        ...
-
-    def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Whether what a run announces may be done."""
-        ...
-
-    def hears(self, part: Part) -> None:
-        """Be told what became of a part."""
-        ...
 
 
 class Bench(Protocol):
@@ -97,7 +61,7 @@ class Work:
 
     journal: Journal
     section: StationSection
-    operator: Operator
+    operator: Asked
     bench: Bench
     told: Callable[[Batch], None] = lambda batch: None
 

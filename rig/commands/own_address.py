@@ -82,7 +82,5 @@ def _turner_moved(config: RigConfig, text: str, host: str) -> Iterator[str]:
 
 def _moved(config: SensorsConfig, host: str) -> Iterator[str]:
     """The ports of the configuration, at another host."""
-    ports = {} if config.board is None else {"board.port": config.board.port}
-    ports |= {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in config.sensors.items() if s.own_port}
-    for key, port in ports.items():
+    for key, port in config.ports.items():
         yield f"{key}=socket://{host}:{urlsplit(port).port}"

@@ -321,13 +321,11 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     if (host := turner.simulated_at) is None and not isinstance(turner, HandSection):
         yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
         return
-    ports = {} if config.board is None else {"board.port": config.board.port}
-    ports |= {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in config.sensors.items() if s.own_port}
     if host is not None and not _is_loopback(host):
         key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.moved_to(host)))}"
         yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     yield from world.misfits(turner)
-    for place, port in ports.items():
+    for place, port in config.ports.items():
         if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):
             yield (
                 f"{place}: {quote(port)} must be socket://host:port, at a loopback address (127.x.y.z), "

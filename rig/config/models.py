@@ -230,6 +230,12 @@ class SensorsConfig(Section):
     output: OutputSection = OutputSection()
     station: StationSection = StationSection()
 
+    @property
+    def ports(self) -> dict[str, str]:
+        """The ports of board and sensors, each by its key in the file."""
+        own = {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in self.sensors.items() if s.own_port}
+        return own if self.board is None else {"board.port": self.board.port} | own
+
     @field_validator("sensors")
     @classmethod
     def sensors_fit_together(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:

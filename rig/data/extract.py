@@ -51,7 +51,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if len(group) > MAX_SENSORS:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
-        described = {name: _attributes(dataset) for name, dataset in samples.items()}
+        described = {name: {key: _plain(value) for key, value in each.attrs.items()} for name, each in samples.items()}
         named = (states_name(schema), "events", *(TABLES if elsewhere else ()))
         rows = {f"samples/{name}": each for name, each in samples.items()}
         rows |= {name: _member(file, name, h5py.Dataset) for name in named}
@@ -147,10 +147,6 @@ def _stored_rows(dataset: Any) -> int:
     if dataset.chunks is None:
         return int(dataset.id.get_storage_size() // dataset.dtype.itemsize)
     return int(dataset.id.get_num_chunks() * dataset.chunks[0])
-
-
-def _attributes(dataset: Any) -> dict[str, Any]:
-    return {name: _plain(value) for name, value in dataset.attrs.items()}
 
 
 def _text(file: Any, name: str) -> str:

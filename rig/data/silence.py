@@ -7,6 +7,7 @@ from pathlib import Path
 CROWDED = 5.0  # times a limit is given at most, once for each program a processor that wants to run
 STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
 STANDS = 0.05  # … or without having run for more than this, and still ready to run
+HELD_UP = ("R", "D")  # states of a thread: ready to run, or waiting for memory that the system has put away
 NS_PER_S = 1e9
 
 _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, seconds waiting for one
@@ -70,7 +71,7 @@ class Silence:
         self._looked_s, self._times = now_s, _times(self._tasks)
         return known and any(
             waited_s - before[thread][1] > STARVED * elapsed_s
-            or (ran_s - before[thread][0] < STANDS * elapsed_s and _held_up(self._tasks / thread))
+            or (ran_s - before[thread][0] < STANDS * elapsed_s and _state(self._tasks / thread) in HELD_UP)
             for thread, (ran_s, waited_s) in self._times.items()
             if thread in before and self._thread in (None, thread)
         )
@@ -103,11 +104,6 @@ def _times(tasks: Path) -> _Times:
     except (OSError, ValueError):
         pass  # not Linux, or a thread that has ended meanwhile
     return times
-
-
-def _held_up(task: Path) -> bool:
-    """Whether the thread is ready to run, or waits for memory that the system has put away."""
-    return _state(task) in ("R", "D")
 
 
 def _state(task: Path) -> str:

@@ -3,12 +3,14 @@
 `catalogue` has every name in one table, from which docs/errors.md is made.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 from firmware_host.problem import Problem, ProblemError
 
-__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "raised_as", "refuse"]
+__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "or_fault", "raised_as", "refuse"]
+Result = TypeVar("Result")
 
 
 class RigError(ProblemError):
@@ -25,6 +27,14 @@ class Refused(RigError):
 
 class Fault(RigError):
     """Something failed during the run; the arm is stopped and the data kept (exit status 3)."""
+
+
+def or_fault(solve: Callable[[], Result]) -> Result | Fault:
+    """What `solve` returns, or the Fault it ends in: for a result that stands beside others."""
+    try:
+        return solve()
+    except Fault as fault:
+        return fault
 
 
 @contextmanager

@@ -13,6 +13,20 @@ def scale_of(matrix: Array) -> Array:
     return scale
 
 
+def across(axis: Array) -> Array:
+    """(2, 3) unit vectors at right angles to a unit vector (3,) and to each other."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first = first / np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def rotation_vectors(matrices: Array) -> Array:
+    """(…, 3) rad of rotations (…, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)
+
+
 def in_units_of(values: ArrayLike, sizes: ArrayLike) -> Array:
     """Values over sizes ≥ 0, of any one shape; infinite where a value is not zero and its size as good as none."""
     value, size = np.asarray(values, dtype=np.float64), np.asarray(sizes, dtype=np.float64)

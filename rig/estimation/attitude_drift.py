@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.bias_process import walk_covariance
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.increments import course
@@ -155,10 +155,3 @@ def drift_model(seen: Seen, fixes: Fixes) -> Mixed:
     same = (fixes.placement[:, None] == fixes.placement) * worse[:, None] * worse
     walked = walk_covariance(seen.windows_s)
     return Mixed(observed, design, step @ same @ step.T, step @ walked @ step.T, precision, groups)
-
-
-def rotation_vectors(matrices: Array) -> Array:
-    """(n, 3) rad of rotations (n, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)

@@ -23,14 +23,14 @@ class BatchSolution:
     converged: NDArray[np.bool_]
 
 
-def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike, weights: ArrayLike | None = None) -> BatchSolution:
+def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
     """The closed form, with Newton steps on γ where speeds differ: `by_newton` for every run.
 
-    `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N); `weights` (N,) or (R, N), 1 unless given.
+    `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     centre = means.mean(axis=1)
-    p, q, square = _responses(means - centre[:, None], speeds_rad_s, weights)
+    p, q, square = _responses(means - centre[:, None], speeds_rad_s)
     with np.errstate(all="ignore"):
         total = np.sum(q[:, 3:] ** 2 / (4 * q[:, :3]), axis=1)
         gamma = square * total / (1 + total)
@@ -57,7 +57,7 @@ def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchS
     Shapes as in `newton_batch`: `means_rad_s` (R, N, 3), `speeds_rad_s` (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
-    p, q, _ = _responses(means, speeds_rad_s, None)
+    p, q, _ = _responses(means, speeds_rad_s)
     beta, last_change = p.copy(), np.full(len(p), np.inf)
     passes = np.ones(len(p), dtype=np.int64)
     active, converged = np.ones(len(p), dtype=np.bool_), np.zeros(len(p), dtype=np.bool_)
@@ -78,19 +78,17 @@ def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchS
         return _solution(beta, np.zeros((len(p), 3)), passes, converged)
 
 
-def _responses(means: Array, speeds_rad_s: ArrayLike, weights: ArrayLike | None) -> tuple[Array, Array, Array]:
+def _responses(means: Array, speeds_rad_s: ArrayLike) -> tuple[Array, Array, Array]:
     """p = X⁺ω² and q = X⁺1, (R, 6) each, and the mean squared speed (R,)."""
     runs, count, _ = means.shape
     x = design(means)
     square = np.broadcast_to(np.asarray(speeds_rad_s, dtype=np.float64) ** 2, (runs, count))
     both = np.stack([square, np.ones((runs, count))], axis=-1)
-    w = np.ones((1, count)) if weights is None else np.atleast_2d(np.asarray(weights, dtype=np.float64))
     if count > 6:
-        transposed = np.swapaxes(x, -1, -2) * w[:, None, :]
+        transposed = np.swapaxes(x, -1, -2)
         x, both = transposed @ x, transposed @ both
     answers = _solve(x, both)
-    mean_square: Array = np.sum(square * w, axis=1) / np.sum(np.broadcast_to(w, (runs, count)), axis=1)
-    return answers[..., 0], answers[..., 1], mean_square
+    return answers[..., 0], answers[..., 1], square.mean(axis=1)
 
 
 def _solve(matrices: Array, right: Array) -> Array:

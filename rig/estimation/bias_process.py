@@ -20,6 +20,10 @@ PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
 SPAN = 300.0  # largest size over the smallest that is looked at
 CHANGED = float(np.sqrt(2))  # times its Allan deviation, by which flicker changes from one mean to the next
 
+Chosen = Callable[
+    [Array, Array], Array
+]  # (2,) walk and scatter, of sizes (K, 2) and the logarithms of their likelihood
+
 
 @dataclass(frozen=True, slots=True)
 class BiasProcess:
@@ -108,7 +112,39 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
     return covariance
 
 
-def expected_bias_process(
+def expected(sizes: Array, likelihood: Array) -> Array:
+    """(2,) mean of sizes (K, 2), each as likely as it makes the averages.
+
+    Before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by chance be
+    far too small in one run and too large in the next, and so would be every uncertainty.
+    """
+    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
+    weights = np.exp(belief - belief.max())
+    return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
+
+
+def walking(sizes: Array, likelihood: Array) -> Array:
+    """(2,) root of the mean of the squares of sizes (K, 2): a walk of any size alike, a scatter as in `expected`.
+
+    For parameters that stand over a long time, as slopes over temperature do: most of their uncertainty may be of a
+    walk that the averages hardly show. So there is one, of any size alike before (Gelman, Bayesian Analysis 1 (2006)
+    515), and the covariance is the mean of those of all sizes. They stand on a grid of powers, so a size is as likely
+    before as the step to the next one is long.
+    """
+    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
+    weights = sizes[:, 0] * np.exp(belief - belief.max())
+    return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
+
+
+def likeliest(sizes: Array, likelihood: Array) -> Array:
+    """(2,) likeliest of sizes (K, 2), zero where they do not make the averages likelier by Akaike's price.
+
+    It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
+    """
+    return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
+
+
+def bias_process(
     design: ArrayLike,
     means_rad_s: ArrayLike,
     variances_rad2_s2: ArrayLike,
@@ -116,74 +152,22 @@ def expected_bias_process(
     shared_rad2_s2: Array | None = None,
     *,
     instability_rad_s: float = 0.0,
+    chosen: Chosen = expected,
 ) -> BiasProcess:
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
     `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
-    axes, so that few averages tell it. Walk and scatter are their means over all sizes, each as likely as it makes the
-    averages; before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by
-    chance be far too small in one run and too large in the next, and so would be every uncertainty. `shared_rad2_s2`
-    (3, N, N) are covariances of what the averages have in common beside their noise, `instability_rad_s` is what is
-    known of the part, zero where nothing is.
+    axes, so that few averages tell it. `shared_rad2_s2` (3, N, N) are covariances of what the averages have in common
+    beside their noise, `instability_rad_s` is what is known of the part, zero where nothing is. Walk and scatter are
+    those `chosen` of all sizes.
     """
-    known = instability_rad_s
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean, shared=shared_rad2_s2, known=known)
-
-
-def walking_bias_process(
-    design: ArrayLike,
-    means_rad_s: ArrayLike,
-    variances_rad2_s2: ArrayLike,
-    windows_s: ArrayLike,
-    *,
-    instability_rad_s: float = 0.0,
-) -> BiasProcess:
-    """The bias process where parameters stand over a long time, as slopes over temperature do.
-
-    Most of their uncertainty may be of a walk that the averages hardly show. So there is one, of any size alike before
-    (Gelman, Bayesian Analysis 1 (2006) 515), and the covariance is the mean of those of all sizes.
-    """
-    return _bias_process(
-        design, means_rad_s, variances_rad2_s2, windows_s, _with_a_walk, shared=None, known=instability_rad_s
-    )
-
-
-def likeliest_bias_process(
-    design: ArrayLike,
-    means_rad_s: ArrayLike,
-    variances_rad2_s2: ArrayLike,
-    windows_s: ArrayLike,
-    shared_rad2_s2: Array | None = None,
-    *,
-    instability_rad_s: float = 0.0,
-) -> BiasProcess:
-    """The bias process of the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
-
-    It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
-    """
-    known = instability_rad_s
-    return _bias_process(
-        design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2, known=known
-    )
-
-
-def _bias_process(
-    design: ArrayLike,
-    means_rad_s: ArrayLike,
-    variances_rad2_s2: ArrayLike,
-    windows_s: ArrayLike,
-    chosen: Callable[[Array, Array], Array],
-    *,
-    shared: Array | None,
-    known: float,
-) -> BiasProcess:
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
-        return BiasProcess(0.0, 0.0, max(freedom, 0), known)
+        return BiasProcess(0.0, 0.0, max(freedom, 0), instability_rad_s)
     free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # to which the parameters are nothing
     unit = walk_covariance(windows_s)
-    flicker = _flicker(known, windows_s) if known else np.zeros(unit.shape)
+    flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)
     typical = float(np.median(variances))
     grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
     walks = grid / float(np.median(np.diag(unit)))
@@ -191,33 +175,11 @@ def _bias_process(
     likelihood = np.zeros(len(squares))
     for axis in range(3):
         own = np.diag(variances[:, axis]) + flicker
-        own = own if shared is None else own + shared[axis]
-        walking = free @ own @ free.T + walks[:, None, None] * (free @ unit @ free.T)
-        likelihood += _likelihood(free @ means[:, axis], walking, grid).ravel()
+        own = own if shared_rad2_s2 is None else own + shared_rad2_s2[axis]
+        covariances = free @ own @ free.T + walks[:, None, None] * (free @ unit @ free.T)
+        likelihood += _likelihood(free @ means[:, axis], covariances, grid).ravel()
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
-    return BiasProcess(walk, scatter, freedom, known)
-
-
-def _mean(sizes: Array, likelihood: Array) -> Array:
-    """(2,) mean of sizes (K, 2), of which zero is before as likely as all others together."""
-    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
-    weights = np.exp(belief - belief.max())
-    return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
-
-
-def _with_a_walk(sizes: Array, likelihood: Array) -> Array:
-    """(2,) root of the mean of the squares of sizes (K, 2): a walk of any size alike, a scatter as in `_mean`.
-
-    The sizes stand on a grid of powers, so a size is as likely before as the step to the next one is long.
-    """
-    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes[:, 1:], axis=1)
-    weights = sizes[:, 0] * np.exp(belief - belief.max())
-    return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
-
-
-def _likeliest(sizes: Array, likelihood: Array) -> Array:
-    """(2,) likeliest of sizes (K, 2)."""
-    return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
+    return BiasProcess(walk, scatter, freedom, instability_rad_s)
 
 
 def _likelihood(seen: Array, noise: Array, scatters: Array) -> Array:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, across
 from rig.estimation.bias_process import BiasProcess
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
@@ -174,7 +174,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     turned = seen.turns_rad_s @ matrix.T
     wide, said = unknown.clock_half_width, unknown.clock_source
     if wide is None:
-        timed = _found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
+        timed = found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
         yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
     else:
         yield assumed(CLOCK, 1e6 * wide, "ppm", said, wide * turned[None])
@@ -192,7 +192,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
         source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
-        yield _found("Earth's rate", source, of(patterns), unknown.earth_freedom)
+        yield found("Earth's rate", source, of(patterns), unknown.earth_freedom)
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
@@ -239,7 +239,7 @@ def _of_times(seen: Seen, unknown: Unknown, turned: Array, of: Callable[[Array],
     each_turn = np.eye(len(turned))[:, :, None]
     jitter = each_turn * (unknown.state_jitter_s * each_end[:, None] * turned)[None]
     source = "scatter of the joint angles"
-    yield _found(STATES, source, of(jitter), unknown.state_jitter_freedom)
+    yield found(STATES, source, of(jitter), unknown.state_jitter_freedom)
     if unknown.stamp_std_s:
         # A mean over a window that lies elsewhere holds other rates at its ends: those of the ripple.
         moved = each_turn * ((unknown.stamp_std_s * each_end * seen.ripples)[:, None] * turned)[None]
@@ -255,7 +255,7 @@ def _noise_freedom(explained: Explained) -> float:
     return float(effective_freedom(parts, counted).min())
 
 
-def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
+def found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
     """A contributor that was found from the readings: type A."""
     return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
 
@@ -264,10 +264,10 @@ def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
     """What the readings contribute: their noise, and a bias that does not stand still."""
     bias, (flicker, wandering) = explained.bias, _of_bias(explained)
     noise = explained.solution.covariance - flicker - wandering
-    yield _found(NOISE, "scatter of the readings", noise, _noise_freedom(explained))
+    yield found(NOISE, "scatter of the readings", noise, _noise_freedom(explained))
     if bias.found:
         source = "scatter of rests and sweeps about each other"
-        yield _found(WANDERING, source, wandering, float(bias.freedom))
+        yield found(WANDERING, source, wandering, float(bias.freedom))
     if bias.instability_rad_s:
         source = f"least Allan deviation: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
         yield Contributor(FLICKER, "B", "normal", None, "", source, np.inf, flicker)
@@ -290,8 +290,6 @@ def _tilted(seen: Seen, angle_rad: float) -> Array:
     for joint in sorted(set(seen.joints) - {None}, key=str):
         swept = np.array([each == joint for each in seen.joints])
         axis = seen.turns_rad_s[swept][0] / np.linalg.norm(seen.turns_rad_s[swept][0])
-        first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        first /= np.linalg.norm(first)
-        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in (first, np.cross(axis, first))])
+        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in across(axis)])
         patterns.extend(np.where(swept[:, None], tilts, 0.0))
     return np.array(patterns)

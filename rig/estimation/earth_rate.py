@@ -25,8 +25,8 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.arrays import Array
-from rig.estimation.bias_process import expected_bias_process
+from rig.estimation.arrays import Array, across
+from rig.estimation.bias_process import bias_process
 from rig.estimation.common_errors import CommonErrors
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.nonlinearity import curvature
@@ -134,7 +134,7 @@ def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthR
     directions = np.eye(3)
     if known.g_sensitivity and known.latitude_rad is not None:
         held = EARTH_RATE_RAD_S * np.sin(known.latitude_rad) * known.up
-        directions = _across(known.up)
+        directions = across(known.up)
     gravity = seen.gravity_m_s2 if known.g_sensitivity else None
     _check_told(seen, directions, gravity)
     pull = None if gravity is None else seen.pull_m_s2
@@ -185,7 +185,7 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
     own = seen.variances_rad2_s2 + of_the_speed(seen.rates_rad_s, timed, solution.matrix) ** 2
     design = design_matrix(seen.rates_rad_s, gravity)
     means = seen.means_rad_s - errors.readings_rad_s
-    bias = expected_bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
+    bias = bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
     shared = bias.covariance(seen.windows_s)
     solution, errors = solve(shared)
     return _Fit(solution, errors, own + np.diag(shared)[:, None])
@@ -203,19 +203,12 @@ def _scatter(fit: _Fit, freedom: int) -> float:
     return float(np.sqrt(squares / freedom)) if freedom > 0 else 1.0
 
 
-def _across(up: Array) -> Array:
-    """(2, 3) unit vectors, both level."""
-    first = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(up, first)])
-
-
 def _leaning(turns_rad_s: Array) -> Array:
     """(2 M, N, 3) what each of M sweeps' axes, leaning by one radian either way, adds to the rates (N, 3) alone."""
     patterns: list[Array] = []
     for place in np.flatnonzero(turns_rad_s.any(axis=1)):
         turn = turns_rad_s[place]
-        for way in _across(turn / np.linalg.norm(turn)):
+        for way in across(turn / np.linalg.norm(turn)):
             patterns.append(np.zeros_like(turns_rad_s))
             patterns[-1][place] = np.cross(way, turn)
     return np.array(patterns).reshape(-1, *turns_rad_s.shape)

@@ -46,16 +46,16 @@ class Sizes:
     own_share: float
 
 
-def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[float]) -> Sizes:
+def expected_sizes(seen: Scattered, shares: Sequence[float]) -> Sizes:
     """Mean squares over all sizes, each as likely as it makes the readings.
 
     Before, the walk was as likely to be there as not, it and δ were of any order of magnitude, and each of the `shares`
-    was as likely as the others. `std_rad` holds δ.
+    was as likely as the others.
     """
     standing = np.diag(seen.walk) > 0
     typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
     walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
-    sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES) if std_rad is None else np.array([std_rad])
+    sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES)
     columns = seen.slopes.shape[1]
     free = np.linalg.qr(seen.slopes, mode="complete")[0][:, columns:].T  # to which the columns are nothing
     left, known, walk = free @ seen.left, free @ seen.known @ free.T, free @ seen.walk @ free.T
@@ -66,7 +66,7 @@ def expected_sizes(seen: Scattered, std_rad: float | None, shares: Sequence[floa
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
     walked, turned = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
-    new = turned @ shares / (turned.sum() or 1.0)  # of an exact arm's nothing, none
+    new = turned @ shares / turned.sum()
     return Sizes(float(np.sqrt(walked)), float(np.sqrt(turned.sum())), float(new))
 
 

@@ -36,7 +36,7 @@ from rig.estimation.imu_fit import Fit, as_expected, free_ways, held_still, most
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
 from rig.estimation.reference_model import BIAS, REFERENCE, matrix
 from rig.estimation.shared_errors import with_uncertainty
-from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
+from rig.estimation.triaxial import check_trustworthy
 
 MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)"
 
@@ -95,7 +95,6 @@ def solve_imu(
     gravity_m_s2: float,
     up: ArrayLike = (0.0, 0.0, 1.0),
     second_order: bool = False,
-    attitude_std_rad: float | None = None,
     repeatability_rad: float = 0.0,
     own: AccelerometerErrors | None = None,
     arm_turns: Array | None = None,
@@ -103,9 +102,8 @@ def solve_imu(
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
-    `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
-    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`,
-    `arm_turns`: see `Movement`; of `own_shares` the readings tell which.
+    `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly.
+    `repeatability_rad`, `own`, `arm_turns`: see `Movement`; of `own_shares` the readings tell which.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
@@ -121,14 +119,11 @@ def solve_imu(
         told = refusals.conditioning(columns / sizes_of(columns), needed)
         what = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
-        fit = most_likely(start, movement, held, attitude_std_rad)
+        fit = most_likely(start, movement, held, None)
         if own is not None:
-            movement, fit = as_expected(
-                fit, movement, own, held, attitude_std_rad=attitude_std_rad, own_shares=own_shares
-            )
+            movement, fit = as_expected(fit, movement, own, held, own_shares)
         covariance, response = fit.covariance(), fit.response()
-        if attitude_std_rad is None:
-            _check_attitudes(start, movement, held, fit)
+        _check_attitudes(start, movement, held, fit)
     f = matrix(fit.theta)
     refusals.check_unit(scale_of(f))
     refusals.check_handedness(f)
@@ -144,9 +139,7 @@ def solve_imu(
         second_order_s2_m=fit.theta[SECOND] if second_order else None,
         covariance=covariance,
         response=response,
-        attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian)
-        if attitude_std_rad is None
-        else AttitudeError(attitude_std_rad, 0.0),
+        attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian),
         dwell_residuals_m_s2=residuals[:count],
         chi_square=float(white @ white),
         freedom=freedom,
@@ -161,17 +154,8 @@ def solve_imu(
 
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
     """Raises Fault where attitudes are off: all, or the dwell that fits worst where enough others are left to tell."""
-    off, readings = fit.std_rad, movement.readings().size
-    said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
-    if off > SUSPICIOUS_RAD and len(movement.dwells.readings_m_s2) and readings - 3 > fit.free.shape[1] + 3:
-        worst, by, expected = _furthest_off(start, movement, held, fit)
-        if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
-            off = by
-            said = (
-                f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
-            )
-    if off > UNTRUSTWORTHY_RAD:
-        raise refusals.untrustworthy(said)
+    enough = len(movement.dwells.readings_m_s2) > 0 and movement.readings().size - 3 > fit.free.shape[1] + 3
+    check_trustworthy(fit.std_rad, lambda: _furthest_off(start, movement, held, fit), enough=enough)
 
 
 def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -> tuple[int, float, float]:

@@ -109,20 +109,14 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
 
 
 def as_expected(
-    fit: Fit,
-    movement: Movement,
-    own: AccelerometerErrors,
-    held: list[int],
-    *,
-    attitude_std_rad: float | None,
-    own_shares: Sequence[float],
+    fit: Fit, movement: Movement, own: AccelerometerErrors, held: list[int], own_shares: Sequence[float]
 ) -> tuple[Movement, Fit]:
     """Movement and fit with the sizes to be expected by what the fit leaves, and disturbances."""
     left = (movement.readings() - predicted(fit.theta, movement)).ravel()
     known, alike = noise(fit.theta, movement), np.diag(movement.noise())
     of_arm = partial(shared_out, *new_and_always(fit.theta, movement))
     scattered = Scattered(left, fit.jacobian, known, of_arm, walking(own, movement), alike)
-    sizes = expected_sizes(scattered, attitude_std_rad, own_shares)
+    sizes = expected_sizes(scattered, own_shares)
     unit = float(np.sqrt(np.median(alike)))
     alone = [np.diag(np.sqrt(alike))[:, piece] for piece in movement.pieces()]
     causes = [*alone, unit * in_sweeps(movement)]

@@ -34,14 +34,13 @@ BLOCK = 1 << 16  # readings taken at once: 20 MB, however long the recording is
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Where a gyroscope says that it was at k instants `at_s` (k,), rising.
+    """Where a gyroscope says that it was at k instants, rising.
 
     - `attitudes` (k, 3, 3): C, body coordinates to those of the first reading.
     - `sensitivities` (k, 3, 12): S, how C turns with F (row by row) and b, in coordinates of the first reading.
     - `rates_rad_s` (k, 3) in body coordinates.
     """
 
-    at_s: Array
     attitudes: Array
     sensitivities: Array
     rates_rad_s: Array
@@ -63,12 +62,10 @@ class Increments:
     - `rotations` (w, 3, 3): body coordinates at the end to those at the start.
     - `jacobian` (w, 3, 12): J, how a rotation turns with F (row by row) and b: exp(J δθ) × rotation, so in body
       coordinates at the start.
-    - `durations_s` (w,).
     """
 
     rotations: Array
     jacobian: Array
-    durations_s: Array
 
 
 def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> Course:
@@ -88,7 +85,7 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
         sensitivities.append(sensitivity + attitude @ s[:-1])
         there.append(w)
         attitude, sensitivity = attitude @ c[-1], sensitivity + attitude @ s[-1]
-    return Course(at_s, np.concatenate(attitudes), np.concatenate(sensitivities), np.concatenate(there))
+    return Course(np.concatenate(attitudes), np.concatenate(sensitivities), np.concatenate(there))
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
@@ -109,11 +106,7 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
     found = course(time_s, readings, matrix, bias, at_s)
     start, end = place.reshape(-1, 2).T
     back = np.swapaxes(found.attitudes[start], -1, -2)
-    return Increments(
-        back @ found.attitudes[end],
-        back @ (found.sensitivities[end] - found.sensitivities[start]),
-        np.diff(windows_s, axis=1)[:, 0],
-    )
+    return Increments(back @ found.attitudes[end], back @ (found.sensitivities[end] - found.sensitivities[start]))
 
 
 def _blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:

@@ -9,11 +9,12 @@ warming. Matrix and bias are their means over the stretches, and as uncertain as
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_drift import (
@@ -97,7 +98,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
     Raises Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `wrong_unit`, `mirrored_axis`.
     """
     recorded = Recorded(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
-    settled = _settle(recorded, State(start, np.zeros(3), 0.0), None)
+    settled = _settle(recorded, State(start, np.zeros(3), 0.0))
     for _ in range(SETTINGS_ASIDE):
         odd = _odd(settled)
         if not odd.any() or odd.sum() > _may_be_odd(fixes):
@@ -105,7 +106,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         joined = recorded.fixes.joined.copy()
         joined[np.flatnonzero(joined)[odd]] = False
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
-        settled = _settle(recorded, settled.state, None)
+        settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
     return _found(settled, int(fixes.joined.sum() - recorded.fixes.joined.sum()))
 
@@ -119,8 +120,9 @@ class _Settled:
     iterations: int
 
 
-def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
+def _settle(recorded: Recorded, state: State) -> _Settled:
     """Solve by Gauss–Newton; the sizes are found anew while the parameters still move much."""
+    sizes: Sizes | None = None
     for iteration in range(1, PASSES + 1):
         there = seen(recorded, state)
         if iteration == 2:
@@ -128,7 +130,8 @@ def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
             there = seen(recorded, state)
         model = MixedModel(drift_model(there, recorded.fixes))
         if iteration == 1:
-            _check_told(model.mixed)
+            told = _conditioning(model.mixed)
+            refusals.check_conditioning(told, BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
         if sizes is None or iteration <= SIZED:
             sizes = model.likeliest(*_expected(model, recorded.fixes), start=sizes)
         solved = model.solve(sizes)
@@ -175,11 +178,6 @@ def _odd(settled: _Settled) -> NDArray[np.bool_]:
 
 def _may_be_odd(fixes: Fixes) -> float:
     return max(SOME_ODD, MOST_ODD * float(fixes.joined.sum()))
-
-
-def _check_told(mixed: Mixed) -> None:
-    """Raises Fault `rank_deficient`, `ill_conditioned`."""
-    refusals.check_conditioning(_conditioning(mixed), BIAS.stop, MAX_CONDITION, "some of F and bias", REMEDY)
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
@@ -261,8 +259,4 @@ def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:
         told = 1e-9 * EARTH_PRECISION * np.eye(3)
     spread = np.asarray(np.linalg.inv(told), dtype=np.float64)
     rate = spread @ information @ rate_rad_s
-    try:
-        check_earth_seen(rate, spread)
-    except Fault as fault:
-        return fault
-    return EarthSeen(rate, spread)
+    return or_fault(partial(check_earth_seen, rate, spread)) or EarthSeen(rate, spread)

@@ -33,21 +33,21 @@ def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
     return tuple(float(group.mean()) for group in np.split(ordered, steps))
 
 
-def curvature(matrix: Array, rates_rad_s: Array, true_at_rad_s: float = 0.0) -> Array:
+def curvature(matrix: Array, rates_rad_s: Array) -> Array:
     """(6, N, 3) what readings gain by odd parts of x, y, z and even parts of x, y, z of `FREE_PER_RAD_S`.
 
-    Of mean rates (N, 3) in the flange's frame, and F (3, 3), which holds at the speed `true_at_rad_s`.
+    Of mean rates (N, 3) in the flange's frame, and F (3, 3).
     """
     readings = rates_rad_s @ matrix.T
     along = readings / np.linalg.norm(matrix, axis=1)
-    gains = ((np.abs(along) - true_at_rad_s) * readings, along * readings)
+    gains = (np.abs(along) * readings, along * readings)
     return FREE_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
 
 
 def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
     """(6, N, 3) what readings gain by cubes along x, y, z and squares along x, y, z that are full scale at full scale.
 
-    As `curvature`.
+    As `curvature`; F holds at the speed `true_at_rad_s`.
     """
     readings = rates_rad_s @ matrix.T
     along = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s

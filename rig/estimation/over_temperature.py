@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, walking_bias_process
+from rig.estimation.bias_process import BiasProcess, bias_process, walking
 from rig.estimation.coverage import coverage_factors, effective_freedom
 from rig.estimation.refusals import check_finite
 
@@ -32,6 +32,7 @@ MIN_RANGE_C = 10.0
 LAG_STD_S = 10.0  # of a thermometer behind what it is beside, before the readings say more; assumed
 EACH_WAY = 0.2  # of the observations, warming and cooling, that tell a loop
 STANDING_K_S = 0.1 / 60  # slower, it counts as going on the way it went before
+AS_GOOD_AS_EQUAL = 0.03  # in two places, of the largest of all
 STEPS = 6  # of Gauss and Newton: the model is linear but for products of small numbers
 COEFFICIENTS = 6 * (HIGHEST + 1)  # scale of order 0 xyz, of order 1 xyz, …, then the bias
 
@@ -85,7 +86,6 @@ class OverTemperature:
     `lag_s` and `lag_std_s` are the thermometer's, `hysteresis` (6,) how far a warming sensor is from the mean of both
     ways in the middle of the range, and its standard deviation; None where it did not go both ways.
     `zero` (3,) is what the axes read at the reference where nothing is felt.
-    `centre` (2, 3, 3) are the mean powers (orders 1 to 3, by axis) at which k and c are uncorrelated with their mean.
     """
 
     reference_c: float
@@ -94,7 +94,6 @@ class OverTemperature:
     scale: Array
     bias: Array
     lines: tuple[Line, ...]
-    centre: Array
     zero: Array
     lag_s: float
     lag_std_s: float
@@ -193,7 +192,7 @@ def over_temperature(seen: Repeated, reference_c: float, gradient_k: float) -> O
         lines.append(Line(HYSTERESIS, "A", "rectangular", "half of what warming and cooling differ by", np.inf,
                           fits.in_units(_of_loop(*loop))))  # fmt: skip
     found = OverTemperature(
-        reference_c, range_c, best, scale, bias, tuple(lines), centre, fits.zero, chosen.lag_s, chosen.lag_std_s,
+        reference_c, range_c, best, scale, bias, tuple(lines), fits.zero, chosen.lag_s, chosen.lag_std_s,
         None if loop is None else (loop[0] * fits.in_scale, loop[1] * fits.in_scale), fits.process, fits.repeats,
     )  # fmt: skip
     return replace(found, lines=(*lines, _gradient(found, gradient_k)))
@@ -299,8 +298,8 @@ class _Fits:
         design = np.column_stack([places, some, *turned, *([self.loop] if self.both_ways else [])])
         basis, sizes, _ = np.linalg.svd(design, full_matrices=False)
         design = basis[:, sizes > 1e-9 * sizes[0]]
-        return walking_bias_process(
-            design, self.left, seen.variances, seen.windows_s, instability_rad_s=seen.instability
+        return bias_process(
+            design, self.left, seen.variances, seen.windows_s, instability_rad_s=seen.instability, chosen=walking
         )
 
     def solve(self, orders: tuple[int, int]) -> _Fit:
@@ -458,7 +457,7 @@ def _repeated_often(seen: Repeated) -> Repeated:
     )  # fmt: skip
 
 
-def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> NDArray[np.intp]:
+def places_of(felt: Array, beside: Array) -> NDArray[np.intp]:
     """(N,) numbers of places: what was felt (N, 3), and what else stood there (N, q), as good as equal in each."""
 
     def scaled(columns: Array) -> Iterator[Array]:
@@ -468,7 +467,7 @@ def places_of(felt: Array, beside: Array, tolerance: float = 0.03) -> NDArray[np
     rows = np.column_stack([*scaled(felt), *scaled(beside)])
     found, seen = np.empty(len(rows), dtype=np.intp), list[Array]()
     for i, row in enumerate(rows):
-        near = [k for k, each in enumerate(seen) if np.abs(row - each).max() < tolerance]
+        near = [k for k, each in enumerate(seen) if np.abs(row - each).max() < AS_GOOD_AS_EQUAL]
         if not near:
             seen.append(row)
         found[i] = near[0] if near else len(seen) - 1

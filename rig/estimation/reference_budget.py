@@ -14,7 +14,7 @@ import numpy as np
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError, effects, whitening_with
-from rig.estimation.budget import NOISE, Budget, Contributor
+from rig.estimation.budget import NOISE, Budget, Contributor, found
 from rig.estimation.coverage import COVERAGE_FACTOR, effective_freedom
 from rig.estimation.reference_model import BIAS, SECOND, F, covariance_bound, jacobian
 from rig.estimation.sensor_axes import parameter_jacobian
@@ -113,8 +113,8 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     """What the readings tell, how well the reference's size is known, and what else there is."""
     noise = spread.response @ spread.noise @ spread.response.T
     told = [
-        _found(NOISE, "scatter of the readings", noise, spread.known_noise),
-        _found(
+        found(NOISE, "scatter of the readings", noise, spread.known_noise),
+        found(
             ATTITUDES,
             "what the readings say of them",
             spread.covariance - noise,
@@ -124,9 +124,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     beyond = spread.chi_square / max(spread.freedom, 1) - 1.0
     if spread.freedom > 0 and beyond > 0.0:
         left = beyond * spread.covariance
-        told.append(
-            _found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom))
-        )
+        told.append(found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom)))
     return Budget((*told, _of_size(spread.scale, size), *others), by_freedom=spread.noise_freedom is not None)
 
 
@@ -143,10 +141,6 @@ def _of_size(scale: Array, size: KnownSize) -> Contributor:
     shown = size.relative * size.per_unit
     spread = np.outer(along, along) * std**2
     return Contributor(size.name, "B", distribution, shown, size.unit, size.source, np.inf, spread)
-
-
-def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
-    return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
 
 
 def freedom_of(error: AttitudeError) -> float:

@@ -70,10 +70,10 @@ def by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
     return p - gamma * q, steps
 
 
-def by_algorithm_1(p: Array, q: Array, tolerance: float = ALGORITHM_1_TOLERANCE) -> tuple[Array, int]:
+def by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
     """β (6,) and the number of passes by SIX, Algorithm 1, as published.
 
-    β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ `tolerance`; the first β is
+    β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is
     pass 1. Each pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (the paper's "β0 < 0.5"
     is that at 1 rad/s). Raises Fault `algorithm_1_diverged` as soon as a step grows.
     """
@@ -82,7 +82,7 @@ def by_algorithm_1(p: Array, q: Array, tolerance: float = ALGORITHM_1_TOLERANCE)
         gamma = float(np.sum(beta[3:] ** 2 / (4 * beta[:3]))) if beta[:3].all() else np.inf
         improved = p - gamma * q
         change = float(np.sum(np.abs(improved - beta)))
-        if change <= tolerance:
+        if change <= ALGORITHM_1_TOLERANCE:
             return improved, passes
         if not change < last_change:
             break

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.refusals import check_finite, check_handedness, require_shape
 from rig.estimation.sensor_axes import SensorAxes
 
@@ -38,14 +38,12 @@ def alignment(
     The two are taken to be independent: what an arm's error does to both alike is counted twice. Raises Fault
     `not_finite`, `mirrored_axis`; ValueError for a wrong shape.
     """
-    from scipy.spatial.transform import Rotation
-
     of_gyroscope, gyroscope_turns = _frame(gyroscope, gyroscope_covariance)
     of_accelerometer, accelerometer_turns = _frame(accelerometer, accelerometer_covariance)
     rotation = of_accelerometer @ of_gyroscope.T
     return Alignment(
         rotation=rotation,
-        vector_rad=np.asarray(Rotation.from_matrix(rotation).as_rotvec(), dtype=np.float64),
+        vector_rad=rotation_vectors(rotation),
         covariance_rad2=accelerometer_turns + rotation @ gyroscope_turns @ rotation.T,
     )
 

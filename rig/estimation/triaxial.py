@@ -15,6 +15,7 @@ noise σ shrinks F⁻¹ by about (σ/v_rms)², however many readings there are; 
 (`rig.estimation.attitude_error`), and says how far off they are.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -219,14 +220,23 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
 
 def _check_attitudes(start: Array, placed: Placed, fit: AttitudeWeighted) -> None:
     """Raises Fault where attitudes are off: all, or the one that fits worst where enough others are left to tell."""
-    off = fit.attitude_error.std_rad
-    said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
-    if off > SUSPICIOUS_RAD and 3 * (len(placed.readings) - 1) > len(start) + 3:
-        worst, by, expected = furthest_off(start, placed, fit)
+    enough = 3 * (len(placed.readings) - 1) > len(start) + 3
+    check_trustworthy(fit.attitude_error.std_rad, lambda: furthest_off(start, placed, fit), enough=enough)
+
+
+def check_trustworthy(off_rad: float, furthest: Callable[[], tuple[int, float, float]], *, enough: bool) -> None:
+    """Raises Fault `attitude_untrustworthy` where attitudes are off by so much each, or the `furthest` by far more.
+
+    `furthest` gives the place of that one, by how much the others say it is off, and how far off they are, rad; it is
+    asked where `enough` others are left to tell.
+    """
+    said = f"the readings say that the attitudes are off by {1e3 * off_rad:.2g} mrad each"
+    if off_rad > SUSPICIOUS_RAD and enough:
+        worst, by, expected = furthest()
         if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
+            off_rad = by
             said = (
                 f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
             )
-            off = by
-    if off > UNTRUSTWORTHY_RAD:
+    if off_rad > UNTRUSTWORTHY_RAD:
         raise refusals.untrustworthy(said)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, expected_bias_process
+from rig.estimation.bias_process import BiasProcess, bias_process
 from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
 from rig.estimation.own_errors import KnownSensor, OwnError, own_errors
@@ -219,7 +219,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None, pr
     steady, errors = solve(None)
     known, own = of_arm_and_speeds(steady.matrix), seen.own_patterns(steady.matrix)
     of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
-    bias = process or expected_bias_process(
+    bias = process or bias_process(
         design_matrix(seen.rates_rad_s, gravity_m_s2),
         seen.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(known)], known),
         seen.variances_rad2_s2 + of_the_speeds,

@@ -21,7 +21,8 @@ def beyond_u(changes: Iterable[Change]) -> list[Change]:
 def change_in_short(change: Change) -> str:
     """The change of one parameter in as few words as a line has room for; U is that of such a change."""
     name = name_in_words(change.name).removeprefix("the ")
-    return f"{name} changed by {_size(change)}, {_times(change)} U"
+    times = f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
+    return f"{name} changed by {_size(change)}, {times} U"
 
 
 def name_in_words(name: str) -> str:
@@ -31,10 +32,6 @@ def name_in_words(name: str) -> str:
     if name in BIASES:
         return f"the bias of {name[1]}"
     return next((each.parameters[name] for each in every_characteristic() if name in each.parameters), name)
-
-
-def _times(change: Change) -> str:
-    return f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
 
 
 def _size(change: Change) -> str:

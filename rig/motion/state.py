@@ -69,19 +69,9 @@ class State(Protocol):
     def q_rad(self) -> Joints: ...
     @property
     def qd_rad_s(self) -> Joints: ...
-    @property
-    def at_rest(self) -> bool:
-        """Whether no joint moves."""
-        ...
-
     def to_record(self) -> Row:
         """The values in the order of `state_dtype`: called for every state, hundreds of times a second."""
         ...
-
-
-def stand_still(qd_rad_s: Joints) -> bool:
-    """Whether joints of these speeds stand still."""
-    return max(map(abs, qd_rad_s), default=0.0) < REST_SPEED_RAD_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +82,6 @@ class JointState:
     host_time_s: float
     q_rad: Joints
     qd_rad_s: Joints
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether no joint moves."""
-        return stand_still(self.qd_rad_s)
 
     def to_record(self) -> Row:
         """The values in the order of `state_dtype`, of at least one joint."""
@@ -173,7 +158,7 @@ class ArmState:
     @property
     def at_rest(self) -> bool:
         """Whether no joint moves."""
-        return stand_still(self.qd_rad_s)
+        return max(map(abs, self.qd_rad_s)) < REST_SPEED_RAD_S
 
 
 _IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(each.name for each in fields(ArmState)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.averaging import dwelling_of
-from rig.observation.known_motion import Motion
 from rig.observation.mean import Mean
 from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Dwelt, Window, dwelt
 
@@ -37,7 +38,7 @@ class DwellReading:
 
 
 def dwell_readings(
-    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds, superseded: Collection[int] = ()
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> Iterator[DwellReading]:
     """Every finished dwell of a recording whose index is not in `superseded`, of a sensor with accelerations.
 
@@ -49,18 +50,13 @@ def dwell_readings(
 
 
 def each_dwell(
-    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> dict[int, DwellReading | Fault]:
     """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
     if not stream.sensor.measures(ACCELERATION):
         return {}
-    found: dict[int, DwellReading | Fault] = {}
-    for each in dwelt(run):
-        try:
-            found[each.dwell.index] = _dwell_reading(run, stream, motion, each, settings)
-        except Fault as fault:
-            found[each.dwell.index] = fault
-    return found
+    read = partial(_dwell_reading, run, stream, motion, settings=settings)
+    return {each.dwell.index: or_fault(partial(read, each)) for each in dwelt(run)}
 
 
 def accelerations(stream: Stream, inside: slice) -> Array:
@@ -97,7 +93,7 @@ def _is_noisy(stream: Stream) -> bool:
 
 
 def _dwell_reading(
-    run: RunData, stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds
 ) -> DwellReading:
     dwell, window = finished.dwell, without_leaving(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
@@ -126,7 +122,7 @@ def without_leaving(run: RunData, finished: Dwelt) -> Dwelt:
     return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 
 
-def _check_standing(motion: Motion, window: Window, where: str) -> None:
+def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
     moved_rad = motion.moved_rad(window)
     if moved_rad is None:
         raise Fault(

@@ -33,7 +33,7 @@ ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicula
 
 
 class ArmMotion:
-    """A `Motion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
+    """The `KnownMotion` of a chain of k joints: `angles(t)` (n, k) rad of them, `rate(t)` (n, 3) rad/s of the flange.
 
     Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
     counts is when the joint was where. `states` (m,) are rows as `state_dtype` has them, of joints of that `kinematics`

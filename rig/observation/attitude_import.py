@@ -17,6 +17,7 @@ board's is on the arm (`rig.observation.timebase`).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,17 +25,17 @@ from numpy.typing import NDArray
 
 from rig.data.motion_file import MOTIONS
 from rig.data.quantity import RATE, Quantity
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
+from rig.observation.csv_windows import MIN_SAMPLES, check_complete, overlapping, scatter_of
 from rig.observation.fixes import Turning
 from rig.observation.placements import Placements, find_placements
 from rig.observation.sample_files import attitudes_in
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
@@ -102,11 +103,12 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
     whole = said.of(_whole(said.windows, counts.tolist(), float(np.median(np.diff(time_s)))))
     rate = readings.get(RATE)
+    place = partial(find_placements, time_s, readings, whole.windows, whole.attitudes, whole.std_rad)
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
         None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
-        None if set(readings) == {RATE} else _placements(time_s, readings, whole),
+        None if set(readings) == {RATE} else or_fault(place),  # a gyroscope needs none
         clock,
     )
 
@@ -127,14 +129,6 @@ class _Said:
     def of(self, rows: NDArray[np.intp]) -> "_Said":
         rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
         return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std)
-
-
-def _placements(time_s: Array, readings: Mapping[Quantity, Array], fixes: _Said) -> Placements | Fault:
-    """A gyroscope needs none."""
-    try:
-        return find_placements(time_s, readings, fixes.windows, fixes.attitudes, fixes.std_rad)
-    except Fault as fault:
-        return fault
 
 
 def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:

@@ -28,10 +28,10 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import average_of, check_complete, check_reads, check_times, inside, overlapping
+from rig.observation.csv_windows import average_of, check_complete, check_reads, check_times, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.turns import Known, TurnedData, turned
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")

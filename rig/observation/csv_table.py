@@ -99,7 +99,7 @@ def _rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
             for row in rows:
                 yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
-        raise _unreadable(path, str(error)) from error
+        raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
 
 
 def _text(file: BinaryIO) -> TextIOWrapper:
@@ -136,10 +136,6 @@ def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
         if most < 0:
             raise UnfitFile("what is packed in it is too long")
         yield line
-
-
-def _unreadable(path: Path, why: str) -> Refused:
-    return Refused("no_file", f"{path} cannot be read: {why}", "Give a CSV file")
 
 
 def _check_headings(path: Path, headings: Sequence[str]) -> None:

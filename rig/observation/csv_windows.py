@@ -56,12 +56,6 @@ def overlapping(windows: Sequence[Window]) -> tuple[int, int] | None:
     return None
 
 
-def inside(time_s: Array, window: Window) -> slice:
-    """The samples of a window."""
-    start, end = np.searchsorted(time_s, [window.start_s, window.end_s]).tolist()
-    return slice(start, end)
-
-
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     """Variance of the mean of readings (n, 3), its degrees of freedom, and the standard deviation of one, (3,) each.
 

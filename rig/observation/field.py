@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.channel import Channel
@@ -16,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading, check_complete
 from rig.observation.mean import Held, Mean, even_mean
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested
+from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
 SETTLING_S = 0.2  # kept away from either end of a rest
@@ -58,8 +57,8 @@ def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thre
 
     Raises Fault `lost_samples`, `saturation`.
     """
-    inside = _inside(run.samples[name], time_s, dwell.window)
-    return _mean(run.sensors[name].channel(FIELD), inside, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
+    samples = _samples(run, name, time_s, dwell.window)
+    return _mean(run.sensors[name].channel(FIELD), samples, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
 
 
 def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
@@ -68,8 +67,8 @@ def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReadin
     if other is not None:
         time_s, channel = recording.time_s(name, other), recording.run.sensors[name].channel(FIELD)
         for dwell in recording.sensors[other].dwells:
-            inside = slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())
-            yield dwell, channel.counts(recording.run.samples[name])[inside], time_s[inside]
+            held = inside(time_s, dwell.window)
+            yield dwell, channel.counts(recording.run.samples[name])[held], time_s[held]
 
 
 def field_tests(
@@ -82,17 +81,15 @@ def field_tests(
     other = beside(recording, name)
     if other is None:
         return ()
-    channel, inside = (
-        recording.run.sensors[name].channel(FIELD),
-        partial(_inside, recording.run.samples[name], recording.time_s(name, other)),
-    )
+    channel, time_s = recording.run.sensors[name].channel(FIELD), recording.time_s(name, other)
+    samples = partial(_samples, recording.run, name, time_s)
     windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
     return tuple(
-        _mean(channel, inside(window), f"a field test of {name}", thresholds)
+        _mean(channel, samples(window), f"a field test of {name}", thresholds)
         for window in windows
         if window.end_s > window.start_s
         and _at_home(recording, window, home_q_rad)
-        and len(inside(window)) >= MIN_SAMPLES_AT_REST
+        and len(samples(window)) >= MIN_SAMPLES_AT_REST
     )
 
 
@@ -101,18 +98,18 @@ def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) 
     return away_rad is not None and away_rad < AT_HOME_RAD
 
 
-def _mean(channel: Channel, inside: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
-    check_complete(inside, where, thresholds)
-    if channel.saturated(inside).any():
+def _mean(channel: Channel, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
+    check_complete(samples, where, thresholds)
+    if channel.saturated(samples).any():
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",
             "Choose a wider range_gauss, or take away the iron beside it",
         )
-    return even_mean(channel.values(inside), channel.resolution)
+    return even_mean(channel.values(samples), channel.resolution)
 
 
-def _inside(samples: NDArray[Any], time_s: Array, window: Window) -> NDArray[Any]:
-    """The samples (n,) in a window of the arm's clock, by their times (n,) on it."""
-    inside: NDArray[Any] = samples[slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())]
-    return inside
+def _samples(run: RunData, name: str, time_s: Array, window: Window) -> NDArray[Any]:
+    """The samples (n,) of a sensor in a window of the arm's clock, by the times (N,) of all of them on it."""
+    samples: NDArray[Any] = run.samples[name]
+    return samples[inside(time_s, window)]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Fault
-from rig.estimation.arrays import Array
-from rig.estimation.attitude_drift import Fixes, rotation_vectors
+from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.attitude_drift import Fixes
 
 WINDOW_S, SHORTEST_S = (
     1.0,

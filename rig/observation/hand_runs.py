@@ -16,7 +16,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import Handled, Move, Rest, Told
+from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of, nearest_face
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
@@ -177,6 +177,5 @@ def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSenso
 
 def turned_face(face: str, rotation: Array) -> Face:
     """The face whose axis is that of `face` after a `rotation` (3, 3) to other axes, as near as they have one."""
-    axis = (1.0 if face[0] == "+" else -1.0) * rotation[:, "xyz".index(face[1])]
-    name = ("+" if axis[np.argmax(np.abs(axis))] > 0 else "-") + "xyz"[int(np.argmax(np.abs(axis)))]
+    name = nearest_face(rotation @ axis_of(face))
     return next(each for each in FACES if each == name)

@@ -5,12 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.motion.steps import Sweep
-from rig.observation.revolution import Revolution
-from rig.observation.windows import Window
 
 MIN_RATE_RAD_S = 0.01  # slower all the time, nothing has turned
 MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
@@ -33,26 +29,6 @@ class KnownMotion(Protocol):
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """(n,) where looks follow each other closely enough for `rate` to be true."""
-        ...
-
-
-class Motion(KnownMotion, Protocol):
-    """A body's turning that sweeps, rests and dwells are observed by; the base is what stands still."""
-
-    def attitude(self, start_s: float, end_s: float) -> Array:
-        """(3, 3) the mean rotation from the base's axes into the body's between two times."""
-        ...
-
-    def moved_rad(self, window: Window) -> float | None:
-        """How far it was moved in a window: nearly nothing where it stood; None where too few looks tell."""
-        ...
-
-    def angle(self, sweep: Sweep, time_s: Array | float, derivative: int = 0) -> Array:
-        """(n,) rad that it has turned by about a sweep's axis, at times (n,); with `derivative` 1 its rate, rad/s."""
-        ...
-
-    def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
-        """The whole turn or the arc of a sweep made in a window. Raises Fault where there is none, or no proper one."""
         ...
 
 

@@ -12,21 +12,22 @@ Nothing doubtful is averaged: whatever does not belong into a calibration raises
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_beside_lines import turned_beside
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
 from rig.observation.averaging import Averaging, Passing, averaging_of
-from rig.observation.known_motion import Motion
 from rig.observation.lines import turning
 from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
@@ -89,7 +90,7 @@ class SensorObservations:
 
 
 def observe_sensor(
-    run: RunData, sensor: str, motion: Motion, settings: ObservationThresholds, superseded: Collection[int] = ()
+    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
     """Average every finished sweep of a recording, in which the arm moved by `motion`.
 
@@ -125,16 +126,11 @@ def observe_sensor(
 
 
 def each_sweep(
-    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> dict[int, Observation | Fault]:
     """Every finished sweep's observation, or why there is none, by the sweep's index."""
-    found: dict[int, Observation | Fault] = {}
-    for finished in swept(run):
-        try:
-            found[finished.sweep.index] = _revolution(run, stream, motion, finished, settings)
-        except Fault as fault:
-            found[finished.sweep.index] = fault
-    return found
+    seen = partial(_revolution, run, stream, motion, settings=settings)
+    return {each.sweep.index: or_fault(partial(seen, each)) for each in swept(run)}
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:
@@ -153,13 +149,13 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
     check_dwells(dwells, run.settings.site)
 
 
-def rests_of(run: RunData, stream: Stream, motion: Motion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
+def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """The rests in which the arm stood still for long enough, without those beside a step in `superseded`."""
     found = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 
-def standing(motion: Motion, rest: Window) -> Window | None:
+def standing(motion: ArmMotion, rest: Window) -> Window | None:
     """A rest without its beginning and its end; None where the arm moved in it or too few states tell."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.moved_rad(still)
@@ -167,7 +163,7 @@ def standing(motion: Motion, rest: Window) -> Window | None:
 
 
 def _revolution(
-    run: RunData, stream: Stream, motion: Motion, finished: Finished, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = motion.turn(finished.sweep, finished.window, settings)
     averaging = averaging_of(run.settings)
@@ -194,7 +190,7 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _placed(average: Average, motion: Motion) -> Average:
+def _placed(average: Average, motion: ArmMotion) -> Average:
     return replace(average, attitude=motion.attitude(average.start_s, average.end_s))
 
 
@@ -204,7 +200,7 @@ def _drifting(average: Average, drift: Array) -> Average:
 
 def _observation(
     stream: Stream,
-    motion: Motion,
+    motion: ArmMotion,
     sweep: Sweep,
     turn: Revolution,
     settings: ObservationThresholds,
@@ -258,7 +254,7 @@ def _observation(
     )
 
 
-def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averaging) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     still = standing(motion, window)
     if still is None:

@@ -13,7 +13,7 @@ from rig.observation.acceleration import check_complete, without_leaving
 from rig.observation.mean import Mean, even_mean
 from rig.observation.observed_run import ObservedRun
 from rig.observation.placements import Placements, Rested
-from rig.observation.windows import Dwelt, Window, dwelt
+from rig.observation.windows import Dwelt, Window, dwelt, inside
 
 NO_REST = Rested({}, {}, {}, (), ())
 
@@ -54,8 +54,7 @@ def _mean(
 ) -> Mean:
     where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"
     channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
-    inside = slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())
-    samples = recording.run.samples[name][inside]
+    samples = recording.run.samples[name][inside(time_s, dwell.window)]
     check_complete(samples, where, thresholds)
     if channel.saturated(samples).any():
         raise Fault("saturation", f"in {where} the {quantity} is beyond the sensor's range", "Choose a wider range")

@@ -15,10 +15,10 @@ from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
-from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
+from rig.observation.csv_windows import MIN_SAMPLES, scatter_of
 from rig.observation.mean import Mean
 from rig.observation.rests import BLOCK_S, find_rests
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned about what it feels
 

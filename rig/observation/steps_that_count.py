@@ -7,9 +7,8 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading, each_dwell
-from rig.observation.arm_motion import motion_of
+from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Stream, between, on_the_arms_clock
-from rig.observation.known_motion import Motion
 from rig.observation.observe import check_feeling, each_sweep, rests_of
 from rig.observation.windows import Window, finished_dwells, finished_sweeps
 
@@ -36,7 +35,7 @@ def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     return frozenset.intersection(*sound)
 
 
-def _sound_for(run: RunData, sensor: str, motion: Motion, settings: ObservationThresholds) -> frozenset[int]:
+def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
     """Sweeps and dwells that a sensor read soundly: none if it once did not feel the arm; since when nobody knows."""
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)

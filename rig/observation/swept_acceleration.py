@@ -6,9 +6,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import accelerations, check_acceleration
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.averaging import Averaging
-from rig.observation.known_motion import Motion
 from rig.observation.revolution import Revolution, describe
 
 
@@ -31,7 +31,7 @@ class SweptAcceleration:
 
 
 def swept_acceleration(
-    stream: Stream, motion: Motion, sweep: Sweep, turn: Revolution, averaging: Averaging
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, averaging: Averaging
 ) -> SweptAcceleration:
     """What one sweep's revolution tells, beside what swings in it.
 

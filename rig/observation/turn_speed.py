@@ -20,7 +20,7 @@ CLOSE = 1e-12  # of the period, between two steps
 
 @dataclass(frozen=True, slots=True)
 class TurnSpeed:
-    """The mean speed of whole turns, its standard deviation, and how many places of the shaft it rests on.
+    """The mean speed of whole turns and its standard deviation.
 
     `speed_rad_s` has the sign of the turning. `period_s` is the time of one turn.
     """
@@ -28,7 +28,6 @@ class TurnSpeed:
     speed_rad_s: float
     speed_std_rad_s: float
     period_s: float
-    places: int
 
 
 def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnSpeed:
@@ -68,7 +67,7 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
             break
     std_s = _std_of_mean(first_s + period_s, time_s, beyond(period_s)) / rate_rad_s
     speed_rad_s = TURN_RAD / period_s
-    return TurnSpeed(way * speed_rad_s, speed_rad_s * std_s / period_s, period_s, places)
+    return TurnSpeed(way * speed_rad_s, speed_rad_s * std_s / period_s, period_s)
 
 
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:

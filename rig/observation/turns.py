@@ -12,10 +12,10 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.known_turns import Gyroscope, Mean, Turn
 from rig.observation.average import Average
-from rig.observation.csv_windows import average_of, inside
+from rig.observation.csv_windows import average_of
 from rig.observation.observe import Observation, bias_drift
 from rig.observation.rests import find_rests
-from rig.observation.windows import Window
+from rig.observation.windows import Window, inside
 
 REACH_S = 0.5  # between a turn's end, as somebody marked it, and the rest that it belongs to
 EDGE_SAMPLES = 2  # either side of an end

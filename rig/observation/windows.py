@@ -4,6 +4,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from rig.data.events import (
     DwellFinished,
     DwellStarted,
@@ -14,6 +16,7 @@ from rig.data.events import (
     SweepStarted,
 )
 from rig.data.run_file import RunData
+from rig.estimation.arrays import Array
 from rig.motion.steps import Dwell, Sweep
 
 MAX_TRAVEL_AT_REST_RAD = 1e-3  # of any joint, while it stands
@@ -27,6 +30,11 @@ class Window:
 
     start_s: float
     end_s: float
+
+
+def inside(time_s: Array, window: Window) -> slice:
+    """The samples of a window among those at rising times (n,)."""
+    return slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,9 +91,9 @@ def asked_next(left: Open, face: Face | None) -> Instruction | None:
     return Instruction("lay", next(iter([*firsts, *left.faces, *(_side(axis) for axis, _ in left.turns)])))
 
 
-def listed(wanted: Wanted, face: Face = "+z") -> Iterator[Instruction]:
-    """What is asked for, one after the other, of somebody who does it and begins with that side up."""
-    taken, seen = list[HandMove](), [face]
+def listed(wanted: Wanted) -> Iterator[Instruction]:
+    """What is asked for, one after the other, of somebody who does it and begins with +z up."""
+    taken, seen = list[HandMove](), list[Face](["+z"])
     while (asked := asked_next(still_open(wanted, taken, seen), seen[-1])) is not None:
         yield asked
         flip = asked.say == "lay"

@@ -15,8 +15,8 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.by_hand.session import nearest_face
 from rig.motion.steps import Stage
-from rig.observation.observe import nearest_axis
 
 REST_S = 1.0  # of readings that show whether it is at rest
 PARTS = 5
@@ -75,8 +75,8 @@ def refuse_hanging_otherwise(felt: Felt, stage: Stage, up_flange: Array) -> None
     if _apart(found, stated) > ASKEW_RAD:
         raise Refused(
             "mounted_otherwise",
-            f"by the accelerometer of {felt.name} the item's {_axis(found)} axis points up, "
-            f"by the stage's mounting its {_axis(stated)} axis",
+            f"by the accelerometer of {felt.name} the item's {nearest_face(found)} axis points up, "
+            f"by the stage's mounting its {nearest_face(stated)} axis",
             remedy(stage),
         )
 
@@ -90,11 +90,11 @@ def refuse_turning_otherwise(felt: Felt, resting_rad_s: Array, stage: Stage, tur
     stated = np.array(stage.mount) @ turn_flange_rad
     found = felt.mounting.T @ turned
     share = float(np.linalg.norm(found) / np.linalg.norm(stated))
-    said = f"in the {what} {felt.name} is turned about the item's {_axis(stated)} axis by the stage's mounting"
+    said = f"in the {what} {felt.name} is turned about the item's {nearest_face(stated)} axis by the stage's mounting"
     if not SHARES[0] < share < SHARES[1]:
         how = f"but reads {degrees(np.linalg.norm(found)):.1f}° of {degrees(np.linalg.norm(stated)):.1f}°"
     elif _apart(found, stated) > ASKEW_RAD:
-        how = f"but reads a turn about its {_axis(found)} axis"
+        how = f"but reads a turn about its {nearest_face(found)} axis"
     else:
         return
     raise Fault("mounted_otherwise", f"{said}, {how}", remedy(stage))
@@ -108,8 +108,3 @@ def remedy(stage: Stage) -> str:
 def _apart(one: Array, other: Array) -> float:
     cosine = float(one @ other / (np.linalg.norm(one) * np.linalg.norm(other)))
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-
-
-def _axis(direction: Array) -> str:
-    axis, sign = nearest_axis(direction)
-    return f"{'+' if sign > 0 else '-'}{axis}"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.motion.steps import Sweep
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
@@ -65,13 +66,7 @@ class BoardCalibration:
 
     def revolutions(self, sweep: Sweep) -> dict[str, Revolution | Fault]:
         """When the revolution was for each sensor, just after it, or why none was found; that may take seconds."""
-        found: dict[str, Revolution | Fault] = {}
-        for name in self.sensors:
-            try:
-                found[name] = self._revolution(name, sweep)
-            except Fault as error:
-                found[name] = error
-        return found
+        return {name: or_fault(partial(self._revolution, name, sweep)) for name in self.sensors}
 
     @contextmanager
     def looking(self, sweep: Sweep) -> Iterator["Future[dict[str, Revolution | Fault]]"]:

@@ -67,9 +67,9 @@ class Sweep:
         return self.noise_rad_s**2 / self.samples
 
 
-def samples_in_a_turn(speed_rad_s: float, rate_hz: float = RATE_HZ) -> int:
+def samples_in_a_turn(speed_rad_s: float) -> int:
     """How many samples fall into one revolution."""
-    return round(rate_hz * 2 * np.pi / speed_rad_s)
+    return round(RATE_HZ * 2 * np.pi / speed_rad_s)
 
 
 def whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> Sweep:

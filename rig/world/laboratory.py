@@ -29,7 +29,6 @@ from rig.world.turning import Turning
 from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.on_arm import OnArm
 from rig.world.ur10e.robot import Robot
-from rig.world.ur10e.true_arm import TrueArm
 
 
 class Laboratory:
@@ -73,13 +72,6 @@ class Laboratory:
         return self.turning
 
     @property
-    def servo(self) -> ServoBench:
-        """The servo that turns the sensors. Raises TypeError where something else does."""
-        if not isinstance(self.turning, ServoBench):
-            raise TypeError("no servo turns the sensors in this laboratory")
-        return self.turning
-
-    @property
     def operator(self) -> Operator:
         """Whose hand turns the sensors. Raises TypeError where something else does."""
         if not isinstance(self.turning, Operator):
@@ -90,11 +82,6 @@ class Laboratory:
     def robot(self) -> Robot:
         """The arm's controller. Raises TypeError as `on_arm`."""
         return self.on_arm.robot
-
-    @property
-    def arm(self) -> TrueArm:
-        """The arm as it is. Raises TypeError as `on_arm`."""
-        return self.on_arm.arm
 
     @property
     def _time_s(self) -> float:

@@ -11,7 +11,7 @@ from math import cos, radians, sin, sqrt
 from rig.config.world_magnetism import IronSection
 from rig.config.world_models import SiteSection
 from rig.world.site import Vector, in_base
-from rig.world.ur10e.forward_kinematics import Rotation
+from rig.world.ur10e.forward_kinematics import Rotation, turned
 from rig.world.ur10e.links import LINKS
 
 MU_0_OVER_4_PI = 1e-7  # T m/A
@@ -49,7 +49,7 @@ class Dipole:
     def at(self, place_m: Vector, frames: Frames) -> Vector:
         """The iron's flux density in tesla at a place in the base frame; inside it that at its surface, 1 mm off."""
         rotation, origin = frames[self.carried_by]
-        source, moment = _turned(rotation, self.place_m), _turned(rotation, self.moment_a_m2)
+        source, moment = turned(rotation, self.place_m), turned(rotation, self.moment_a_m2)
         x, y, z = (here - from_base - there for here, from_base, there in zip(place_m, origin, source, strict=True))
         distance = max(sqrt(x * x + y * y + z * z), 1e-3)
         u, v, w = moment
@@ -96,9 +96,3 @@ def magnetic_field_of(section: SiteSection, iron: Sequence[IronSection] = ()) ->
 def _dipole(section: IronSection) -> Dipole:
     x, y, z = (1e-3 * each for each in section.place_mm)
     return Dipole(LINKS.index(section.carried_by), (x, y, z), section.moment_a_m2)
-
-
-def _turned(rotation: Rotation, vector: Vector) -> Vector:
-    x, y, z = vector
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z

@@ -15,11 +15,10 @@ from rig.data.settings import Site
 from rig.estimation.accelerometer_model import OWN_ERRORS, Dwells, Movement, turned
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.expected_sizes import OWN_SHARES
 from rig.estimation.imu import solve_imu
 from rig.estimation.magnetometer import field_drift, uniformity
 from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import BIAS, KnownNorm
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import solve_triaxial
 from rig.plans.recorded import open_run
 from support import drawn_accelerations
@@ -163,22 +162,6 @@ def test_the_readings_tell_how_much_of_what_an_arm_is_off_by_is_new_in_each_dwel
         off.append(error[3:] / budget.std[3:])
     assert least <= np.median(shares) <= most
     assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5  # of 18 values, which scatter by 0.17
-
-
-def test_an_arm_may_be_held_to_be_exact() -> None:
-    session = drawn_accelerations.drawn("adis16465", 0, arm_rad=0.0)
-    movement, gravity = session.movement, drawn_accelerations.GRAVITY
-    solution = solve_imu(
-        movement.dwells,
-        movement.sweeps,
-        gravity_m_s2=gravity,
-        attitude_std_rad=0.0,
-        own=movement.own,
-        arm_turns=movement.arm_turns,
-        own_shares=OWN_SHARES,
-    )
-    off = (solution.bias_m_s2 - session.parameters[3:]) / np.sqrt(np.diag(solution.covariance)[BIAS])
-    assert solution.own_share == 0 and np.abs(off).max() < 4
 
 
 def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:

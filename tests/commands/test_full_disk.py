@@ -13,8 +13,8 @@ from rig.data.run_file import read_run
 from rig.errors import Refused
 from rig.history import engine
 from rig.history.store import open_history
-from rig.observation.observed_run import observe_runs
 from rig.report.exports.formats import OF_READINGS, writer_of_readings
+from rig.report.exports.recorded import exported
 from rig.runner.readings import ReadingsFile
 from support.commands import rig_here
 from support.frozen import RECORDINGS
@@ -54,7 +54,7 @@ def test_the_file_that_is_not_written_is_named_and_not_there(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(OF_READINGS))
 def test_readings_are_exported_whole_or_not_at_all(name: str, tmp_path: Path) -> None:
-    recordings = observe_runs([read_run(RUN / "run.h5")])
+    recordings = exported([read_run(RUN / "run.h5")])
     with full_disk(4000), pytest.raises(OSError, match=str(tmp_path)):
         writer_of_readings(name)(recordings, tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -50,12 +50,11 @@ def test_batches_give_the_numbers_of_single_runs(repeats: int) -> None:
         assert published.iterations[i] == single.iterations
 
 
-def test_runs_may_have_speeds_and_weights_of_their_own() -> None:
+def test_runs_may_have_speeds_of_their_own() -> None:
     means, speeds, _, _ = runs(3, repeats=2)
-    weights = np.random.default_rng(2).uniform(0.5, 2.0, (3, 12))
-    every = newton_batch(means, np.tile(speeds, (3, 1)), weights)
+    every = newton_batch(means, np.tile(speeds, (3, 1)))
     for i in range(3):
-        alone = newton_batch(means[i : i + 1], speeds, weights[i])
+        alone = newton_batch(means[i : i + 1], speeds)
         np.testing.assert_allclose(every.scale[i], alone.scale[0], rtol=1e-12)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, expected_bias_process, walk_covariance
+from rig.estimation.bias_process import BiasProcess, bias_process, walk_covariance
 from rig.estimation.vector_model import VectorSolution, design_matrix, solve_vector_model
 
 STEP_S = 0.02
@@ -54,7 +54,7 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     for _ in range(150):
         wandered, whole = wandering(windows_s, 3e-5, rng)
         means = rates + wandered + np.sqrt(variances) * rng.standard_normal((12, 3))
-        process = expected_bias_process(design_matrix(rates, None), means, variances, windows_s)
+        process = bias_process(design_matrix(rates, None), means, variances, windows_s)
         found = solve(means, rates, variances, process, windows_s)
         std = np.sqrt(np.diag(found.covariance))[3:]
         errors.append((found.bias_rad_s + whole) / std)
@@ -79,7 +79,7 @@ def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be(th
     widths, errors = [], []
     for _ in range(200 if thorough else 80):
         means = rates + np.sqrt(variances) * rng.standard_normal((12, 3))
-        process = expected_bias_process(design_matrix(rates, None), means, variances, windows_s)
+        process = bias_process(design_matrix(rates, None), means, variances, windows_s)
         found = solve(means, rates, variances, process, windows_s)
         best = solve(means, rates, variances, BiasProcess(0.0, 0.0, 24), windows_s)
         std = np.sqrt(np.diag(found.covariance))[3:]
@@ -97,7 +97,7 @@ def test_what_the_sweeps_turn_is_nothing_to_the_walk_that_is_found() -> None:
     variances, rng = np.full((12, 3), 1e-12), np.random.default_rng(4)
     wandered = wandering(windows_s, 3e-6, rng)[0] + 1e-6 * rng.standard_normal((12, 3))
     design = design_matrix(rates, None)
-    still = expected_bias_process(design, wandered, variances, windows_s)
-    turned = expected_bias_process(design, rates + wandered, variances, windows_s)
+    still = bias_process(design, wandered, variances, windows_s)
+    turned = bias_process(design, rates + wandered, variances, windows_s)
     assert turned.walk_rad_s_sqrt_s == pytest.approx(still.walk_rad_s_sqrt_s, rel=1e-7)
     assert turned.scatter_rad_s == pytest.approx(still.scatter_rad_s, rel=1e-7)

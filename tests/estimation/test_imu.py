@@ -142,7 +142,7 @@ def test_without_noise_the_truth_comes_back(design: Design, second_order: bool) 
         read, count = predicted(theta, Movement(dwells, sweeps)), len(dwells.readings_m_s2)
         dwells = replace(dwells, readings_m_s2=read[:count])
         sweeps = replace(sweeps, harmonics_m_s2=read[count:].reshape(-1, 3, 3))
-    solution = solve(dwells, sweeps, second_order=second_order, attitude_std_rad=0.0)
+    solution = solve(dwells, sweeps, second_order=second_order)
     np.testing.assert_allclose(found(solution, truth)[:19], theta[:19], atol=3e-7)
     assert solution.rank == 14 + (4 if design[0] else 0) + (3 if second_order else 0)
     if second_order:

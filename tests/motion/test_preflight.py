@@ -50,8 +50,6 @@ REPORT = ArmReport(
     serial_number="20265500123",
     remote_control=True,
     program_running=False,
-    payload_kg=0.0,
-    payload_centre_m=(0.0, 0.0, 0.0),
     state=READY,
 )
 

@@ -79,8 +79,6 @@ def report(q_rad: Joints) -> ArmReport:
         serial_number="20225500001",
         remote_control=True,
         program_running=False,
-        payload_kg=0.35,
-        payload_centre_m=(0.0, 0.0, 0.025),
         state=state(0.0, q_rad, (0.0,) * 6),
         called="UR10",
         model="UR10e or UR12e",

@@ -147,7 +147,7 @@ def test_gravity_is_that_of_where_the_arm_stands_when_nobody_looked_on_the_way()
     one.laboratory.unplug()
     stand(one, TILTED)
     sensor = SensorTruth(SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"}), SIMULATED)
-    felt = one.laboratory.arm.felt_at(one.laboratory.robot.time_s)
+    felt = one.laboratory.on_arm.arm.felt_at(one.laboratory.robot.time_s)
     assert sensor.motion(felt)[3:] == pytest.approx(chain(TILTED)[:3, :3].T @ [0, 0, 1], abs=1e-9)
 
 
@@ -375,7 +375,7 @@ def test_a_vibration_that_encoders_see_is_in_their_angles_and_speeds_as_sensors_
 def test_a_vibration_that_encoders_see_is_felt_when_they_see_it() -> None:
     """Standing and turning."""
     one = laboratory(arm={"vibration_seen_rms_rad_s": 0.05, "vibration_seen_hz": 11})
-    robot, arm = one.laboratory.robot, one.laboratory.arm
+    robot, arm = one.laboratory.robot, one.laboratory.on_arm.arm
     for speed_rad_s in (0.0, 1.0):
         turning(one, 5, speed_rad_s)
         for _ in range(50):

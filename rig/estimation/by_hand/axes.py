@@ -4,7 +4,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import Handled
+from rig.estimation.by_hand.session import Handled, nearest_face
 from rig.estimation.refusals import MAX_SCALE
 
 SIDEWAYS = 0.3  # cosine between the verticals of a quarter turn
@@ -31,7 +31,7 @@ def check_axes(session: Handled) -> None:
     seen = np.argmax(np.abs(unit), axis=1)
     if (np.abs(unit[np.arange(3), seen]) < SAME).any():
         return
-    names = [("-" if unit[row, axis] < 0 else "+") + "xyz"[axis] for row, axis in enumerate(seen.tolist())]
+    names = [nearest_face(row) for row in unit]
     if names == ["+x", "+y", "+z"]:
         return
     told = f"the gyroscope's x, y, z read the turning about the accelerometer's {', '.join(names)}"

@@ -45,7 +45,6 @@ class Fit:
     chi_square: float
     freedom: float
     iterations: int
-    settled: bool
 
     def freedom_of(self, factor: Factor) -> Array:
         """(r,) share of each row of a factor that the solution does not take up."""
@@ -77,7 +76,7 @@ def fit(session: Handled, told: Told, trusted: int | None = None) -> Fit:
     rows = list(factors(Graph(session, on, told, state, seen, found)))
     _, covariance = solved(rows)
     chi_square, freedom = left(rows, covariance)
-    return Fit(session, told, on, state, seen, found, tuple(rows), covariance, chi_square, freedom, iterations, settled)
+    return Fit(session, told, on, state, seen, found, tuple(rows), covariance, chi_square, freedom, iterations)
 
 
 _REMEDY = "See that each move is between two rests on the table, that no reading is lost, and which axes are which"

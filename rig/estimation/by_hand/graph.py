@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.by_hand.moves import Moved, Taken
 from rig.estimation.by_hand.session import FACES, Faced, Handled, Sizes, Told, axis_of
 
@@ -130,12 +130,12 @@ class Graph:
     @cached_property
     def turned_rad(self) -> Array:
         """(N − 1, 3) rotation vectors of `between`."""
-        return _vectors(self.between)
+        return rotation_vectors(self.between)
 
     @cached_property
     def missed_rad(self) -> Array:
         """(N − 1, 3) rotation vectors by which the body turned more in each move, as the gyroscope says."""
-        return _vectors(self.moved.rotations @ np.swapaxes(self.between, -1, -2))
+        return rotation_vectors(self.moved.rotations @ np.swapaxes(self.between, -1, -2))
 
     @cached_property
     def noise_rad_s(self) -> float:
@@ -320,12 +320,6 @@ def _priors(graph: Graph) -> Iterator[Factor]:
         design[0, at : at + 3] = state.attitudes[row][2]
         yield Factor(PRIOR, row, np.zeros(1), design, {"heading": np.array([HEADING_STD_RAD])})
     yield prior("bias", slice(RESTS + 3, RESTS + 6), state.biases[0], BIAS_STD_RAD_S)
-
-
-def _vectors(matrices: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(matrices).as_rotvec(), dtype=np.float64)
 
 
 def _skew(vector: Array) -> Array:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, across
 
 MATRIX, GRAVITY, BIAS, FACES = slice(0, 9), slice(9, 18), slice(18, 21), slice(21, 33)
 PRIOR_STD = np.repeat([0.2, 1.75e-3, 1.0, 3.5e-3], [9, 9, 3, 12])
@@ -138,7 +138,7 @@ def _of_move(centre: Array, move: TakenMove) -> Iterator[Equation]:
     design = np.hstack([by_matrix, by_gravity.reshape(3, 9), np.zeros((3, 15))])
     half = np.linalg.norm(up - reached) / 2
     stretched = np.arcsin(half) / (half * np.sqrt(1 - half**2)) if half > 1e-9 else 1.0
-    for way in _across(middle):
+    for way in across(middle):
         row, aside = way @ design, np.cross(way, middle)
         row[FACES.start + 2 * move.before.face + np.arange(2)] -= aside @ up_ways
         row[FACES.start + 2 * move.after.face + np.arange(2)] += aside @ turned @ after_ways
@@ -160,13 +160,6 @@ def _attitudes(steps: Array) -> tuple[Array, Array]:
         middles[row] = attitude @ half
         attitude = middles[row] @ half
     return attitude, middles
-
-
-def _across(axis: Array) -> tuple[Array, Array]:
-    """Unit vectors (3,) at right angles to an axis (3,) and to each other."""
-    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    first = first / np.linalg.norm(first)
-    return first, np.cross(axis, first)
 
 
 def _variance(move: TakenMove, path_rad: float) -> float:

@@ -112,3 +112,9 @@ class Faced:
 def axis_of(face: str) -> Array:
     """(3,) unit vector of a face's name."""
     return np.asarray((1.0 if face[0] == "+" else -1.0) * np.eye(3)["xyz".index(face[1])], dtype=np.float64)
+
+
+def nearest_face(direction: Array) -> str:
+    """The name of the face whose axis is nearest to a direction (3,)."""
+    axis = int(np.argmax(np.abs(direction)))
+    return ("-" if direction[axis] < 0 else "+") + "xyz"[axis]

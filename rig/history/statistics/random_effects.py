@@ -13,14 +13,13 @@ CONFIDENCE = 0.95
 class Fitted:
     """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the spread that the values' own stds leave.
 
-    `freedom` is n − p. `residuals` (n,) are values less the model.
+    `freedom` is n − p.
     """
 
     coefficients: Array
     covariance: Array
     between_std: float
     freedom: int
-    residuals: Array
 
     @property
     def std(self) -> Array:
@@ -68,7 +67,7 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
     residuals = values - design @ coefficients
     scatter = max(1.0, float(weights @ residuals**2) / (n - p))
     covariance = scatter * np.linalg.inv((design.T * weights) @ design)
-    return Fitted(coefficients, covariance, float(np.sqrt(between_variance)), n - p, residuals)
+    return Fitted(coefficients, covariance, float(np.sqrt(between_variance)), n - p)
 
 
 def _solve(design: Array, values: Array, weights: Array) -> Array:

@@ -93,11 +93,9 @@ def degrees_of(sensor: SensorEntry) -> tuple[str, float]:
 
 
 def _spread(sensor: SensorEntry) -> Sequence[float]:
-    return _noise(sensor) if sensor.budget is None else sensor.budget.expanded
-
-
-def _noise(sensor: SensorEntry) -> list[float]:
-    return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    if sensor.budget is None:
+        return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    return sensor.budget.expanded
 
 
 def check_row(check: CheckEntry) -> CheckRow:

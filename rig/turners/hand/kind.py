@@ -40,11 +40,6 @@ class HandState:
         """No speeds."""
         return ()
 
-    @property
-    def at_rest(self) -> bool:
-        """Whether a joint moves: there is none."""
-        return True
-
     def to_record(self) -> Row:
         """The times."""
         return self.time_s, self.host_time_s

@@ -22,8 +22,6 @@ from rig.turners.servo.registers import (
     TORQUE,
     VELOCITY_LIMIT,
     VOLTAGE_LIMITS,
-    WATCHDOG,
-    WATCHDOG_FIRMWARE,
 )
 from rig.turners.servo.state import ServoReport, decode, now_s
 
@@ -122,7 +120,6 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
         startup=bus.look_up(STARTUP)[0] if firmware >= STARTUP_FIRMWARE else None,
         shutdown=bus.look_up(SHUTDOWN)[0],
         torque_on=bool(bus.look_up(TORQUE)[0]),
-        watchdog=bus.look_up(WATCHDOG)[0] if firmware >= WATCHDOG_FIRMWARE else None,
         round_trip_s=sorted(round_trips)[1],  # the line's: this computer may be busy in the others
         state=states[-1],
     )

@@ -24,7 +24,6 @@ SERVO_STATE_DTYPE = state_dtype(1, SERVO_FIELDS)
 JOINTS = ("shaft",)
 STILL_S, STILL_STATES = 0.15, 5  # so long, and in so many states, a shaft must stand to stand still
 STILL_RAD = 6.5 * PULSE_RAD  # … within this: a shaft at rest is seen to dither by ±3 pulses (forum.robotis.com 7582)
-AT_REST_RAD_S = 2.5 * SPEED_RAD_S  # of Present Velocity, which is coarse and dithers as the position does
 
 
 def now_s() -> float:
@@ -59,11 +58,6 @@ class ServoState:
     load: float
     voltage_v: float
     temperature_c: float
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether the shaft stands, as far as one state tells; `stands` has several."""
-        return not self.moving and abs(self.qd_rad_s[0]) < AT_REST_RAD_S
 
     def to_record(self) -> Row:
         """The values in the order of `SERVO_STATE_DTYPE`."""
@@ -128,7 +122,6 @@ class ServoReport:
     startup: int | None
     shutdown: int
     torque_on: bool
-    watchdog: int | None
     round_trip_s: float
     state: ServoState
 

@@ -92,7 +92,7 @@ class _Child:
         """Let the controller send its states and wait for the first; `OSError` when none comes."""
         self._states = StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S)
         first = self._latest = self._states.first
-        self.send(Connected(self._states.version, first.payload_kg, first.payload_centre_m))
+        self.send(Connected(self._states.version))
         self.send(Heartbeat((first.state,)))
 
     def stream(self) -> NoReturn:

@@ -62,8 +62,6 @@ def reported(host: str, connected: Connected, state: ArmState, robot_api_port: i
         serial_number=NOT_TOLD,
         remote_control=None,
         program_running=state.runtime_state != RuntimeState.STOPPED,
-        payload_kg=connected.payload_kg,
-        payload_centre_m=connected.payload_centre_m,
         state=state,
         kinematics=account.kinematics,
         tcp_offset=account.tcp_offset,

@@ -1,6 +1,7 @@
 """Limits of position, speed and acceleration, joint by joint: those of the arm, and those of its controller. Pure."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -46,35 +47,36 @@ def _position_problems(motion: Motion, ours: JointLimits, told: JointLimits | No
 
 
 def _speed_problems(motion: Motion, ours_rad_s: Joints, told_rad_s: Joints | None) -> list[Problem]:
-    problems = []
-    for joint, speed in enumerate(motion.speed_rad_s * _shares(motion)):
-        limit, whose = _narrower(ours_rad_s[joint], None if told_rad_s is None else told_rad_s[joint])
-        if speed > limit:
-            problems.append(
-                Problem(
-                    "joint_speed",
-                    f"{motion.name} turns {JOINT_NAMES[joint]} at {math.degrees(speed):.1f}°/s, "
-                    f"{whose} is {math.degrees(limit):.1f}°/s",
-                    f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
-                )
-            )
-    return problems
+    return [
+        Problem(
+            "joint_speed",
+            f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, {whose} is {math.degrees(limit):.1f}°/s",
+            f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
+        )
+        for name, speed, limit, whose in _beyond(motion.speed_rad_s * _shares(motion), ours_rad_s, told_rad_s)
+    ]
 
 
 def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, told_rad_s2: Joints | None) -> list[Problem]:
-    problems = []
-    for joint, acceleration in enumerate(motion.acceleration_rad_s2 * _shares(motion)):
-        limit, whose = _narrower(ours_rad_s2[joint], None if told_rad_s2 is None else told_rad_s2[joint])
-        if acceleration > limit:
-            problems.append(
-                Problem(
-                    "joint_acceleration",
-                    f"{motion.name} accelerates {JOINT_NAMES[joint]} with {math.degrees(acceleration):.0f}°/s², "
-                    f"{whose} is {math.degrees(limit):.0f}°/s²",
-                    "Lower procedure.acceleration_deg_s2",
-                )
-            )
-    return problems
+    return [
+        Problem(
+            "joint_acceleration",
+            f"{motion.name} accelerates {name} with {math.degrees(acceleration):.0f}°/s², "
+            f"{whose} is {math.degrees(limit):.0f}°/s²",
+            "Lower procedure.acceleration_deg_s2",
+        )
+        for name, acceleration, limit, whose in _beyond(
+            motion.acceleration_rad_s2 * _shares(motion), ours_rad_s2, told_rad_s2
+        )
+    ]
+
+
+def _beyond(values: Array, ours: Joints, told: Joints | None) -> Iterator[tuple[str, float, float, str]]:
+    """The joints whose values (6,) are beyond the narrower limit: name, value, that limit, and whose it is."""
+    for joint, name in enumerate(JOINT_NAMES):
+        limit, whose = _narrower(ours[joint], None if told is None else told[joint])
+        if values[joint] > limit:
+            yield name, values[joint], limit, whose
 
 
 def _shares(motion: Motion) -> Array:

@@ -44,14 +44,9 @@ Request = TakeControl | Move | Stop | Alive
 
 @dataclass(frozen=True, slots=True)
 class Connected:
-    """The controller sends states. The payload is what it reckons with; None when it does not tell.
-
-    `version` is its software's: major, minor, bugfix, build.
-    """
+    """The controller sends states; `version` is its software's: major, minor, bugfix, build."""
 
     version: tuple[int, ...]
-    payload_kg: float | None
-    payload_centre_m: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,11 +21,10 @@ class ArmSetup:
 class ArmReport:
     """What a look at the arm shows; None where the controller does not tell.
 
-    `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `payload_kg` and
-    `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's geometry as the
-    factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame, `setup` the arm it
-    is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all of that means, in the
-    maker's names. It is a `Report`.
+    `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `kinematics` is
+    its arm's geometry as the factory has measured it, `tcp_offset` where its tool centre point stands in the flange's
+    frame, `setup` the arm it is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all
+    of that means, in the maker's names. It is a `Report`.
     """
 
     host: str
@@ -34,8 +33,6 @@ class ArmReport:
     serial_number: str
     remote_control: bool | None
     program_running: bool
-    payload_kg: float | None
-    payload_centre_m: tuple[float, float, float] | None
     state: ArmState
     kinematics: DenavitHartenberg | None = None
     tcp_offset: Pose | None = None

@@ -41,7 +41,9 @@ def flash_of(path: Path | None) -> FlashMemory:
         ) from error
     torn = frozenset(offset for (offset,) in struct.iter_unpack("<I", data[FLASH_BYTES:]))
     memory = FlashMemory(firmware("bin"), data[STORE_OFFSET:FLASH_BYTES], torn)
-    memory.on_change = lambda: _save(memory, path)
+    memory.on_change = lambda: write_new(  # in one go: whoever reads the file meets the old flash or the new one
+        path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn))
+    )
     return memory
 
 
@@ -52,8 +54,3 @@ def _check(data: bytes) -> None:
     stack, reset = struct.unpack_from("<II", data)
     if not (RAM.start <= stack <= RAM.stop and FLASH.start <= reset < FLASH.stop):
         raise UnfitFile("it does not begin as a program of this chip does")
-
-
-def _save(memory: FlashMemory, path: Path) -> None:
-    """Save the flash in one go: whoever reads the file meets the old flash or the new one."""
-    write_new(path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn)))

@@ -33,21 +33,22 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
         c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         ca, sa = link.cos_alpha, link.sin_alpha
         x, y, z = position
-        along = _turned(rotation, (link.a_m * c, link.a_m * s, link.d_m))
+        along = turned(rotation, (link.a_m * c, link.a_m * s, link.d_m))
         position = x + along[0], y + along[1], z + along[2]
         turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
         rotation = _product(rotation, turn)
         yield rotation, position
 
 
-def _turned(rotation: Rotation, vector: Vector) -> Vector:
+def turned(rotation: Rotation, vector: Vector) -> Vector:
+    """The vector as it is after a rotation (rows)."""
     x, y, z = vector
     (a, b, c), (d, e, f), (g, h, i) = rotation
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
 def _product(left: Rotation, right: Rotation) -> Rotation:
-    first, second, third = (_turned(left, column) for column in zip(*right, strict=True))
+    first, second, third = (turned(left, column) for column in zip(*right, strict=True))
     (a, b, c), (d, e, f), (g, h, i) = first, second, third
     return (a, d, g), (b, e, h), (c, f, i)
 
