@@ -5,7 +5,9 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final
+
+RECORDING_MAX_BYTES: Final = 1 << 40  # more than a disk full of days
 
 
 class UnfitFile(Exception):

@@ -21,7 +21,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.regular_file import UnfitFile, open_regular_file
+from rig.config.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
 from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, checked, parsed
 from rig.data.events import Event, Recorded, from_lines, to_line
@@ -41,7 +41,6 @@ from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 from rig.motion.state import State
 
-RECORDING_MAX_BYTES = 1 << 40  # more than a disk full of days
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
 READ_TICK_S = 0.1

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
-from rig.data.run_file import RECORDING_MAX_BYTES
+from rig.config.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file, read_regular_file
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
