@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
+import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.estimation.arrays import Array
@@ -22,6 +23,7 @@ def non_orthogonality(setup: Setup) -> Array:
     return solution.non_orthogonality_rad
 
 
+@pytest.mark.slow
 def test_the_sensors_axes_are_found_on_an_arm_whose_controller_knows_it() -> None:
     setup = Setup(kinematics=MADE, noise_rad_s=0.001)
     known, unknown = (np.abs(non_orthogonality(replace(setup, told=told))).max() for told in (MADE, None))

@@ -225,6 +225,7 @@ class Chip:
         self.done.append("reset")
 
 
+@pytest.mark.slow
 def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -157,6 +157,7 @@ def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not
         assert (ended.returncode != 0) == bool(status), ended.stderr
 
 
+@pytest.mark.slow
 def test_a_signed_digital_certificate_is_one_by_its_schema(lab: Laboratory) -> None:
     assert schema_faults(lab.read(XML)) == []
 

@@ -33,6 +33,7 @@ def _sign(sweep: Sweep) -> int:
     return 1 if sweep.direction == "ccw" else -1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axes", "most_deg"), [(3, 0.12), (6, 0.01)])
 def test_the_angles_stated_uncertainty_holds_the_arms_errors(axes: int, most_deg: float) -> None:
     rates, off = movement(axes)

@@ -32,6 +32,7 @@ def changed(coefficients: Array, covariance: Array, from_c: float, to_c: float) 
     return error
 
 
+@pytest.mark.slow
 def test_slopes_of_a_heated_run_lie_within_u() -> None:
     slopes, loops = errors(3)
 

@@ -188,6 +188,7 @@ def test_frames_survive_any_chopping_of_the_stream(sent: list[Sent], cuts: list[
     assert reader.damaged == receiver.damaged == 0
 
 
+@pytest.mark.slow
 @given(messages(), st.data())
 def test_a_flipped_bit_costs_at_most_the_frame_it_is_in_and_never_makes_a_wrong_one(
     sent: Sent, data: st.DataObject

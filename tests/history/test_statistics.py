@@ -27,6 +27,7 @@ def line(days: Array) -> Array:
     return np.stack([np.ones_like(days), days], axis=1)
 
 
+@pytest.mark.slow
 def test_the_mean_and_the_spread_are_those_of_statsmodels() -> None:
     from statsmodels.stats.meta_analysis import combine_effects  # with pandas
 

@@ -49,6 +49,7 @@ def test_a_shaft_that_dithers_is_at_rest(drawn: Drawn) -> None:
     assert all(standing(motion, window) is not None for window in rested(drawn.runs[0]))
 
 
+@pytest.mark.slow
 def test_a_turn_that_was_not_ended_is_refused(drawn: Drawn) -> None:
     run = drawn.runs[0]
     motion, finished = motion_of(run), next(swept(run))

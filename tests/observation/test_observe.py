@@ -489,6 +489,7 @@ def test_holes_between_arm_states_cost_certainty_not_truth(thorough: bool) -> No
     assert np.median(stds) < 3e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("holes", [False, True])
 def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool) -> None:
     """At 14.9 Hz a turn has 33 samples, and the ripple's 31 cycles look like two: the plain mean would be 20 σ off."""

@@ -58,6 +58,7 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
     assert last.sensors[0].samples == len(run.samples["gyro"]) and last.sensors[0].lost == 0
 
 
+@pytest.mark.slow
 def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     shown = Shown(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
     for moment in replayed:

@@ -326,6 +326,7 @@ def with_accelerations(observed: ObservedRun) -> ObservedRun:
     return replace(observed, run=replace(observed.run, samples={"gyro": samples}, sensors={"gyro": sensor}))
 
 
+@pytest.mark.slow
 def test_accelerations_are_exported_beside_the_rates(recordings: tuple[WithMotion, ...], tmp_path: Path) -> None:
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore

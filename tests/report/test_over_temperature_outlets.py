@@ -79,6 +79,7 @@ def test_the_run_folder_has_picture_certificate_and_history(
     assert "over temperature" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     result: ResultDocument, entry: OverTemperatureEntry
 ) -> None:

@@ -17,6 +17,7 @@ from support.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, tur
 from support.servo_on_a_wire import SET_UP, servo_on_a_wire
 
 
+@pytest.mark.slow
 def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:
     with servo_on_a_wire() as wire:
         before_rad = wire.angle_rad

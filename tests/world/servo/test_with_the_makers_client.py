@@ -35,6 +35,7 @@ def client(*truths: ServoTruth, line: LineTruth = PLAIN) -> Iterator[tuple[Any, 
             port.closePort()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_every_register_of_the_maker_s_own_table_is_there(model: str) -> None:
     table = ControlTable.getControlTable(MODELS[model].number)
