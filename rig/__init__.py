@@ -19,6 +19,8 @@ docs/errors.md.
 
 from typing import TYPE_CHECKING, Any
 
+from rig.version import VERSION
+
 if TYPE_CHECKING:
     from rig.commands.from_python import check, export, plan, run, write_certificate
     from rig.errors import Fault, Refused
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from rig.notebook.runs import Run, load
     from rig.report.plan_table import Planned
 
-__version__ = "0.1.0"
+__version__ = VERSION
 __all__ = [
     "Calibration",
     "Calibrations",

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rig import __version__
 from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
+from rig.version import VERSION
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -141,7 +141,7 @@ def _ended(text: str, status: int) -> int:
 def _parser(meant: str | None) -> argparse.ArgumentParser:
     """Every command by its name, and the arguments of the one that is meant."""
     parser = argparse.ArgumentParser(prog="rig", description="Calibrate inertial sensors on a robot arm.")
-    parser.add_argument("--version", action="version", version=f"rig {__version__}")
+    parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in _COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)

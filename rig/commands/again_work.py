@@ -4,11 +4,11 @@ import platform
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig import __version__
 from rig.config.regular_file import UnfitFile
 from rig.errors import RigError
 from rig.history.again import Answer, Given, State, Unsolved
 from rig.history.finished import Recording, recording_of
+from rig.version import VERSION
 
 # Refusals that say nothing of a recording: it has no such setting or estimator, or this computer cannot solve it.
 NOT_OF_IT = ("unknown_setting", "wrong_setting", "unknown_estimator")
@@ -27,13 +27,13 @@ class Task:
     places: tuple[tuple[str, str], ...]
     overrides: tuple[str, ...]
     estimator: str | None
-    rig_version: str = __version__
+    rig_version: str = VERSION
 
 
 def solved_again(task: Task) -> Answer:
     """The answer of recordings that are what was entered, to the byte; else why there is none. Writes nothing."""
-    if task.rig_version != __version__:
-        return Unsolved("failed", f"the worker has version {__version__} of the rig, not {task.rig_version}")
+    if task.rig_version != VERSION:
+        return Unsolved("failed", f"the worker has version {VERSION} of the rig, not {task.rig_version}")
     folder = _folder(task)
     return folder if isinstance(folder, Unsolved) else _given(folder, task)
 

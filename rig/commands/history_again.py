@@ -8,7 +8,6 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig import __version__
 from rig.commands.again_work import Task, solved_again
 from rig.commands.history_commands import opened
 from rig.commands.spread import Answered, Cluster, Processes, Solve, one_by_one, spread
@@ -23,6 +22,7 @@ from rig.history.again_plan import stated_results
 from rig.history.again_report import CSV, PAGE, again_csv, again_page, counts, notable_table
 from rig.history.store import Selection
 from rig.station.plain_text import say
+from rig.version import VERSION
 
 CHANGED = 1
 MOST_SHOWN = 20  # lines on the terminal; the page has them all
@@ -74,7 +74,7 @@ def _question(options: Namespace) -> Question:
     if options.estimator is not None:
         known_estimator(options.estimator)
     # Older recordings keep the way of reckoning they were made with; today's method is today's way.
-    return Question(__version__, (f"reckoning={RECKONING}", *options.overrides), options.estimator)
+    return Question(VERSION, (f"reckoning={RECKONING}", *options.overrides), options.estimator)
 
 
 def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[Stated, ...]]:

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
-from rig import __version__
 from rig.config.load import Loaded
 from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.checked import Finite, checked
@@ -21,6 +20,7 @@ from rig.data.result_types import Utc
 from rig.data.run_folder import ScriptIdentity
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Made, Report
+from rig.version import VERSION
 
 OF_FILES = ("readings_file", "motion_file")
 OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
@@ -105,7 +105,7 @@ def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Ite
 def _program() -> dict[str, Any]:
     """What reckons."""
     return {
-        "rig_version": __version__,
+        "rig_version": VERSION,
         "python_version": platform.python_version(),
         "package_versions": {name: version(name) for name in PACKAGES},
     }
