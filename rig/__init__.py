@@ -19,7 +19,7 @@ docs/errors.md.
 
 from typing import TYPE_CHECKING, Any
 
-from rig.version import VERSION
+from rig.data.version import VERSION
 
 if TYPE_CHECKING:
     from rig.commands.from_python import check, export, plan, run, write_certificate

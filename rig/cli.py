@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
+from rig.data.version import VERSION
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
-from rig.version import VERSION
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure

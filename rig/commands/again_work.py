@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.config.regular_file import UnfitFile
+from rig.data.version import VERSION
 from rig.errors import RigError
 from rig.history.again import Answer, Given, State, Unsolved
 from rig.history.finished import Recording, recording_of
-from rig.version import VERSION
 
 # Refusals that say nothing of a recording: it has no such setting or estimator, or this computer cannot solve it.
 NOT_OF_IT = ("unknown_setting", "wrong_setting", "unknown_estimator")

@@ -15,6 +15,7 @@ from rig.commands.waiting import answer_of
 from rig.config.written_file import write_new
 from rig.data.run_folder import refuse_links
 from rig.data.settings import RECKONING, known_setting
+from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.again import Answer, Outcome, Stated, compared, to_solve
 from rig.history.again_journal import JOURNAL, Journal, Question
@@ -22,7 +23,6 @@ from rig.history.again_plan import stated_results
 from rig.history.again_report import CSV, PAGE, again_csv, again_page, counts, notable_table
 from rig.history.store import Selection
 from rig.station.plain_text import say
-from rig.version import VERSION
 
 CHANGED = 1
 MOST_SHOWN = 20  # lines on the terminal; the page has them all

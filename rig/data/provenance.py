@@ -18,9 +18,9 @@ from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.result_types import Utc
 from rig.data.run_folder import ScriptIdentity
+from rig.data.version import VERSION
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import Made, Report
-from rig.version import VERSION
 
 OF_FILES = ("readings_file", "motion_file")
 OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
