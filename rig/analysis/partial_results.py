@@ -19,10 +19,10 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
-from rig.observation.field import field_mean
+from rig.observation.field import dwelt_beside, field_mean
 from rig.observation.mean import Mean, ReadAtRest
 from rig.observation.observe import Observation, each_sweep, observe_sensor
-from rig.observation.observed_run import one_clock, times_s
+from rig.observation.observed_run import times_s
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_dwells, finished_sweeps
 
@@ -112,7 +112,7 @@ def _fields(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
     site = run.settings.site
     expected_t = None if site is None else site.magnetic_field_t
     for name in run.measuring(FIELD):
-        other = next((each for each in seen if seen[each].dwells and one_clock(run, name, each)), None)
+        other = dwelt_beside(run, name, (sensor for sensor, each in seen.items() if each.dwells))
         if other is None:
             continue
         clock = seen[other].clock

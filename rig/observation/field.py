@@ -1,6 +1,6 @@
 """What a magnetometer read at rest: its means in dwells, each with the attitude the arm stood in, and at home. Pure."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading, check_complete
 from rig.observation.mean import Held, Mean, even_mean
-from rig.observation.observed_run import ObservedRun
+from rig.observation.observed_run import ObservedRun, one_clock
 from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
@@ -26,8 +26,12 @@ def beside(recording: ObservedRun, name: str) -> str | None:
 
     None where there is none.
     """
-    dwelt = (sensor for sensor, found in recording.sensors.items() if found.dwells)
-    return next((sensor for sensor in dwelt if recording.one_clock(sensor, name)), None)
+    return dwelt_beside(recording.run, name, (sensor for sensor, found in recording.sensors.items() if found.dwells))
+
+
+def dwelt_beside(run: RunData, name: str, dwelt: Iterable[str]) -> str | None:
+    """The first of the sensors read in dwells whose clock stamps the samples of the magnetometer, as of `beside`."""
+    return next((sensor for sensor in dwelt if one_clock(run, sensor, name)), None)
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[Held, ...]:

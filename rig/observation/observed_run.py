@@ -45,10 +45,6 @@ class ObservedRun:
         stream = on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
         return stream.at_reference(self.polynomials[sensor]) if sensor in self.polynomials else stream
 
-    def one_clock(self, sensor: str, other: str) -> bool:
-        """Whether one clock stamps the samples of both."""
-        return one_clock(self.run, sensor, other)
-
     def time_s(self, sensor: str, beside: str | None = None) -> Array:
         """Times (n,) of all samples of any sensor on the arm's clock.
 
