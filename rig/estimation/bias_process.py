@@ -20,9 +20,8 @@ PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
 SPAN = 300.0  # largest size over the smallest that is looked at
 CHANGED = float(np.sqrt(2))  # times its Allan deviation, by which flicker changes from one mean to the next
 
-Chosen = Callable[
-    [Array, Array], Array
-]  # (2,) walk and scatter, of sizes (K, 2) and the logarithms of their likelihood
+# (2,) walk and scatter, of sizes (K, 2) and the logarithms of their likelihoods (K,).
+Chosen = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
