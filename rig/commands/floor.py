@@ -2,7 +2,6 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 from rig.commands.named_history import add_history, named_history
 from rig.commands.page_arguments import PageWish, add_place, token_said, wait_for_interrupt
@@ -23,12 +22,13 @@ def run(options: Namespace) -> int:
     """
     from rig.floor.feed import looking
     from rig.history.address import own_place
+    from rig.history.continuity import is_there
     from rig.history.store import open_history
     from rig.page.control import Control
     from rig.page.serving import Page, serving
 
     place = own_place(named_history(options.history))
-    if place is None or (isinstance(place.where, Path) and not place.where.exists()):
+    if place is None or not is_there(place):
         what = "the history is off" if place is None else f"there is no history {place.label}"
         raise Refused("no_history", what, "Name the history that the rigs share: rig floor --history URL")
     with open_history(place):

@@ -3,8 +3,7 @@
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from rig.commands.remember import ANSWER_S, why
-from rig.commands.waiting import answer_of
+from rig.commands.history_answer import history_answer, why
 from rig.config.models import RigConfig
 from rig.data.absent import NO_BOARD
 from rig.runner.mounted import CalibratedBefore, Memory
@@ -26,7 +25,7 @@ def remembered(config: RigConfig, moved: frozenset[str]) -> Memory:
         if where is None:
             return Memory(silent="the history is off", moved=moved)
         numbers = sorted({each.serial_number for each in config.all_sensors.values()})
-        found = answer_of(lambda: _of(where, numbers), ANSWER_S)
+        found = history_answer(where, lambda: _of(where, numbers))
     except Exception as error:  # whatever it is, a run does not depend on the history
         return Memory(silent=f"the history is silent ({why(error)})", moved=moved)
     return Memory(found, None, moved)
@@ -43,7 +42,7 @@ def known_board(
 
     try:
         where = chosen_place(config.history)
-        found = () if where is None else answer_of(lambda: _on(where, board), ANSWER_S)
+        found = () if where is None else history_answer(where, lambda: _on(where, board))
     except Exception:  # whatever it is, a run does not depend on the history, and says that it is silent
         return None
     same = [each for each in found if each.part in parts and each.simulated == simulated]
@@ -66,11 +65,10 @@ def _of(where: "Place", serial_numbers: list[str]) -> tuple[CalibratedBefore, ..
 
 def _found(where: "Place", wanted: "Sequence[Selection]") -> tuple[CalibratedBefore, ...]:
     """What a history has of that, the newest first; a file that is not there has nothing."""
-    from pathlib import Path
-
+    from rig.history.continuity import is_there
     from rig.history.store import open_history
 
-    if isinstance(where.where, Path) and not where.where.exists():
+    if not is_there(where):
         return ()
     with open_history(where) as history:
         found = [each for selection in wanted for each in history.calibrations(selection)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.waiting import answer_of
+from rig.commands.history_answer import TO_ENTER, history_answer, why
 from rig.errors import RigError
 from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from rig.history.issued import Issued
     from rig.history.series import Change
     from rig.history.store import History, Past
-
-
-ANSWER_S = 4.0  # docs/how-to/shared-history.md promises five until the verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +54,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
             return None, ()
         label = where.label
         run = finished_run(folder)
-        numbers, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
+        numbers, beside = history_answer(where, lambda: _entered(where, run), TO_ENTER)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
     return Remembered(label, numbers, tuple(map(_since, beside)), usual=_is_usual(where)), beside
@@ -87,7 +84,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
         where = own_place(history)
         if where is None or (history is None and loaded is not None and loaded.config.history.off):
             return None
-        known = answer_of(lambda: _certified(where, content_sha256(result), certificate), ANSWER_S)
+        known = history_answer(where, lambda: _certified(where, content_sha256(result), certificate))
     except Exception as error:  # whatever it is, the certificate is written
         return why(error)
     if known:
@@ -110,7 +107,7 @@ def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | N
         where = own_place(history)
         if where is None or (history is None and loaded is not None and loaded.config.history.off):
             return None
-        return answer_of(lambda: _end(where), ANSWER_S)
+        return history_answer(where, lambda: _end(where))
     except Exception:  # whatever it is, the certificate is signed; that it is in no history is said afterwards
         return None
 
@@ -147,31 +144,24 @@ def _entered(where: "Place", run: "Finished") -> "tuple[tuple[int, ...], tuple[B
 
 
 def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bool:
+    from rig.history.continuity import is_there
     from rig.history.store import open_history
 
-    if isinstance(place.where, Path) and not place.where.exists():
+    if not is_there(place):
         return False
     with open_history(place) as history:
         return history.certify(content_sha256, certificate)
 
 
 def _end(place: "Place") -> tuple[int, str] | None:
+    from rig.history.continuity import is_there
     from rig.history.store import open_history
 
-    if isinstance(place.where, Path) and not place.where.exists():
+    if not is_there(place):
         return None
     with open_history(place) as history:
         end = history.head()
     return (end.number, end.sha256) if end.number else None
-
-
-def why(error: Exception) -> str:
-    """Why a history was of no use, in a few words."""
-    if isinstance(error, RigError):
-        return error.what
-    if isinstance(error, TimeoutError):
-        return f"it has not answered within {ANSWER_S:g} s"
-    return f"{type(error).__name__}: {error}"
 
 
 def _since(calibration: Beside) -> Since:

@@ -87,11 +87,12 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
     """What the history says of each file."""
     from rig.commands.waiting import answer_of
     from rig.history.address import place
+    from rig.history.continuity import is_there
     from rig.history.entered_file import known
     from rig.history.store import open_history
 
     where = place(named)
-    if isinstance(where.where, Path) and not where.where.exists():  # to look makes none
+    if not is_there(where):  # to look makes none
         raise Refused("history_unreachable", f"there is no history {where.label}", "Name another with --history")
 
     def asked() -> dict[Path, Any]:

@@ -2,16 +2,40 @@
 
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Final
 
 RECORDING_MAX_BYTES: Final = 1 << 40  # more than a disk full of days
+FileIdentity = tuple[int, int]  # device and inode: the file, by whatever name and through whatever link
+_shut: list[Callable[[], Iterable[FileIdentity]]] = []
 
 
 class UnfitFile(Exception):
     """Why a file is not read, as the end of the sentence that names it: "it is no regular file"."""
+
+
+def file_identity(path: Path) -> FileIdentity | None:
+    """Identify what lies at that path, a link itself; None where nothing does. Raises OSError."""
+    try:
+        status = path.lstat()
+    except FileNotFoundError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+@contextmanager
+def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[None]:
+    """Have nothing here open these files for the length of the block, as a database of this process works on them.
+
+    Opening and closing one would take that database's locks away.
+    """
+    _shut.append(identities)
+    try:
+        yield
+    finally:
+        _shut.remove(identities)
 
 
 @contextmanager
@@ -40,6 +64,8 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
         raise UnfitFile("it is a link")
     if not stat.S_ISREG(status.st_mode):
         raise UnfitFile("it is no regular file")
+    if any((status.st_dev, status.st_ino) in identities() for identities in tuple(_shut)):
+        raise UnfitFile("it is the history that is open")
     if status.st_size > max_bytes:
         raise UnfitFile(f"it is longer than {max_bytes} bytes")
 

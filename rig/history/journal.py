@@ -70,6 +70,17 @@ def head(connection: Connection) -> Head:
     return Head(last.number, _chained(connection))  # entered before version 6: the next line seals it with all before
 
 
+def has(connection: Connection, known: Head) -> bool:
+    """Whether there is a line with that chain, which every later one seals: told by this line alone, not reckoned."""
+    lines = schema.journal.c
+    if known.number == 0:
+        return True
+    found = connection.execute(select(lines.chain_sha256).where(lines.number == known.number)).one_or_none()
+    if found is None:
+        return False
+    return found.chain_sha256 == known.sha256 if found.chain_sha256 is not None else holds(connection, known)
+
+
 def holds(connection: Connection, known: Head) -> bool:
     """Whether the lines up to that one are those of when it was the end; `known` may be of years ago."""
     return _chained(connection, known.number) == known.sha256

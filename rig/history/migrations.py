@@ -101,7 +101,7 @@ def bring_up_to_date(connection: Connection, label: str) -> None:
     if version == 0:
         schema.metadata.create_all(connection)
         create_triggers(connection)
-        created = {"key": "created_utc", "value": datetime.now(UTC).isoformat(timespec="seconds")}
+        created = {"key": "created_utc", "value": datetime.now(UTC).isoformat(timespec="microseconds")}
         connection.execute(insert(schema.meta), [created, {"key": "version", "value": str(schema.VERSION)}])
         return
     for number in range(version, schema.VERSION):

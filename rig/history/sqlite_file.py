@@ -1,4 +1,9 @@
-"""A history's file is looked at before anything opens it to write: what is no history stays as it is."""
+"""A history's file is looked at before anything opens it to write: what is no history stays as it is.
+
+SQLite alone opens the file. Its locks belong to the process (POSIX advisory locks): if any other code of the process
+opens the file and closes it, the locks of all its connections are gone, and the next process believes that it is alone.
+Source: "How To Corrupt An SQLite Database File", 2.2, https://sqlite.org/howtocorrupt.html.
+"""
 
 import os
 import sqlite3
@@ -8,25 +13,43 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.config.regular_file import UnfitFile
+from rig.config.regular_file import FileIdentity, UnfitFile, file_identity
 from rig.errors import Refused
 
 APPLICATION_ID = 0x52494748  # "RIGH", at bytes 68 to 71 of the file (SQLite's file format, 1.3.13)
-HEADER_BYTES, MAGIC, ID_AT = 100, b"SQLite format 3\0", slice(68, 72)
+BESIDE = ("-wal", "-shm")  # what SQLite lays beside a database: its log, and the log's index with locks of its own
 
 
 def history_is_there(file: Path) -> bool:
     """Whether there is a history; False where there is nothing at all. Raises Refused `not_a_history`, OSError."""
     try:
-        header = _header(file)
-        if header is None:
-            return False
-        ours = header[ID_AT] == APPLICATION_ID.to_bytes(4, "big") or _is_of_before(file)
+        status = file.lstat()
+    except FileNotFoundError:
+        return False
+    try:
+        _refuse_unfit(status)
+        _look(file)
     except UnfitFile as error:
         raise _refused(file, str(error)) from error
-    if not ours:
-        raise _refused(file, "it is a database of something else")
     return True
+
+
+def identities(file: Path) -> Iterator[FileIdentity]:
+    """Identify a history's file, its log and the log's index, as far as they are there."""
+    for name in ("", *BESIDE):
+        if (found := file_identity(file.with_name(file.name + name))) is not None:
+            yield found
+
+
+def address_of(file: Path, options: str) -> str:
+    """The address under which SQLite opens a file; `options` as in https://sqlite.org/uri.html, 3.3."""
+    return f"{file.absolute().as_uri()}?{options}"
+
+
+def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
+    """Read from a new connection whose database it is, before it writes anything. Raises Refused `not_a_history`."""
+    if not _is_history(connection):
+        raise _refused(file, "it is a database of something else")
 
 
 @contextmanager
@@ -48,37 +71,42 @@ def made_whole(file: Path) -> Iterator[Path]:
                 beside.replace(file)
 
 
-def _header(file: Path) -> bytes | None:
-    try:
-        # Opened without waiting for the other end of a pipe, and never through a link.
-        descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except FileNotFoundError:
-        return None
-    except OSError as error:
-        if file.is_symlink():
-            raise UnfitFile("it is a link to something else") from error
-        raise
-    try:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise UnfitFile("it is no regular file")
-        header = os.read(descriptor, HEADER_BYTES)
-    finally:
-        os.close(descriptor)
-    if not header:
+def _refuse_unfit(status: os.stat_result) -> None:
+    if stat.S_ISLNK(status.st_mode):
+        raise UnfitFile("it is a link to something else")
+    if not stat.S_ISREG(status.st_mode):
+        raise UnfitFile("it is no regular file")
+    if status.st_size == 0:
         raise UnfitFile("it is an empty file, and a new history needs a name that does not exist yet")
-    if len(header) < HEADER_BYTES or not header.startswith(MAGIC):
-        raise UnfitFile("it is no database of SQLite")
-    return header
 
 
-def _is_of_before(file: Path) -> bool:
-    """Whether it has the tables of a history made before files were marked. Reads; locks and writes nothing."""
-    path = f"{file.absolute().as_uri()}?mode=ro&immutable=1"
+def _look(file: Path) -> None:
+    """Raise UnfitFile where it is no history. As of a medium that takes no more: locks and writes nothing."""
     try:
-        with closing(sqlite3.connect(path, uri=True)) as connection:
-            version = connection.execute("SELECT value FROM meta WHERE key = 'version'").fetchone()
-            return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None
-    except sqlite3.DatabaseError:
+        with closing(sqlite3.connect(address_of(file, "mode=ro&immutable=1"), uri=True)) as connection:
+            if not _is_history(connection):
+                raise UnfitFile("it is a database of something else")
+    except sqlite3.DatabaseError as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code == sqlite3.SQLITE_NOTADB:
+            raise UnfitFile("it is no database of SQLite") from error
+        if code == sqlite3.SQLITE_CANTOPEN:
+            raise OSError(str(error)) from error
+        # Read without a lock, a history into which another process just writes its log may look damaged: whoever opens
+        # it looks again under a lock, by `refuse_unmarked`.
+
+
+def _is_history(connection: sqlite3.Connection) -> bool:
+    (marked,) = connection.execute("PRAGMA application_id").fetchone()
+    return marked == APPLICATION_ID or _is_of_before(connection)
+
+
+def _is_of_before(connection: sqlite3.Connection) -> bool:
+    """Whether it has the tables of a history made before files were marked."""
+    try:
+        version = connection.execute("SELECT value FROM meta WHERE key = 'version'").fetchone()
+        return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None
+    except sqlite3.OperationalError:  # it has no such table
         return False
 
 

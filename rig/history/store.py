@@ -16,9 +16,9 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
-from rig.history import certificates, journal, schema
+from rig.history import certificates, journal, read_back, schema
 from rig.history.address import Place, place
-from rig.history.engine import WRITES, engine_of
+from rig.history.engine import WRITES, connection_apart, engine_of
 from rig.history.entering import enter_run, note_place, now_utc
 from rig.history.finished import Finished, Recording
 from rig.history.issued import Issued
@@ -108,13 +108,13 @@ class Kept:
 def open_history(where: str | Place | None = None) -> Iterator["History"]:
     """A history by its file or URL, the user's own by default; its tables are made or migrated if need be.
 
-    Raises Refused `history_unreachable`, `history_too_new`, `not_a_history`, `missing_extra`.
+    Raises Refused `history_unreachable`, `history_too_new`, `not_a_history`, `missing_extra`; `history_gone` or
+    `history_exchanged` if this process has opened it before, and it is not there any more or another is.
     """
     found = where if isinstance(where, Place) else place(where)
-    engine: Engine | None = None
     try:
-        engine = engine_of(found)
-        yield History(engine)
+        with engine_of(found) as engine:
+            yield History(found, engine)
     except (SQLAlchemyError, OSError) as error:
         why = str(getattr(error, "orig", None) or error).strip().splitlines()
         raise Refused(
@@ -123,21 +123,20 @@ def open_history(where: str | Place | None = None) -> Iterator["History"]:
             "Correct that, or name another history with --history or RIG_HISTORY; runs are entered later by "
             "`rig history import`",
         ) from error
-    finally:
-        if engine is not None:
-            engine.dispose()
 
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An open history."""
+    """An open history. A connection of its own has read back what the methods say is entered, or `entry_not_kept`."""
 
+    place: Place
     engine: Engine
 
     def enter(self, finished: Finished) -> Entered:
         """Add a run; one that is there already only gets the place of its folder noted, if that is another.
 
-        It is taken at its word: whether its recordings give its result, `rig history import` finds out.
+        It is taken at its word: whether its recordings give its result, `rig history import` finds out. Raises Refused
+        `entry_not_kept`.
         """
         content = finished.content_sha256
         try:
@@ -147,14 +146,18 @@ class History:
                 note_place(connection, run_id, finished)
                 if finished.certificate is not None:
                     certificates.enter(connection, run_id, finished.certificate, now_utc())
-                return Entered(run_id, known is None)
+            entered = Entered(run_id, known is None)
         except IntegrityError:
             # Somebody else entered the same at the same moment, and was first.
             with self.engine.connect() as connection:
                 known = self._run_id(connection, content)
             if known is None:
                 raise
-            return Entered(known, False)
+            entered = Entered(known, False)
+        if not entered.new:
+            with connection_apart(self.engine) as connection:
+                read_back.refuse_missing(connection, self.place, schema.run, entered.run_id)
+        return entered
 
     def has(self, content_sha256: str) -> bool:
         """Whether a run with that result was entered."""
@@ -162,7 +165,10 @@ class History:
             return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
-        """Note a certificate of the run with that result; False where the history does not have it."""
+        """Note a certificate of the run with that result; False where the history does not have it.
+
+        Raises Refused `entry_not_kept`.
+        """
         with self._writing() as connection:
             run_id = self._run_id(connection, content_sha256)
             if run_id is not None:
@@ -189,7 +195,10 @@ class History:
         return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
 
     def void(self, number: int, reason: str) -> None:
-        """Say that a calibration does not count, and why. Raises Refused `not_in_history`, `already_voided`."""
+        """Say that a calibration does not count, and why.
+
+        Raises Refused `not_in_history`, `already_voided`, `entry_not_kept`.
+        """
         before = self.calibration(number).voided
         if before is not None:
             raise Refused(
@@ -242,9 +251,14 @@ class History:
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
+        """A transaction that enters something; when it has ended, its entries are read back."""
         with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
             journal.alone(connection)
+            before = journal.head(connection)
             yield connection
+            after = journal.head(connection)
+        with connection_apart(self.engine) as connection:
+            read_back.refuse_lost(connection, self.place, before, after)
 
     @staticmethod
     def _run_id(connection: Connection, content_sha256: str) -> int | None:

@@ -11,7 +11,7 @@ from rig.history.engine import WRITES
 from rig.history.issued import Issued
 from rig.history.store import open_history
 from support.forked import forked
-from support.kept_rows import drop_triggers
+from support.kept_rows import as_of_another_process, drop_triggers
 from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
@@ -62,6 +62,7 @@ def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:
             connection.execute(text("ALTER TABLE parameter DROP COLUMN coverage_factor"))
             connection.execute(delete(schema.meta).where(schema.meta.c.key == "version"))
             connection.execute(schema.meta.insert().values(key="version", value="1"))
+    as_of_another_process()
     with open_history(url) as history:
         assert history.calibrations() == before
         history.void(before[0].id, "to see that it can be")

@@ -4,6 +4,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -364,8 +365,13 @@ def test_a_history_that_is_only_read_while_another_writes_it_is_as_that_one_left
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "history.sqlite"
-    with open_history(str(file)) as written:
-        written.enter(finished_run(FIXTURES / "verified"))  # in the log beside the file so far
+    with open_history(str(file)):
+        pass
+    with closing(sqlite3.connect(file)) as another:
+        another.execute("SELECT count(*) FROM run").fetchall()  # who has it open too, so that the log stays
+        with open_history(str(file)) as written:
+            written.enter(finished_run(FIXTURES / "verified"))
+        assert file.with_name(f"{file.name}-wal").stat().st_size > 0
         monkeypatch.setattr(os, "access", lambda *_: False)
         with open_history(str(file)) as history:
             assert len(history.calibrations()) == 2

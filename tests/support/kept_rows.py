@@ -6,6 +6,8 @@ from contextlib import closing
 
 from sqlalchemy import Connection, text
 
+from rig.history import continuity
+
 
 def drop_triggers(connection: Connection) -> None:
     """All of them."""
@@ -17,10 +19,20 @@ def drop_triggers(connection: Connection) -> None:
 
 
 def forge(file: str, *statements: str, values: Sequence[str] = ()) -> None:
-    """Carry these out in a history's file, its triggers dropped; `values` are those of the first."""
+    """Carry these out in a history's file, without its triggers, which stand there again afterwards; `values` are those
+    of the first."""
     with closing(sqlite3.connect(file)) as other:
-        for (name,) in other.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+        triggers = other.execute("SELECT name, sql FROM sqlite_master WHERE type = 'trigger'").fetchall()
+        for name, _ in triggers:
             other.execute(f"DROP TRIGGER {name}")
         for number, statement in enumerate(statements):
             assert other.execute(statement, values if number == 0 else ()).rowcount > 0, statement
+        for _, trigger in triggers:
+            other.execute(trigger)
         other.commit()
+    as_of_another_process()
+
+
+def as_of_another_process() -> None:
+    """Forget what this process has seen of histories, as one that is started later has seen nothing."""
+    continuity._known.clear()
