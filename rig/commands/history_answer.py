@@ -26,9 +26,9 @@ TO_CONNECT = {
 
 
 def history_answer(place: "Place", work: Callable[[], T], imported: Sequence[str] = ()) -> T:
-    """What `work` gets of the history at `place`, or raises; TimeoutError after `ANSWER_S`.
+    """Return what `work` gets of the history at `place`, or raise what it raises; TimeoutError after `ANSWER_S`.
 
-    That time is the history's alone: what the work needs is imported before it begins, these modules too.
+    That time is the history's alone: what the work needs is imported before, the modules named `imported` too.
     """
     for name in (*TO_ASK, *imported):
         import_module(name)
@@ -39,7 +39,7 @@ def history_answer(place: "Place", work: Callable[[], T], imported: Sequence[str
 
 
 def why(error: Exception) -> str:
-    """Why a history was of no use, in a few words."""
+    """Say why a history was of no use, in a few words."""
     if isinstance(error, RigError):
         return error.what
     if isinstance(error, TimeoutError):

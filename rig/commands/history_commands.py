@@ -147,9 +147,9 @@ def imported(options: Namespace) -> int:
 
 def verify(options: Namespace) -> int:
     """Hold rows against their journal and results, files against hashes; names what is wrong. Returns 1 then."""
-    from rig.history.integrity import examined
+    from rig.history.integrity import STATES, WRONG, examined
 
-    counts = {"ok": 0, "changed": 0, "missing": 0, "elsewhere": 0}
+    counts = dict.fromkeys(STATES, 0)
     with opened(options) as history:
         for found in examined(history):
             counts[found.state] += 1
@@ -158,7 +158,7 @@ def verify(options: Namespace) -> int:
         end = history.head()
     say(f"journal: entry {end.number}, chained to all before by SHA-256 {end.sha256}")
     say(", ".join(f"{count} {state}" for state, count in counts.items()))
-    return DISAGREE if counts["changed"] or counts["missing"] else 0
+    return DISAGREE if any(counts[state] for state in WRONG) else 0
 
 
 def compare(options: Namespace) -> int:

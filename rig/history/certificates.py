@@ -4,15 +4,17 @@ from sqlalchemy import Connection, insert, select
 
 from rig.history import journal
 from rig.history.issued import Issued
+from rig.history.numbers import next_number
 from rig.history.schema import certificate, certificate_file
 
 
 def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> None:
     """Add the certificate, and those of its files that are not known; what is there already stays as it is."""
-    known = select(certificate.c.id).where(certificate.c.number == issued.number)
-    number = connection.scalar(known)
+    number = connection.scalar(select(certificate.c.id).where(certificate.c.number == issued.number))
     if number is None:
+        number = next_number(connection, certificate)
         row = {
+            "id": number,
             "number": issued.number,
             "run_id": run_id,
             "title": issued.title,
@@ -22,7 +24,6 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
             "entered_utc": now_utc,
         }
         connection.execute(insert(certificate).values(row))
-        number = connection.scalars(known).one()
         journal.note(connection, certificate, number)
     files = certificate_file.c
     there = select(files.name, files.sha256).where(files.certificate_id == number)

@@ -32,7 +32,7 @@ _known: dict[Path | URL, _Known] = {}
 
 
 def is_there(place: Place) -> bool:
-    """Whether there is something to open; of a server that is not known before it is asked.
+    """Return whether there is something to open; of a server that is not known before it is asked.
 
     Raises Refused as `refuse_another_file`.
     """

@@ -21,7 +21,7 @@ __all__ = ["WRITES", "connection_apart", "engine_of"]
 
 @contextmanager
 def engine_of(place: Place) -> Iterator[Engine]:
-    """The engine of a history, up to date and ready, for the length of the block; of a file the process has but one.
+    """Yield the engine of a history, up to date and ready; of a file the process has but one.
 
     Raises Refused as `bring_up_to_date`, `history_is_there`, `missing_extra` and `continuity`; SQLAlchemyError and
     OSError.
@@ -45,7 +45,7 @@ def engine_of(place: Place) -> Iterator[Engine]:
 
 @contextmanager
 def connection_apart(engine: Engine) -> Iterator[Connection]:
-    """A connection that is none of those before it: it reads what the history itself holds."""
+    """Yield a connection that is none of those before it: it reads what the history itself holds."""
     with engine.connect() as connection:
         connection.invalidate()  # the one that the pool has may be the one that wrote
         yield connection
@@ -57,7 +57,7 @@ def _bring_up_to_date(engine: Engine, label: str) -> None:
 
 
 def _make(file: Path, label: str) -> None:
-    """A history with all its tables and nothing in them."""
+    """Make a history with all its tables and nothing in them."""
     with made_whole(file) as beside:
         engine = sqlite_engine(beside, label, new=True)
         try:
@@ -70,7 +70,7 @@ def _make(file: Path, label: str) -> None:
 
 @contextmanager
 def _of_server(server: URL) -> Iterator[Engine]:
-    """An engine of this block's own: one that waits for a frozen server keeps nobody else waiting."""
+    """Yield an engine of this block's own: one that waits for a frozen server keeps nobody else waiting."""
     engine = _postgresql(server)
     try:
         yield engine

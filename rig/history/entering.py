@@ -1,12 +1,13 @@
 """The rows of a run, within somebody's transaction."""
 
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sqlalchemy import Connection, Row, insert, select
+from sqlalchemy import Connection, insert, select
 
 from rig.history import journal, schema
 from rig.history.finished import Finished
+from rig.history.numbers import next_number
 
 if TYPE_CHECKING:
     from rig.report.kinds.followed import Followed
@@ -17,8 +18,10 @@ def enter_run(connection: Connection, finished: Finished, content_sha256: str) -
     from rig.history.index import run_row
     from rig.report.kinds.registry import followed
 
+    run_id = next_number(connection, schema.run)
     row = {
         **run_row(finished.document),
+        "id": run_id,
         "content_sha256": content_sha256,
         "entered_utc": now_utc(),
         "rig": finished.rig,
@@ -27,7 +30,7 @@ def enter_run(connection: Connection, finished: Finished, content_sha256: str) -
         "operator": finished.operator,
         "note": finished.note,
     }
-    run_id = _inserted(connection.execute(insert(schema.run).values(row)).inserted_primary_key)
+    connection.execute(insert(schema.run).values(row))
     if finished.recordings:
         rows = [{"run_id": run_id, "name": r.name, "bytes": r.size, "sha256": r.sha256} for r in finished.recordings]
         connection.execute(insert(schema.recording), rows)
@@ -45,8 +48,9 @@ def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
     places = schema.location.c
     same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
     if connection.scalar(select(places.id).where(*same)) is None:
-        where = {"run_id": run_id, "computer": finished.computer, "path": finished.path, "noted_utc": now_utc()}
-        number = _inserted(connection.execute(insert(schema.location).values(where)).inserted_primary_key)
+        number = next_number(connection, schema.location)
+        where = {"id": number, "run_id": run_id, "computer": finished.computer, "path": finished.path}
+        connection.execute(insert(schema.location).values(**where, noted_utc=now_utc()))
         journal.note(connection, schema.location, number)
 
 
@@ -56,7 +60,9 @@ def now_utc() -> str:
 
 
 def _enter_calibration(connection: Connection, run_id: int, calibration: "Followed", *, check_standard: bool) -> None:
+    number = next_number(connection, schema.calibration)
     row = {
+        "id": number,
         "run_id": run_id,
         "sensor": calibration.sensor,
         "quantity": calibration.quantity,
@@ -67,13 +73,8 @@ def _enter_calibration(connection: Connection, run_id: int, calibration: "Follow
         "temperature_c": calibration.temperature_c,
         "check_standard": check_standard,
     }
-    number = _inserted(connection.execute(insert(schema.calibration).values(row)).inserted_primary_key)
+    connection.execute(insert(schema.calibration).values(row))
     columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
     rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in calibration.parameters]
     if rows:
         connection.execute(insert(schema.parameter), rows)
-
-
-def _inserted(key: Row[Any] | None) -> int:
-    assert key is not None
-    return int(key[0])

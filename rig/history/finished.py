@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
+CERTIFICATES = (PAGE, "certificate.pdf", "certificate.xml")
 CHUNK_BYTES = 1 << 20
 PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 

@@ -13,7 +13,7 @@ _of_the_parent: list[Pool] = []
 
 
 def kept_from_children(engine: Engine) -> Engine:
-    """The engine, which in a forked process begins with connections of its own."""
+    """Return the engine, which in a forked process begins with connections of its own."""
     _engines.add(engine)
     return engine
 

@@ -1,23 +1,26 @@
 """Whether what a history knows is still what was entered, and what lies on the disk."""
 
+import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import ValidationError
 
 from rig.config.regular_file import UnfitFile
 from rig.data.result_file import ResultDocument
-from rig.data.run_folder import RESULT
-from rig.history.finished import content_sha256, document_sha256, recording_of
+from rig.data.run_folder import RESULT, recordings
+from rig.history.finished import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
 from rig.history.index import run_row, unlike
 from rig.history.store import History, Kept, Past
 from rig.report.kinds.followed import Followed
 from rig.station.words import calibrations_in_words
 
-State = Literal["ok", "changed", "missing", "elsewhere"]
+State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]
+STATES: Sequence[State] = get_args(State)
+WRONG: Sequence[State] = ("changed", "missing", "unknown")
 MOST_TOLD = 3
 
 
@@ -31,20 +34,26 @@ class Found:
 
 
 def examined(history: History) -> Iterator[Found]:
-    """Rows against the journal, every run's against its result, files against their hashes where they were seen last.
+    """Triggers, numbers, rows against the journal, every run's against its result, and files against their hashes.
 
-    What was entered on another computer and is not to be seen from here is `elsewhere`.
+    Files are looked at where they were seen last. What was entered on another computer and is not to be seen from here
+    is `elsewhere`; a file of a run that no run was entered with is `unknown`.
     """
     here = platform.node()
     for each in history.broken():
         yield Found(each.what, each.state, each.why)
-    documents = _documents_by_folder(history)
+    documents = _files_by_folder(history)
+    looked_at: set[Path] = set()
     for run in history.kept():
         pasts = history.of_run(run.run_id)
         why = "; ".join(_contradictions(run, pasts))
         numbers = calibrations_in_words([each.id for each in pasts])
         yield Found(f"run {run.run_id}, {numbers}", "changed" if why else "ok", why)
-        yield from _files(run, here, documents)
+        folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
+        yield from _files(run, folder, here, documents)
+        if folder is not None and folder not in looked_at:
+            looked_at.add(folder)
+            yield from _unknown(folder, documents)
 
 
 def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
@@ -76,7 +85,7 @@ def _calibrated(past: Past) -> Followed:
     )
 
 
-def _documents_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
+def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
     """What the files of a folder may be, by its path: a run that was resumed there was entered again."""
     found: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
@@ -84,10 +93,9 @@ def _documents_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]
     return found
 
 
-def _files(run: Kept, here: str, documents: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
+def _files(run: Kept, folder: Path | None, here: str, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
     if not run.recordings and not run.documents:
         return
-    folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
     if folder is None:
         elsewhere = [name for name, _ in run.places if name != here]
         state: State = "elsewhere" if elsewhere else "missing"
@@ -102,7 +110,7 @@ def _files(run: Kept, here: str, documents: Mapping[str, set[tuple[str, str]]]) 
             yield _unreadable(file, error)
             continue
         yield _held(file, now.sha256, {recording.sha256})
-    allowed = documents.get(str(folder), set())
+    allowed = entered.get(str(folder), set())
     for name in sorted(_names(run, folder)):
         try:
             sha256 = document_sha256(folder, name)
@@ -113,6 +121,19 @@ def _files(run: Kept, here: str, documents: Mapping[str, set[tuple[str, str]]]) 
             yield Found(str(folder / name), "missing", "it was there when the run was entered")
         else:
             yield _held(folder / name, sha256, {each for known, each in allowed if known == name})
+
+
+def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
+    """Yield the files of a run in its folder that no run was entered with.
+
+    With a recording more, the folder gives another result.
+    """
+    known = {name for name, _ in entered.get(str(folder), set())}
+    recorded = [file.name for readings in ("raw", "calibrated") for file in recordings(folder, readings)]
+    there = [name for name in (*DOCUMENTS, *CERTIFICATES) if os.path.lexists(folder / name)]
+    for name in (*recorded, *there):
+        if name not in known:
+            yield Found(str(folder / name), "unknown", "no run in this history was entered with it")
 
 
 def _names(run: Kept, folder: Path) -> set[str]:

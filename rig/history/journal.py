@@ -71,7 +71,7 @@ def head(connection: Connection) -> Head:
 
 
 def has(connection: Connection, known: Head) -> bool:
-    """Whether there is a line with that chain, which every later one seals: told by this line alone, not reckoned."""
+    """Return whether there is a line with that chain. Only this line is read: `holds` reckons the chain."""
     lines = schema.journal.c
     if known.number == 0:
         return True

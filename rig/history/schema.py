@@ -23,6 +23,15 @@ HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
 
+
+def numbered() -> Column[int]:
+    """Make a column of numbers from 1 on without gaps, which whoever enters a row counts up (`numbers`).
+
+    Not the database: what PostgreSQL's sequences hand out to a transaction that ends without its rows is a gap.
+    """
+    return Column("id", Integer, primary_key=True, autoincrement=False)
+
+
 meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))
 
 # `measurement_sha256` is the same for results of the same recordings: one that was computed again, or of a run that was
@@ -30,7 +39,7 @@ meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Colu
 run = Table(
     "run",
     metadata,
-    Column("id", Integer, primary_key=True),
+    numbered(),
     Column("content_sha256", String(HASH), nullable=False, unique=True),
     Column("measurement_sha256", String(HASH), nullable=False, index=True),
     Column("started_utc", String(TIME), nullable=False, index=True),
@@ -52,7 +61,7 @@ run = Table(
 location = Table(
     "location",
     metadata,
-    Column("id", Integer, primary_key=True),
+    numbered(),
     Column("run_id", ForeignKey("run.id"), nullable=False),
     Column("computer", String(NAME), nullable=False),
     Column("path", String(4096), nullable=False),
@@ -72,7 +81,7 @@ recording = Table(
 calibration = Table(
     "calibration",
     metadata,
-    Column("id", Integer, primary_key=True),
+    numbered(),
     Column("run_id", ForeignKey("run.id"), nullable=False),
     Column("sensor", String(NAME), nullable=False),
     Column("quantity", String(40), nullable=False),
@@ -114,7 +123,7 @@ voided = Table(
 certificate = Table(
     "certificate",
     metadata,
-    Column("id", Integer, primary_key=True),
+    numbered(),
     Column("number", String(40), nullable=False, unique=True),
     Column("run_id", ForeignKey("run.id"), nullable=False, index=True),
     Column("title", String(40), nullable=False),

@@ -33,7 +33,7 @@ _sharing = threading.Lock()
 
 @contextmanager
 def shared_engine(file: Path, label: str) -> Iterator[Engine]:
-    """The process's engine of a history's file; the last who uses it closes its connections."""
+    """Yield the one engine that this process has of a history's file; the last who uses it closes its connections."""
     key = file.parent.resolve() / file.name
     with _sharing:
         if key not in _shared:
@@ -53,7 +53,7 @@ def shared_engine(file: Path, label: str) -> Iterator[Engine]:
 
 
 def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
-    """An engine of a file that is a history, or that will be a `new` one.
+    """Make an engine of a file that is a history, or that will be a `new` one.
 
     Each use of a connection raises Refused `history_gone` or `history_exchanged` where the file is not there any more,
     or another is.
@@ -85,7 +85,7 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Write-ahead log, so that readers and a writer do not wait for each other. Not for network shares."""
+    """Open a file with a write-ahead log: readers and a writer do not wait for each other. Not for network shares."""
     connection = _connected(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)
@@ -97,7 +97,7 @@ def _to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 
 
 def _only_to_read(file: Path) -> sqlite3.Connection:
-    """A file that this user may only read, in a folder in which nothing can be laid beside it.
+    """Open a file that this user may only read, in a folder in which nothing can be laid beside it.
 
     Whoever writes it has a log beside it; without one it stays as it is while it is read, so that nothing is locked.
     """
@@ -111,7 +111,7 @@ def _connected(file: Path, options: str) -> sqlite3.Connection:
 
 
 def _begin_anew() -> None:
-    """In a process that was forked: who works on an engine there, begins there."""
+    """Forget in a forked process the engines that its parent shares: who works on a file there, begins there."""
     _shared.clear()
     _sharing.release()
 

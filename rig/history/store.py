@@ -16,7 +16,7 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
-from rig.history import certificates, journal, read_back, schema
+from rig.history import certificates, journal, numbers, read_back, schema, triggers
 from rig.history.address import Place, place
 from rig.history.engine import WRITES, connection_apart, engine_of
 from rig.history.entering import enter_run, note_place, now_utc
@@ -222,12 +222,13 @@ class History:
                 yield _kept(connection, number)
 
     def files(self) -> Iterator[tuple[str, str, str]]:
-        """Where runs were seen, and what lies there beside the recordings: path, name, SHA-256."""
+        """Where runs were seen, and what lies there: path, name, SHA-256."""
         places, files = schema.location, schema.certificate_file
+        recorded = places.join(schema.recording, schema.recording.c.run_id == places.c.run_id)
         beside = places.join(schema.document, schema.document.c.run_id == places.c.run_id)
         issued = places.join(schema.certificate, schema.certificate.c.run_id == places.c.run_id).join(files)
         with self.engine.connect() as connection:
-            for table, of in ((schema.document, beside), (files, issued)):
+            for table, of in ((schema.recording, recorded), (schema.document, beside), (files, issued)):
                 yield from map(
                     tuple, connection.execute(select(places.c.path, table.c.name, table.c.sha256).select_from(of))
                 )
@@ -235,8 +236,10 @@ class History:
             yield from ((path, RESULT, sha256) for path, sha256 in connection.execute(result))
 
     def broken(self) -> Iterator[journal.Broken]:
-        """What is not as it was entered, as `journal.broken`."""
+        """What is not as it was entered: triggers, numbers, and rows as `journal.broken`."""
         with self.engine.connect() as connection:
+            yield from triggers.unlike_made(connection)
+            yield from numbers.gaps(connection)
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:

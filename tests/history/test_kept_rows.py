@@ -11,13 +11,15 @@ import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
+from rig.cli import main
 from rig.history import journal, schema
 from rig.history.engine import WRITES
 from rig.history.finished import content_sha256, finished_run
-from rig.history.integrity import examined
+from rig.history.integrity import WRONG, examined
 from rig.history.issued import Issued
 from rig.history.journal import Head
 from rig.history.store import History, open_history
+from rig.history.triggers import create_triggers
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
@@ -27,7 +29,7 @@ from support.paths import CONFIGS, FIXTURES
 from support.postgres import postgresql
 
 ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
-WRONG = ("changed", "missing")
+GAPS = ("run", "location", "calibration")
 TABLES = [table.name for table in schema.metadata.sorted_tables]
 
 
@@ -169,6 +171,7 @@ def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_e
             journal.note(connection, schema.certificate_file, 1, *file)
             for table in ("run", "location"):
                 journal.note(connection, schema.metadata.tables[table], 2)
+            create_triggers(connection)
         assert list(history.broken()) == [], "a journal that fits can be made by who may write every table"
         assert not history.holds(known)
         assert history.holds(Head(0, ""))
@@ -221,3 +224,92 @@ def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> No
     forge(file, "DELETE FROM journal WHERE kind IN ('run', 'location') AND key = '[2]'")
     with open_history(file) as history:
         assert "journal 3 to 4" in [each.what for each in examined(history)]
+
+
+def wrong(history: History) -> list[tuple[str, str]]:
+    return [(each.state, each.what) for each in examined(history) if each.state in WRONG]
+
+
+def carried_out(history: History, *statements: str) -> None:
+    with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        for statement in statements:
+            connection.execute(text(statement))
+
+
+@pytest.mark.parametrize("place", ["sqlite"], indirect=True)
+@pytest.mark.parametrize(
+    ("statements", "named"),
+    [
+        (["DROP TRIGGER run_not_changed"], ("missing", "trigger run_not_changed")),
+        (["DROP TRIGGER parameter_not_replaced"], ("missing", "trigger parameter_not_replaced")),
+        (["DROP TRIGGER journal_not_removed",
+          "CREATE TRIGGER journal_not_removed BEFORE DELETE ON journal WHEN OLD.number < 0 BEGIN SELECT 1; END"],
+         ("changed", "trigger journal_not_removed")),
+    ],
+)  # fmt: skip
+def test_a_trigger_of_a_file_that_does_not_say_no_any_more_is_named(
+    statements: list[str], named: tuple[str, str], place: str
+) -> None:
+    with open_history(place) as history:
+        assert wrong(history) == []
+        carried_out(history, *statements)
+        assert wrong(history) == [named]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["postgresql"], indirect=True)
+def test_a_trigger_of_a_server_that_does_not_say_no_any_more_is_named(place: str) -> None:
+    body = "BEGIN RETURN NULL; END"
+    with open_history(place) as history:
+        assert wrong(history) == []
+        carried_out(history, "ALTER TABLE run DISABLE TRIGGER not_changed", "DROP TRIGGER not_removed ON meta")
+        assert wrong(history) == [("missing", "trigger not_removed of meta"), ("changed", "trigger not_changed of run")]
+        carried_out(
+            history, f"CREATE OR REPLACE FUNCTION history_keeps_its_rows() RETURNS trigger LANGUAGE plpgsql AS '{body}'"
+        )
+        named = wrong(history)
+        assert ("changed", "trigger not_changed of journal") in named and len(named) == len(TABLES) + 1
+
+
+def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_written_anew(place: str) -> None:
+    with open_history(place) as history:
+        for day in range(4):
+            history.enter(finished(day))
+        assert wrong(history) == []
+        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+            drop_triggers(connection)
+            for number in (2, 3):
+                connection.execute(text(f"DELETE FROM parameter WHERE calibration_id = {number}"))
+                for table in ("calibration", "location", "recording"):
+                    connection.execute(text(f"DELETE FROM {table} WHERE run_id = {number}"))
+                connection.execute(text(f"DELETE FROM run WHERE id = {number}"))
+            connection.execute(text("DELETE FROM journal"))
+            journal.note_all(connection)
+            create_triggers(connection)
+        assert wrong(history) == [("missing", f"{table} 2 to 3") for table in GAPS]
+        if history.engine.dialect.name == "postgresql":  # of before, when its sequences handed numbers out, and gaps
+            carried_out(history, "CREATE SEQUENCE of_before")
+            carried_out(history, *(f"ALTER TABLE {each} ALTER id SET DEFAULT nextval('of_before')" for each in GAPS))
+            assert wrong(history) == []
+
+
+@pytest.mark.parametrize("name", ["run-2.h5", "run-17.h5", "verify-2.h5", "certificate.pdf", "script.py"])
+def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_path: Path) -> None:
+    folder = run_folder(tmp_path / "run")
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        history.enter(finished_run(folder))
+        (folder / "notes.txt").write_text("not of the run", encoding="utf-8")
+        assert wrong(history) == []
+        shutil.copy(folder / "run.h5", folder / name)
+        assert wrong(history) == [("unknown", str(folder / name))]
+        assert main(["history", "verify", "--history", str(tmp_path / "history.sqlite")]) == 1
+
+
+def test_a_run_that_was_gone_on_with_is_entered_with_its_new_recording(tmp_path: Path) -> None:
+    folder = run_folder(tmp_path / "run")
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        history.enter(finished_run(folder))
+        shutil.copy(folder / "run.h5", folder / "run-2.h5")
+        another_value(folder)
+        history.enter(replace(finished_run(folder), certificate=None))
+        assert wrong(history) == []
