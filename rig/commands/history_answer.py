@@ -41,7 +41,7 @@ def history_answer(place: "Place", work: Callable[[], T], imported: Sequence[str
 def why(error: Exception) -> str:
     """Say why a history was of no use, in a few words."""
     if isinstance(error, RigError):
-        return error.what
+        return f"{error.name}: {error.what}"
     if isinstance(error, TimeoutError):
         return f"it has not answered within {ANSWER_S:g} s"
     return f"{type(error).__name__}: {error}"

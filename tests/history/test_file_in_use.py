@@ -153,16 +153,16 @@ def overwrite_with_an_older_copy(file: Path) -> None:
 
 
 EXCHANGES = [
-    (remove, "was there before, and is not there any more"),
-    (put_a_new_one_there, "is not the one with which this program has worked before"),
-    (put_an_older_copy_there, "is not the one with which this program has worked before"),
-    (overwrite_with_an_older_copy, "is not the one with which this program has worked before"),
+    (remove, "history_gone: "),
+    (put_a_new_one_there, "history_exchanged: "),
+    (put_an_older_copy_there, "history_exchanged: "),
+    (overwrite_with_an_older_copy, "history_exchanged: "),
 ]
 
 
-@pytest.mark.parametrize(("exchange", "why"), EXCHANGES)
+@pytest.mark.parametrize(("exchange", "name"), EXCHANGES)
 def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered_in_it(
-    exchange: Callable[[Path], None], why: str, file: Path, monkeypatch: pytest.MonkeyPatch
+    exchange: Callable[[Path], None], name: str, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with open_history(str(file)) as history:
         history.enter(finished(0))
@@ -173,24 +173,24 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
         exchange(file)
     before = {each.name: each.read_bytes() for each in file.parent.iterdir()}
     event, _ = remember(FIXTURES / "verified", config.history)  # and ends
-    assert isinstance(event, NotRemembered) and why in event.why
-    assert why in (remembered(config, frozenset()).silent or "")
+    assert isinstance(event, NotRemembered) and name in event.why
+    assert name in (remembered(config, frozenset()).silent or "")
     assert {each.name: each.read_bytes() for each in file.parent.iterdir()} == before
     as_of_another_process()
     event, _ = remember(FIXTURES / "verified", config.history)
     assert isinstance(event, Remembered)
 
 
-@pytest.mark.parametrize(("exchange", "why"), EXCHANGES[:2])
+@pytest.mark.parametrize(("exchange", "name"), EXCHANGES[:2])
 def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
-    exchange: Callable[[Path], None], why: str, file: Path
+    exchange: Callable[[Path], None], name: str, file: Path
 ) -> None:
     """Though their connections still can."""
     with open_history(str(file)) as history:
         history.enter(finished(0))
         exchange(file)
         for work in (lambda: history.enter(finished(1)), history.calibrations):
-            with pytest.raises(Refused, match=why):
+            with pytest.raises(Refused, match=name):
                 work()
 
 
