@@ -1,9 +1,9 @@
 """What works on a history while a test looks on, each as a process: `python -m support.history_users WHO …`.
 
 `station FOLDER RIG PAUSE_S SEED` is what a station does to the history that RIG_HISTORY names, and no more: its
-heartbeat, and of each part what is asked before the run and entered after it, by the program's own functions. It works
-until its standard input ends. `notebook SECONDS` looks calibrations up and keeps a history open meanwhile. Each line on
-stdout is JSON.
+heartbeat, and of each part what is asked before the run and entered after it, by the program's own functions. The last
+part follows when its standard input has ended. `notebook SECONDS` looks calibrations up and keeps a history open
+meanwhile. Each line on stdout is JSON.
 """
 
 import json
@@ -19,7 +19,7 @@ from pathlib import Path
 from support.paths import CONFIGS, FIXTURES
 
 FIRST = datetime(2026, 1, 1, tzinfo=UTC)
-FEWEST, MOST = 2, 8  # parts
+PARTS = 4
 
 
 def tell(**said: object) -> None:
@@ -58,9 +58,9 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
     now = Now(rig=rig)
     with heartbeat(rig, place(os.environ["RIG_HISTORY"]), now) as heart:
         tell(state="begun")
-        for number in range(MOST):
-            if over.is_set() and number >= FEWEST:
-                return
+        for number in range(PARTS):
+            if number == PARTS - 1:
+                over.wait()
             serial_number = f"{rig}-{number}"
             heart.hear(replace(now, state="running", part=serial_number))
             silent = remembered(config, frozenset()).silent
@@ -72,7 +72,6 @@ def station(folder: Path, rig: str, pause_s: float, seed: int) -> None:
                 tell(not_remembered=getattr(event, "why", str(event)), silent=silent)
             heart.hear(replace(now, state="waiting"))
             time.sleep(drawn.uniform(0, pause_s))
-        over.wait()
 
 
 def notebook(seconds: float) -> None:
