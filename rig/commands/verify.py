@@ -2,7 +2,7 @@
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +17,19 @@ if TYPE_CHECKING:
 
 SIZE_MAX_BYTES = 256_000_000
 SCHEMA = "rig.verification/1"
-WRONG = 1
+WRONG, NOBODY_TRUSTED = 1, 4
+BY_NOBODY_TRUSTED = {"not_signed", "signer_unknown", "signer_not_trusted"}  # all is well but who answers for the file
+STATUSES = (
+    "exit status: 0 each file is whole, and signed by whom --trust and --signer name, or attached to one that is, or "
+    f"known to the history that --history names; {WRONG} a file was altered, or the history contradicts it; "
+    f"{NOBODY_TRUSTED} nobody who is trusted has signed a file: it is not signed, signed by another, or there is no "
+    "--trust; 2 it could not be found out"
+)
 
 
 def add(parser: ArgumentParser) -> None:
-    """The arguments of `rig verify`."""
+    """Add the arguments of `rig verify`."""
+    parser.epilog = STATUSES
     parser.add_argument(
         "files",
         nargs="+",
@@ -35,7 +43,13 @@ def add(parser: ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="CERTIFICATE",
-        help="that of the laboratory's key, or of who issued it, or of a time server: PEM or DER; may be repeated",
+        help="that of the laboratory's key, or of who issued it, or of a time server: PEM or DER; may be repeated; the "
+        "key's certificate must be made for signing documents",
+    )
+    parser.add_argument(
+        "--signer",
+        metavar="NAME",
+        help="the name that the key's certificate must have: its common name, or all of it, as CN=Example,O=Laboratory",
     )
     parser.add_argument(
         "--history", metavar="PLACE", help="whether this history knows the files, and still has them so"
@@ -53,13 +67,17 @@ class _Found:
 
 
 def run(options: Namespace) -> int:
-    """Look at each file and say what is found; returns 1 where one is not whole, not trusted, or not known.
+    """Look at each file and say what is found; returns 0, or the exit status that `--help` names.
 
-    Raises Refused `verify_file`, and as `trusted_in`, `looked_at` and `open_history`.
+    Raises Refused `bad_option`, `verify_file`, and as `trusted_in`, `looked_at` and `open_history`.
     """
     from rig.report.signatures.inspection import looked_at, trusted_in
+    from rig.report.signatures.trust import Trust
 
-    trust = trusted_in(options.trust)
+    if options.signer is not None and not options.trust:
+        what = "--signer names whom a trusted authority must have certified, and no --trust says which authority"
+        raise Refused("bad_option", what, "Give --trust CERTIFICATE too, or leave it out")
+    trust = Trust(trusted_in(options.trust), options.signer)
     contents = {file: _content(file) for file in options.files}
     looks = {file: looked_at(file.name, content, trust) for file, content in contents.items()}
     named = named_history(options.history)
@@ -70,7 +88,8 @@ def run(options: Namespace) -> int:
     else:
         for each in found:
             _tell(each)
-    return WRONG if any(each.problems for each in found) else 0
+    problems = {problem.name for document in found for problem in document.problems}
+    return WRONG if problems - BY_NOBODY_TRUSTED else NOBODY_TRUSTED if problems else 0
 
 
 def _content(file: Path) -> bytes:
@@ -108,24 +127,35 @@ def _known(named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, Loo
 
 def _found(file: Path, content: bytes, looks: "Mapping[Path, Looked]", known: Any) -> _Found:
     """A file that has no signature of its own is held by the signed one it is attached to, or by the history."""
-    from rig.report.signatures.findings import not_as_signed
-
     look, attached_to = looks[file], None
-    problems = list(look.problems)
+    problems = look.problems
     if not look.signatures:
-        holders = [(other, each.attached[file.name]) for other, each in looks.items() if file.name in each.attached]
-        attached_to = next((other.name for other, held in holders if held == content), None)
-        if attached_to is not None or (known is not None and not known.problems):
-            problems = [each for each in problems if each.name != "not_signed"]
-        elif holders:
-            named = ", ".join(dict.fromkeys(other.name for other, _ in holders))
-            problems = [not_as_signed(file.name, f"another is attached to {named}")]
+        attached_to, problems = _held(file.name, content, look, looks)
+        if known is not None and not known.problems:
+            problems = tuple(problem for problem in problems if problem.name not in BY_NOBODY_TRUSTED)
     said = () if known is None else known.said
     return _Found(file, look.signatures, said, attached_to, (*problems, *(() if known is None else known.problems)))
 
 
+def _held(
+    name: str, content: bytes, look: "Looked", looks: "Mapping[Path, Looked]"
+) -> tuple[str | None, tuple[Refused, ...]]:
+    """The signed file that an unsigned one is attached to, and what is wrong: if it is attached, as with its signer."""
+    from rig.report.signatures.findings import not_as_signed
+
+    holders = {other: signed for other, signed in looks.items() if name in signed.attached}
+    same = [other for other, signed in holders.items() if signed.attached[name] == content]
+    if same:
+        best = min(same, key=lambda other: len(looks[other].problems))
+        return best.name, looks[best].problems
+    if holders and {problem.name for problem in look.problems} == {"not_signed"}:
+        named = ", ".join(dict.fromkeys(other.name for other in holders))
+        return None, (not_as_signed(name, f"another is attached to {named}"),)
+    return None, look.problems
+
+
 def _tell(documents: _Found) -> None:
-    say(f"{documents.file}: {'NOT WHOLE, or not to be relied on' if documents.problems else 'whole'}")
+    say(f"{documents.file}: {_state(documents.problems)}")
     for each in documents.signatures:
         when = "at a time it does not say" if each.when is None else f"{each.when:%Y-%m-%d %H:%M:%S %Z}"
         clock = "the signer's own clock" if each.time_server is None else f"the time server {each.time_server}"
@@ -140,6 +170,13 @@ def _tell(documents: _Found) -> None:
         say(f"  in the history: {words}")
     for problem in documents.problems:
         say(f"  {problem}")
+
+
+def _state(problems: Sequence[Refused]) -> str:
+    if not problems:
+        return "whole"
+    altered = {problem.name for problem in problems} - BY_NOBODY_TRUSTED
+    return "NOT WHOLE, or not to be relied on" if altered else "NOT SIGNED BY ANYBODY WHO IS TRUSTED"
 
 
 _TRUSTED = {

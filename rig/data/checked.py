@@ -69,13 +69,13 @@ def parsed(content: str | bytes, most: int = MOST_RECORDED) -> Any:
         parse_float=_measured,
         parse_int=_measured,
         parse_constant=_measured,
-        object_pairs_hook=_each_once,
+        object_pairs_hook=each_key_once,
     )
     return seen(found)
 
 
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object of a JSON file. Raises ValueError where a key stands twice, of which each reader takes another."""
+def each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of a JSON file. Raises ValueError if a key stands twice: readers take different ones."""
     found = dict(pairs)
     if len(found) < len(pairs):
         keys = [key for key, _ in pairs]

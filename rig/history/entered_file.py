@@ -1,6 +1,7 @@
 """What a history knows of a file: which certificate or result it is, and whether that is still as it was entered."""
 
 import hashlib
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ from sqlalchemy import Connection, Table, select
 
 from rig.errors import Refused
 from rig.history import journal, schema
-from rig.history.finished import content_sha256
+from rig.history.finished import compact, content_sha256
 from rig.history.journal import Head
 from rig.history.store import History
 
@@ -22,10 +23,11 @@ class Known:
 
 
 def known(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> Known:
-    """A file by its SHA-256, a result.json by what it says; `anchor` is the journal's entry that its signature names.
+    """Return what the history has of a file, by its bytes, or by the values of a result.json.
 
-    It is a problem, `unknown_to_history`, if the history has no such file; `not_as_entered` if its rows have changed
-    since; `journal_rewritten` if the journal is not the one at the time of the signature.
+    `anchor` is the journal's entry that its signature names. It is a problem, `unknown_to_history`, if the history has
+    no such file; `not_as_entered` if its rows have changed since; `journal_rewritten` if the journal is not the one at
+    the time of the signature.
     """
     with history.engine.connect() as connection:
         found = list(_entries(connection, content))
@@ -56,8 +58,7 @@ def _entries(connection: Connection, content: bytes) -> Iterator[tuple[Table, tu
         of_runs.append(row.run_id)
     beside = schema.document.c
     of_runs += connection.scalars(select(beside.run_id).where(beside.sha256 == sha256))
-    result = _result(content)
-    of_runs += connection.scalars(select(runs.c.id).where(runs.c.content_sha256 == result)) if result else []
+    of_runs += _runs_of(connection, content)
     for number in sorted(set(of_runs)):
         row = connection.execute(select(runs).where(runs.c.id == number)).one()
         void = _voided(connection, number)
@@ -69,12 +70,16 @@ def _voided(connection: Connection, run_id: int) -> list[str]:
     return [f"calibration {row.calibration_id} is void: {row.reason}" for row in connection.execute(rows)]
 
 
-def _result(content: bytes) -> str | None:
-    """The hash of a result.json by which it is entered; None of anything else."""
+def _runs_of(connection: Connection, content: bytes) -> list[int]:
+    """The runs that were entered with this result.json: with every value of it, and in its order."""
+    runs = schema.run.c
     try:
-        return content_sha256(content.decode())
+        text = content.decode()
+        asked = select(runs.id, runs.result).where(runs.content_sha256 == content_sha256(text))
+        said = compact(json.loads(text))  # with the time it was computed, which the hash leaves out
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
+        return []
+    return [row.id for row in connection.execute(asked) if row.result == said]
 
 
 def _unknown(name: str) -> Refused:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.config.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file, read_regular_file
+from rig.data.checked import each_key_once
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
@@ -136,8 +137,11 @@ def compact(document: Any) -> str:
 
 
 def content_sha256(text: str) -> str:
-    """The hash of a result.json that tells it from others; in the order of the alphabet, without `solved_utc`."""
-    document = json.loads(text)
+    """The hash of a result.json that tells it from others; in the order of the alphabet, without `solved_utc`.
+
+    Raises ValueError if it is no JSON or a key stands twice, and what else a result of another form leads to.
+    """
+    document = json.loads(text, object_pairs_hook=each_key_once)
     document["provenance"].pop("solved_utc", None)
     said = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(said.encode()).hexdigest()

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 from asn1crypto.x509 import Certificate
-from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding
 from pyhanko.pdf_utils.generic import StreamObject
 from pyhanko.pdf_utils.reader import PdfFileReader
@@ -25,7 +24,8 @@ from rig.report.signatures.long_term import authorities_in
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signatory import signatory
 from rig.report.signatures.signing import signed_pdf
-from support.signing import PASSPHRASE, Holder, holder, issued, revocation_list, time_server
+from rig.report.signatures.trust import Trust
+from support.signing import PASSPHRASE, Holder, holder, revocation_list, stamping, time_server
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def signing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Signing
     monkeypatch.setenv("RIG_SIGNING_PASSPHRASE", PASSPHRASE)
     authority = holder("Authority")
     laboratory = holder("Laboratory", authority)
-    server = issued("Time server", rsa.generate_private_key(65537, 2048), authority, stamps=True)
+    server = stamping("Time server", authority)
     with time_server(server) as url:
         yield Signing(laboratory.p12(tmp_path / "key.p12"), laboratory, authority, url, tmp_path)
 
@@ -69,7 +69,7 @@ def page() -> bytes:
 
 
 def seen(pdf: bytes, trust: list[bytes]) -> Looked:
-    return looked_at("certificate.pdf", pdf, trust)
+    return looked_at("certificate.pdf", pdf, Trust(tuple(trust)))
 
 
 def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(signing: Signing) -> None:
@@ -95,9 +95,9 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
 def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     own = signing.laboratory.chain[0].public_bytes(Encoding.DER)
-    for trust in ([], [own], [own, *signing.trust]):
+    for trust, problems in (([], ["signer_unknown"]), ([own], ["signer_not_trusted"]), ([own, *signing.trust], [])):
         looked = seen(made, trust)
-        assert not looked.problems and not looked.signatures[0].long_term
+        assert [problem.name for problem in looked.problems] == problems and not looked.signatures[0].long_term
 
 
 def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:

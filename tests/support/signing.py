@@ -20,7 +20,13 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from rig.report.signatures.signatory import Signatory
+
 PASSPHRASE = "a passphrase"
+USAGES = (
+    *("digital_signature", "content_commitment", "key_encipherment", "data_encipherment", "key_agreement"),
+    *("key_cert_sign", "crl_sign", "encipher_only", "decipher_only"),
+)
 Key = rsa.RSAPrivateKey | ec.EllipticCurvePrivateKey
 
 
@@ -55,29 +61,54 @@ def holder(name: str, above: Holder | None = None, *, days: tuple[int, int] = (-
 
 
 def issued(
-    name: str, key: Key, above: Holder | None = None, *, days: tuple[int, int] = (-1, 30), stamps: bool = False
+    name: str,
+    key: Key,
+    above: Holder | None = None,
+    *,
+    days: tuple[int, int] = (-1, 30),
+    usage: Sequence[str] | None = None,
+    purposes: Sequence[x509.ObjectIdentifier] = (),
 ) -> Holder:
-    """The holder of this key; one that `stamps` gives time stamps."""
+    """Return the holder of this key, whose certificate has this key usage and these purposes (extended key usage).
+
+    Without a `usage` it is that of who signs documents or, without one above, of an authority; an empty one is absent.
+    """
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     issuer = subject if above is None else above.chain[0].subject
     begin, end = (datetime.now(UTC) + timedelta(days=each) for each in days)
     signs = above is not None
-    usage = x509.KeyUsage(
-        **dict.fromkeys(("digital_signature", "content_commitment"), signs),
-        **dict.fromkeys(("key_cert_sign", "crl_sign"), not signs),
-        **dict.fromkeys(
-            ("key_encipherment", "data_encipherment", "key_agreement", "encipher_only", "decipher_only"), False
-        ),
-    )
-    made = (
-        x509.CertificateBuilder(issuer, subject, key.public_key(), x509.random_serial_number(), begin, end)
-        .add_extension(x509.BasicConstraints(ca=not signs, path_length=None), critical=True)
-        .add_extension(usage, critical=True)
-    )
-    if stamps:
-        made = made.add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.TIME_STAMPING]), critical=True)
+    if usage is None:
+        usage = ("digital_signature", "content_commitment") if signs else ("key_cert_sign", "crl_sign")
+    made = x509.CertificateBuilder(issuer, subject, key.public_key(), x509.random_serial_number(), begin, end)
+    made = made.add_extension(x509.BasicConstraints(ca=not signs, path_length=None), critical=True)
+    if usage:
+        bits = x509.KeyUsage(**{bit: bit in usage for bit in USAGES})
+        made = made.add_extension(bits, critical=True)
+    if purposes:
+        made = made.add_extension(x509.ExtendedKeyUsage(purposes), critical=True)
     certificate = made.sign(key if above is None else above.key, hashes.SHA256())
     return Holder(key, (certificate, *(() if above is None else above.chain)))
+
+
+def stamping(name: str, above: Holder) -> Holder:
+    """Return a time server's key with a certificate of that authority."""
+    purposes = [ExtendedKeyUsageOID.TIME_STAMPING]
+    return issued(name, rsa.generate_private_key(65537, 2048), above, purposes=purposes)
+
+
+def signing_as(by: Holder) -> Signatory:
+    """Return the signatory with this key, which nothing asks whether it may sign documents."""
+    from asn1crypto import keys
+    from asn1crypto import x509 as asn1
+    from pyhanko.sign.signers import SimpleSigner
+    from pyhanko_certvalidator.registry import SimpleCertificateStore
+
+    own, *above = (asn1.Certificate.load(each.public_bytes(Encoding.DER)) for each in by.chain)
+    private = by.key.private_bytes(Encoding.DER, PrivateFormat.PKCS8, NoEncryption())
+    known = SimpleCertificateStore()
+    known.register_multiple(above)
+    signer = SimpleSigner(signing_cert=own, signing_key=keys.PrivateKeyInfo.load(private), cert_registry=known)
+    return Signatory(signer, by.chain)
 
 
 def revocation_list(by: Holder, *revoked: Holder, days: tuple[int, int] = (-1, 7)) -> bytes:

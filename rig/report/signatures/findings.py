@@ -1,16 +1,11 @@
 """What a look at a signed file found: its signatures, and the names of what is wrong with it."""
 
-import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from rig.errors import Refused
 from rig.report.signatures.reason import Reason
-
-if TYPE_CHECKING:
-    from asn1crypto.crl import CertificateList
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,43 +47,4 @@ def not_as_signed(name: str, why: str) -> Refused:
     """The problem of a file that was altered, or never was what is signed."""
     return Refused(
         "not_as_signed", f"{name} is not what was signed: {why}", "Do not rely on it; ask the laboratory for it"
-    )
-
-
-def untrusted(
-    chain: Sequence[bytes], trust: Sequence[bytes], moment: datetime, lists: "Sequence[CertificateList]" = ()
-) -> str:
-    """Why the first of a `chain` of certificates (DER) leads to none of those trusted then; empty if it does.
-
-    Where there are `lists` of revoked certificates, they have to clear all of the way.
-    """
-    from asn1crypto.x509 import Certificate
-    from pyhanko_certvalidator import CertificateValidator, ValidationContext
-    from pyhanko_certvalidator.errors import PathError, ValidationError
-
-    own, *others = map(Certificate.load, chain)
-    begin, end = own.not_valid_before, own.not_valid_after
-    if not begin <= moment <= end:  # one that is trusted itself is not asked this below
-        return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, and not on {moment:%Y-%m-%d}"
-    context = ValidationContext(
-        trust_roots=list(map(Certificate.load, trust)),
-        other_certs=others,
-        moment=moment,
-        crls=list(lists),
-        revocation_mode="require" if lists else "soft-fail",
-        allow_fetching=False,
-    )
-    try:
-        asyncio.run(CertificateValidator(own, validation_context=context).async_validate_usage(set()))
-    except (PathError, ValidationError) as error:
-        return " ".join(str(error).split())
-    return ""
-
-
-def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
-    """The problem of a file that is whole, and signed by somebody else than was expected."""
-    return Refused(
-        "signer_not_trusted",
-        f"{name} is signed by {signer}, who is not trusted: {why}",
-        "Compare the SHA-256 of the certificate with what the laboratory says, and give the right one with --trust",
     )

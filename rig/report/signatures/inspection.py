@@ -1,5 +1,6 @@
 """What is seen of a file's signatures: who, when, why, and what is wrong; nothing is signed here."""
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,10 +9,13 @@ from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.report.signatures.findings import Looked, not_as_signed, not_signed
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
+from rig.report.signatures.trust import Trust
+
+HEAD_BYTES = 200  # in which it shows what a file is
 
 
-def looked_at(name: str, content: bytes, trust: Sequence[bytes]) -> Looked:
-    """A file by its content: PDF, XML, or one that has no signature of its own. `trust` are certificates in DER.
+def looked_at(name: str, content: bytes, trust: Trust) -> Looked:
+    """Look at a file by its content: PDF, XML, or one that has no signature of its own.
 
     Raises Refused `missing_extra`.
     """
@@ -22,19 +26,26 @@ def looked_at(name: str, content: bytes, trust: Sequence[bytes]) -> Looked:
         raise missing_extra(error, EXTRA) from error
     if content.startswith(b"%PDF-"):
         look = seen_pdf
-    elif content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<?xml"):
+    elif _is_xml(content):
         look = seen_xml
     else:
         return Looked(problems=(not_signed(name),))
     try:
-        return look(name, content, trust)
+        with warnings.catch_warnings(action="ignore"):  # the libraries' own, about what such a file holds
+            return look(name, content, trust)
     except Exception as error:  # of a file that anybody may have made the libraries raise whatever they meet
         why = str(error).strip().splitlines()
         return Looked(problems=(not_as_signed(name, f"it cannot be read: {why[0] if why else type(error).__name__}"),))
 
 
-def trusted_in(files: Sequence[Path]) -> list[bytes]:
-    """The certificates in these files, PEM or DER, as DER. Raises Refused `trust_file`, `missing_extra`."""
+def _is_xml(content: bytes) -> bool:
+    """Whether the file begins as XML does, in an encoding of one or two bytes a character, and not as HTML."""
+    head = content[:HEAD_BYTES].lstrip(b"\xef\xbb\xbf\xfe\xff").replace(b"\0", b"").lstrip().lower()
+    return head.startswith(b"<") and not head.startswith(b"<!doctype html")
+
+
+def trusted_in(files: Sequence[Path]) -> tuple[bytes, ...]:
+    """Return the certificates in these files, PEM or DER, as DER. Raises Refused `trust_file`, `missing_extra`."""
     try:
         from cryptography.hazmat.primitives.serialization import Encoding
         from cryptography.x509 import load_der_x509_certificate, load_pem_x509_certificates
@@ -49,4 +60,4 @@ def trusted_in(files: Sequence[Path]) -> list[bytes]:
         except (UnfitFile, OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
             raise Refused("trust_file", f"{file} is no certificate: {why}", "Give it as PEM or DER") from None
-    return [each.public_bytes(Encoding.DER) for each in found]
+    return tuple(each.public_bytes(Encoding.DER) for each in found)

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, unquote
 
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
+from rig.report.signatures.token_address import PASSPHRASE, TokenKey, is_token_address, token_key
+from rig.report.signatures.trust import chain_of, unfit_for_documents
 
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate
 
-PASSPHRASE = "RIG_SIGNING_PASSPHRASE"
-EXTRA, DIGEST, TOKEN = "sign", "sha256", "pkcs11:"
+EXTRA, DIGEST = "sign", "sha256"
 SIZE_MAX_BYTES = 1_000_000
 _BLOCK = re.compile(rb"-----BEGIN ([A-Z ]*PRIVATE KEY)-----.*?-----END \1-----", re.DOTALL)
 REMEDY = f"Give a PKCS#12 or PEM file that holds an RSA or EC key with its certificate; its passphrase in {PASSPHRASE}"
@@ -49,9 +49,15 @@ def signatory(where: str) -> Iterator[Signatory]:
         import signxml  # noqa: F401
     except ImportError as error:
         raise missing_extra(error, EXTRA) from error
-    with _of_token(where) if where.startswith(TOKEN) else _of_file(Path(where)) as found:
-        _check(found, where.partition("?")[0])
-        yield found
+    if is_token_address(where):
+        key = token_key(where)
+        with _of_token(key) as found:
+            _check(found, key.label)
+            yield found
+    else:
+        with _of_file(Path(where)) as found:
+            _check(found, where)
+            yield found
 
 
 @contextmanager
@@ -83,8 +89,8 @@ def _of_file(file: Path) -> Iterator[Signatory]:
     ordered = _own_first(certificates, key)
     if key is None or not ordered:
         raise _unfit(str(file), "it does not hold a key and the certificate of this key")
-    known = SimpleCertificateStore()
-    known.register_multiple(map(translate_pyca_cryptography_cert_to_asn1, ordered))
+    known = SimpleCertificateStore()  # of those above it; its own comes by itself
+    known.register_multiple(map(translate_pyca_cryptography_cert_to_asn1, ordered[1:]))
     try:
         own_key = translate_pyca_cryptography_key_to_asn1(key)
     except (ValueError, TypeError, NotImplementedError) as error:
@@ -100,56 +106,48 @@ def _of_file(file: Path) -> Iterator[Signatory]:
 
 
 def _own_first(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
-    """The certificates, the key's own before the others; empty where none is of the key."""
-    if key is None:
-        return []
-    own = [each for each in certificates if each.public_key() == key.public_key()]
-    return [*own[:1], *(each for each in certificates if each not in own)] if own else []
+    """The certificates, the key's own before those above it; empty where none is of the key."""
+    own = [] if key is None else [each for each in certificates if each.public_key() == key.public_key()]
+    return chain_of([own[0], *certificates]) if own else []
 
 
 @contextmanager
-def _of_token(where: str) -> Iterator[Signatory]:
+def _of_token(key: TokenKey) -> Iterator[Signatory]:
     """The key in a token and the certificate beside it, both of one label."""
     try:
         import pkcs11
         from pyhanko.config.pkcs11 import TokenCriteria
+        from pyhanko.keys.internal import translate_pyca_cryptography_cert_to_asn1
         from pyhanko.sign.pkcs11 import PKCS11Signer, open_pkcs11_session
     except ImportError as error:
         raise missing_extra(error, EXTRA) from error
     from cryptography.x509 import load_der_x509_certificate
 
-    path, _, query = where.removeprefix(TOKEN).partition("?")
-    named = {name: unquote(value) for name, _, value in (each.partition("=") for each in path.split(";"))}
-    library = parse_qs(query).get("module-path", [""])[0]
-    label, name = f"{TOKEN}{path}", named.get("object")
-    if not library or name is None or named.keys() - {"token", "object"}:
-        form = f"{TOKEN}token=NAME;object=NAME?module-path=LIBRARY"
-        raise Refused("signing_key", f"{label} does not say which key", f"Name it as {form}; its PIN in {PASSPHRASE}")
     try:
         session = open_pkcs11_session(
-            library, token_criteria=TokenCriteria(label=named.get("token")), user_pin=os.environ.get(PASSPHRASE)
+            key.library, token_criteria=TokenCriteria(label=key.token), user_pin=os.environ.get(PASSPHRASE)
         )
         with session:
-            signer = PKCS11Signer(session, cert_label=name, key_label=name, other_certs_to_pull=None)
+            all_there = PKCS11Signer(session, cert_label=key.name, key_label=key.name, other_certs_to_pull=None)
+            asyncio.run(all_there.ensure_objects_loaded())
+            if all_there.signing_cert is None:
+                raise _unfit(key.label, "no certificate of that name is in the token")
+            found = (all_there.signing_cert, *all_there.cert_registry)
+            certificates = chain_of([load_der_x509_certificate(one.dump()) for one in found])
+            above = map(translate_pyca_cryptography_cert_to_asn1, certificates[1:])
+            signer = PKCS11Signer(session, cert_label=key.name, key_label=key.name, ca_chain=list(above))
             asyncio.run(signer.ensure_objects_loaded())
-            own = signer.signing_cert
-            others = [each for each in signer.cert_registry if own is not None and each.dump() != own.dump()]
-            if own is None:
-                raise _unfit(label, "no certificate of that name is in the token")
-            signer.use_raw_mechanism = own.public_key.algorithm == "ec"  # many tokens hash for RSA alone
-            yield Signatory(signer, tuple(load_der_x509_certificate(each.dump()) for each in (own, *others)))
+            signer.use_raw_mechanism = all_there.signing_cert.public_key.algorithm == "ec"  # many hash for RSA alone
+            yield Signatory(signer, tuple(certificates))
     except pkcs11.exceptions.PKCS11Error as error:
-        raise _unfit(label, str(error) or type(error).__name__) from error
+        raise _unfit(key.label, str(error) or type(error).__name__) from error
 
 
 def _check(signatory: Signatory, where: str) -> None:
-    """Raises Refused `signing_key` where a certificate is not valid now, or the key is neither RSA nor EC."""
-    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
-    from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
-
+    """Raises Refused `signing_key` where a certificate is not valid now, or a verifier would not accept its key."""
     own = signatory.certificates[0]
-    if not isinstance(own.public_key(), RSAPublicKey | EllipticCurvePublicKey):
-        raise _unfit(where, "its key is neither RSA nor EC")
+    for why in unfit_for_documents(own):
+        raise _unfit(where, why)
     if not own.not_valid_before_utc <= datetime.now(UTC) <= own.not_valid_after_utc:
         days = f"{own.not_valid_before_utc:%Y-%m-%d} to {own.not_valid_after_utc:%Y-%m-%d}"
         raise _unfit(where, f"its certificate is valid from {days}, and not now")

@@ -1,0 +1,100 @@
+"""What the container of a signature (CMS, RFC 5652) holds beside what is signed: nothing that nobody vouches for."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from asn1crypto import cms
+from cryptography.x509 import Certificate, load_der_x509_certificate
+from pyhanko.sign.general import extract_certificate_info
+
+from rig.report.signatures.signatory import DIGEST
+from rig.report.signatures.trust import chain_of
+
+DATA, STAMPED = "v1", "v3"  # versions of a container, by what is in it (RFC 5652, 5.1)
+METHODS = ("sha256_rsa", "rsassa_pkcs1v15", "sha256_ecdsa")
+WITH_PARAMETERS = "rsassa_pss"
+
+
+def uncovered_in_container(der: bytes) -> Iterator[str]:
+    """Yield what is in the container of a document's signature that it does not cover.
+
+    `der` is its ContentInfo. A signature covers its signed attributes alone. So the container must be, to the byte,
+    what can be rebuilt of these, of the signature's value, of the certificates of the signer's chain and of at most
+    one time stamp, to which the same applies. Whether the certificates are what was issued is not asked here.
+    """
+    content = cms.ContentInfo.load(der, strict=True)
+    (info,) = content["content"]["signer_infos"]
+    method = info["signature_algorithm"]["algorithm"].native
+    if info["digest_algorithm"]["algorithm"].native != DIGEST or method not in METHODS:
+        yield f"it is signed by a method that is not accepted: {method}"
+    if "signing_certificate_v2" not in [attribute["type"].native for attribute in info["signed_attrs"]]:
+        yield "what is signed does not say whose certificate it is"
+    yield from _uncovered(content, der, DATA)
+    stamps = [(attribute["type"].native, list(attribute["values"])) for attribute in info["unsigned_attrs"] or ()]
+    if [(kind, len(values)) for kind, values in stamps] not in ([], [("signature_time_stamp_token", 1)]):
+        yield "beside its signature there is more than a time stamp"
+        return
+    for _, (stamp,) in stamps:
+        yield from _uncovered(stamp, stamp.dump(), STAMPED)
+        if stamp["content"]["signer_infos"][0]["unsigned_attrs"]:
+            yield "its time stamp holds something that is not signed"
+
+
+def certificates_with(der: bytes) -> list[list[Certificate]]:
+    """Return the certificates that come with a signature, and those with its time stamp; of each its signer's first."""
+    contents = [cms.ContentInfo.load(der)["content"]]
+    for attribute in contents[0]["signer_infos"][0]["unsigned_attrs"] or ():
+        contents += [stamp["content"] for stamp in attribute["values"]]
+    return [_certificates(content) for content in contents]
+
+
+def _certificates(content: Any) -> list[Certificate]:
+    signer = extract_certificate_info(content).signer_cert  # of two that claim to be the signer's, the last
+    found = (signer, *(choice.chosen for choice in content["certificates"]))
+    return [load_der_x509_certificate(one.dump()) for one in found]
+
+
+def _uncovered(content: Any, der: bytes, version: str) -> Iterator[str]:
+    container = content["content"]
+    (info,) = container["signer_infos"]
+    if _rebuilt(container, info, extract_certificate_info(container).signer_cert, version).dump() != der:
+        yield "in its signature's container there is something that is not signed"
+    if any(choice.name != "certificate" for choice in container["certificates"]):
+        yield "with its signature comes something else than certificates of keys"
+    certificates = _certificates(container)
+    chain = chain_of(certificates)
+    for stranger in (certificate for certificate in certificates if certificate not in chain):
+        yield f"with its signature comes a certificate of {stranger.subject.rfc4514_string()}, which has issued none"
+
+
+def _rebuilt(container: Any, info: Any, signer: Any, version: str) -> Any:
+    digest = info["digest_algorithm"]
+    digests = [one for one in container["digest_algorithms"] if one["algorithm"].native == digest["algorithm"].native]
+    who = {"issuer": signer.issuer, "serial_number": signer.serial_number}
+    by = {
+        "version": "v1",
+        "sid": cms.SignerIdentifier("issuer_and_serial_number", cms.IssuerAndSerialNumber(who)),
+        "digest_algorithm": _plain(digest),
+        "signed_attrs": info["signed_attrs"],
+        "signature_algorithm": _plain(info["signature_algorithm"]),
+        "signature": info["signature"],
+    }
+    if info["unsigned_attrs"]:
+        by["unsigned_attrs"] = info["unsigned_attrs"]
+    signed = {
+        "version": version,
+        "digest_algorithms": list(map(_plain, digests)),
+        "encap_content_info": {"content_type": "data"} if version == DATA else container["encap_content_info"],
+        "certificates": container["certificates"],
+        "signer_infos": [cms.SignerInfo(by)],
+    }
+    return cms.ContentInfo({"content_type": "signed_data", "content": cms.SignedData(signed)})
+
+
+def _plain(algorithm: Any) -> Any:
+    """The algorithm without parameters, or with none (NULL), as it is; nothing else may stand there."""
+    name = algorithm["algorithm"].native
+    if name == WITH_PARAMETERS:
+        return algorithm
+    forms = [type(algorithm)({"algorithm": name, **none}) for none in ({}, {"parameters": None})]
+    return next((form for form in forms if form.dump() == algorithm.dump()), forms[0])

@@ -1,0 +1,182 @@
+"""Whom a verifier trusts, and whether a certificate of a key is theirs and is made for signing documents (RFC 5280)."""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from asn1crypto.crl import CertificateList
+    from cryptography.x509 import Certificate
+
+RSA_MIN_BITS, EC_MIN_BITS = 2048, 256  # ETSI TS 119 312, clause 6.2: what is to be used today
+DOCUMENT_PURPOSES = {
+    "1.3.6.1.5.5.7.3.36": "documents (RFC 9336)",
+    "1.3.6.1.4.1.311.10.3.12": "documents (Microsoft)",
+    "1.2.840.113583.1.1.5": "documents (Adobe)",
+    "1.3.6.1.5.5.7.3.4": "e-mail",  # what authorities gave to who signs documents before RFC 9336
+    "2.5.29.37.0": "any purpose",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """Certificates that are trusted (DER), of signers or of their authorities, and the name the signer must have."""
+
+    certificates: tuple[bytes, ...] = ()
+    signer: str | None = None
+
+
+def why_untrusted(
+    chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]" = ()
+) -> str:
+    """Return why the signer whose certificate begins this `chain` (DER) is not trusted; empty if it is.
+
+    The certificate must be valid at the `moment`, lead to a trusted one, be made for signing documents and bear the
+    expected name. Where there are `lists` of revoked certificates, they have to clear all of the way.
+    """
+    from cryptography.x509 import load_der_x509_certificate
+
+    own = load_der_x509_certificate(chain[0])
+    begin, end = own.not_valid_before_utc, own.not_valid_after_utc
+    if not begin <= moment <= end:  # path validation does not ask this of a certificate that is trusted itself
+        return f"the certificate is valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, and not on {moment:%Y-%m-%d}"
+    return _no_path(chain, trust, moment, lists) or next(unfit_for_documents(own), "") or _other_name(own, trust.signer)
+
+
+def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]") -> str:
+    from asn1crypto.x509 import Certificate
+    from pyhanko_certvalidator import CertificateValidator, ValidationContext
+    from pyhanko_certvalidator.errors import PathError, ValidationError
+
+    own, *others = map(Certificate.load, chain)
+    context = ValidationContext(
+        trust_roots=list(map(Certificate.load, trust.certificates)),
+        other_certs=others,
+        moment=moment,
+        crls=list(lists),
+        revocation_mode="require" if lists else "soft-fail",
+        allow_fetching=False,
+    )
+    try:
+        asyncio.run(CertificateValidator(own, validation_context=context).async_validate_usage(set()))
+    except (PathError, ValidationError) as error:
+        return " ".join(str(error).split())
+    return ""
+
+
+def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
+    """Yield why a key with this certificate may not sign documents: its key usage, its purposes, a key too short.
+
+    An absent key usage permits nothing here, though RFC 5280 (4.2.1.3) lets it permit all: certificates of web servers
+    that small authorities issue often have none.
+    """
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
+    from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
+    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound, KeyUsage
+
+    extensions = certificate.extensions
+    try:
+        usage = extensions.get_extension_for_class(KeyUsage).value
+        signs = usage.digital_signature or usage.content_commitment
+    except ExtensionNotFound:
+        signs = False
+    if not signs:
+        yield "its certificate is not made for signing documents: the key usage is not digitalSignature"
+    try:
+        purposes = [purpose.dotted_string for purpose in extensions.get_extension_for_class(ExtendedKeyUsage).value]
+    except ExtensionNotFound:
+        purposes = list(DOCUMENT_PURPOSES)
+    if not DOCUMENT_PURPOSES.keys() & purposes:
+        yield f"its certificate is not made for signing documents: its extended key usage is {', '.join(purposes)}"
+    key = certificate.public_key()
+    if not isinstance(key, RSAPublicKey | EllipticCurvePublicKey):
+        yield "its key is neither RSA nor EC"
+    elif key.key_size < (RSA_MIN_BITS if isinstance(key, RSAPublicKey) else EC_MIN_BITS):
+        yield f"its key is weak: it has {key.key_size} bits"
+
+
+def _other_name(certificate: "Certificate", expected: str | None) -> str:
+    from cryptography.x509.oid import NameOID
+
+    subject = certificate.subject
+    names = [str(name.value) for name in subject.get_attributes_for_oid(NameOID.COMMON_NAME)]
+    if expected is None or expected == subject.rfc4514_string() or names == [expected]:
+        return ""
+    return f"the name that --signer expects is {expected}"
+
+
+def unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
+    """Return those of a signer's `chain` but the first, which the signature itself names, whose content may be altered.
+
+    Somebody vouches for one that is trusted itself, or was issued by another of the chain or a trusted one.
+    """
+    from cryptography.hazmat.primitives.serialization import Encoding
+    from cryptography.x509 import load_der_x509_certificate
+
+    issuers = [*chain, *map(load_der_x509_certificate, trust.certificates)]
+    return [
+        one
+        for one in chain
+        if one != chain[0]
+        and one.public_bytes(Encoding.DER) not in trust.certificates
+        and not any(_issued(issuer, one) for issuer in issuers)
+    ]
+
+
+def chain_of(certificates: "Sequence[Certificate]") -> list["Certificate"]:
+    """Return the first of the certificates, and those of the others that lead from it upwards."""
+    chain, rest = [certificates[0]], [other for other in certificates if other != certificates[0]]
+    while issuers := [other for other in rest if any(_issued(other, one) for one in chain)]:
+        chain += issuers
+        rest = [other for other in rest if other not in issuers]
+    return chain
+
+
+def _issued(issuer: "Certificate", certificate: "Certificate") -> bool:
+    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+
+    try:
+        certificate.verify_directly_issued_by(issuer)
+    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
+        return False
+    return True
+
+
+def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
+    """Return the problem of a file that is unaltered, and signed by somebody else than was expected."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} is signed by {signer}, who is not trusted: {why}",
+        "Compare the SHA-256 of the certificate with what the laboratory says, and give the right one with --trust",
+    )
+
+
+def stamp_not_trusted(name: str, server: str) -> Refused:
+    """Return the problem of a file whose time stamp anybody may have made."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} has a time stamp by {server}, who is not trusted",
+        "Give the certificate of the time server, or of the authority that issued it, with --trust too",
+    )
+
+
+def authority_not_trusted(name: str, authority: str) -> Refused:
+    """Return the problem of a file with an authority's certificate that may have been altered."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} brings a certificate of {authority} that nobody who is trusted has issued",
+        "Give the certificate of this authority, or of the one above it, with --trust too",
+    )
+
+
+def signer_unknown(name: str, signer: str) -> Refused:
+    """Return the problem of a file that is unaltered, by a verifier who trusts nobody."""
+    return Refused(
+        "signer_unknown",
+        f"{name} is signed by {signer}, and anybody may have made a key of that name",
+        "Give the certificate of the laboratory's key, or of the authority that issued it, with --trust",
+    )

@@ -1,0 +1,97 @@
+"""A signed digital certificate as text and tree: how it is read, and what it must be if nothing of it is unsigned."""
+
+import re
+from base64 import b64decode, b64encode
+from hashlib import sha256
+from typing import Any
+
+from lxml import etree
+from signxml.algorithms import CanonicalizationMethod, DigestAlgorithm, SignatureConstructionMethod
+from signxml.util import namespaces
+
+NAMES = {"ds": namespaces.ds, "xades": namespaces.xades}
+BEFORE_PROPERTIES = "-SignedProperties"  # in the Id of the signed properties: what stands before it is the signature's
+_ENCODINGS = {  # by the first bytes: how to decode the text, and the names that its declaration may give this
+    b"\xff\xfe": ("utf-16", {"utf-16", "utf-16le"}),
+    b"\xfe\xff": ("utf-16", {"utf-16", "utf-16be"}),
+    b"<\0": ("utf-16-le", {"utf-16", "utf-16le"}),
+    b"\0<": ("utf-16-be", {"utf-16", "utf-16be"}),
+}
+_UTF_8 = ("utf-8-sig", {"utf-8"})
+_DECLARATION = re.compile(
+    r"""<\?xml\s+version\s*=\s*(["'])1\.0\1
+        (?:\s+encoding\s*=\s*(["'])(?P<encoding>[A-Za-z0-9_-]+)\2)?
+        (?:\s+standalone\s*=\s*(["'])(?:yes|no)\4)?\s*\?>""",
+    re.VERBOSE,
+)
+
+
+def read_xml(content: bytes) -> Any:
+    """Return the root of a document in UTF-8 or UTF-16, with its declaration or without one.
+
+    The bytes decide about the encoding, so that no two readers take them for different texts. Raises ValueError for
+    another encoding, for a declaration that contradicts the bytes and for a document type, and as lxml does.
+    """
+    codec, names = _ENCODINGS.get(content[:2], _UTF_8)
+    text = content.decode(codec)
+    declaration = _DECLARATION.match(text)
+    if declaration is not None:
+        encoding = declaration["encoding"]
+        if encoding is not None and encoding.lower() not in names:
+            raise ValueError(f"it says that its encoding is {encoding}, and it is {codec}")
+        text = text[declaration.end() :]
+    elif re.match(r"<\?xml\s", text):
+        raise ValueError("its declaration is not one of XML 1.0 in UTF-8 or UTF-16")
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, encoding="utf-8")
+    root = etree.fromstring(text.encode(), parser)
+    if root.getroottree().docinfo.doctype:
+        raise ValueError("it has a document type, which no signature covers")
+    return root
+
+
+def canonical(root: Any) -> bytes:
+    """Return all that a reader of the document could read: its canonical form (C14N) with comments, from end to end."""
+    made: bytes = etree.tostring(root.getroottree(), method="c14n", with_comments=True)
+    return made
+
+
+def rebuilt(verified: tuple[bytes, bytes, bytes], method: str, value: str) -> Any:
+    """Return the root of the one document that this signature makes whole, built of what is verified and nothing else.
+
+    `verified` are the canonical forms whose digests are signed, of the document without its signature, of the signed
+    properties (XAdES) and of the key's certificates; `method` is that of the signature and `value` its value in base64.
+    All else in it follows from these: the names from the signed properties, the rest from how the rig signs.
+    """
+    document, properties, key_info = verified
+    root, signed_properties, certificates = map(etree.fromstring, verified)
+    name = signed_properties.get("Id", "").partition(BEFORE_PROPERTIES)[0]
+    about = signed_properties.find(".//xades:DataObjectFormat", NAMES).get("ObjectReference", "")
+    signature = etree.SubElement(root, _ds("Signature"), nsmap=NAMES, Id=name)
+    info = etree.SubElement(signature, _ds("SignedInfo"))
+    etree.SubElement(info, _ds("CanonicalizationMethod"), Algorithm=CanonicalizationMethod.CANONICAL_XML_1_1.value)
+    etree.SubElement(info, _ds("SignatureMethod"), Algorithm=method)
+    of_document = _reference(info, document, URI="", Id=about.removeprefix("#"))
+    transforms = etree.Element(_ds("Transforms"))
+    of_document.insert(0, transforms)
+    for transform in (SignatureConstructionMethod.enveloped, CanonicalizationMethod.CANONICAL_XML_1_1):
+        etree.SubElement(transforms, _ds("Transform"), Algorithm=transform.value)
+    kind = "http://uri.etsi.org/01903#SignedProperties"
+    _reference(info, properties, URI=f"#{signed_properties.get('Id')}", Type=kind)
+    _reference(info, key_info, URI=f"#{certificates.get('Id')}")
+    etree.SubElement(signature, _ds("SignatureValue")).text = b64encode(b64decode(value)).decode()
+    signature.append(certificates)
+    holder = etree.SubElement(signature, _ds("Object"))
+    qualifying = etree.SubElement(holder, f"{{{namespaces.xades}}}QualifyingProperties", Target=f"#{name}")
+    qualifying.append(signed_properties)
+    return root
+
+
+def _reference(info: Any, signed: bytes, **attributes: str) -> Any:
+    reference = etree.SubElement(info, _ds("Reference"), **attributes)
+    etree.SubElement(reference, _ds("DigestMethod"), Algorithm=DigestAlgorithm.SHA256.value)
+    etree.SubElement(reference, _ds("DigestValue")).text = b64encode(sha256(signed).digest()).decode()
+    return reference
+
+
+def _ds(tag: str) -> str:
+    return f"{{{namespaces.ds}}}{tag}"

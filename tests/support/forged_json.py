@@ -1,0 +1,72 @@
+"""Forgeries of a result.json that is attached to a signed certificate, or entered in a history."""
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+Forgery = Callable[[bytes], bytes]
+
+
+def replaced(old: str, new: str) -> Forgery:
+    def forge(content: bytes) -> bytes:
+        forged = re.sub(old.encode(), new.encode(), content, count=1)
+        assert forged != content, old
+        return forged
+
+    return forge
+
+
+def document(change: Callable[[dict[str, Any]], object]) -> Forgery:
+    def forge(content: bytes) -> bytes:
+        found = json.loads(content)
+        change(found)
+        return written(found)
+
+    return forge
+
+
+def written(found: Any, **form: Any) -> bytes:
+    return (json.dumps(found, **{"indent": 2, "ensure_ascii": False, **form}) + "\n").encode()
+
+
+def reordered(found: dict[str, Any]) -> None:
+    found["provenance"] = found.pop("provenance")
+
+
+def in_provenance(key: str, value: str) -> Forgery:
+    return document(lambda found: found["provenance"].update({key: value}))
+
+
+FORGED_JSON: dict[str, Forgery] = {
+    "the verdict": replaced(r'"verdict": "pass"', '"verdict": "fail"'),
+    "the serial number": replaced(r'"serial_number": "', r'"serial_number": "X'),
+    "a scale factor": replaced(r'("scale": \[\s*)\d', r"\g<1>7"),
+    "a check": replaced(r'"passed": true', '"passed": false'),
+    "when it was solved": in_provenance("solved_utc", "2020-01-01T00:00:00Z"),
+    "when it was measured": in_provenance("started_utc", "2020-01-01T00:00:00Z"),
+    "a key more": document(lambda found: found.update(note="k = 1 1 1")),
+    "a key of its parts more": in_provenance("accredited_by", "PTB"),
+    "the order of its keys": document(reordered),
+    "a key twice, the forged one first": replaced(r'"verdict": "pass"', r'"verdict": "fail", "verdict": "pass"'),
+    "a key twice, the forged one last": replaced(r'"verdict": "pass"', r'"verdict": "pass", "verdict": "fail"'),
+    "a key twice, in its parts": replaced(r'"provenance": {', r'"provenance": {"started_utc": "2020-01-01T00:00:00Z",'),
+    "a part twice": replaced(r'"provenance": {', r'"provenance": {}, "provenance": {'),
+    "the same key in another spelling": replaced(r'"verdict": "pass"', r'"verdi\\u0063t": "fail", "verdict": "pass"'),
+    "another document behind": lambda content: content + b'{"verdict": "pass"}\n',
+    "a text behind": lambda content: content + b"// k = 1 1 1\n",
+    "a comment": replaced(r"{", r"{ /* k = 1 1 1 */"),
+    "a zero byte behind": lambda content: content + b"\0",
+    "a mark of the byte order": lambda content: b"\xef\xbb\xbf" + content,
+    "UTF-16": lambda content: content.decode().encode("utf-16"),
+    "no number": replaced(r'("scale": \[\s*)[\d.]+', r"\g<1>NaN"),
+    "everything": lambda content: b"{}",
+    "nothing": lambda content: b"",
+}
+# What says the same in other bytes: a history knows the values, a signature the bytes.
+IN_OTHER_BYTES: dict[str, Forgery] = {
+    "a line at its end": lambda content: content + b"\n",
+    "no blanks": lambda content: written(json.loads(content), indent=None),
+    "the ends of its lines": lambda content: content.replace(b"\n", b"\r\n"),
+    "a letter as a code": replaced(r'"pass"', r'"p\\u0061ss"'),
+}
