@@ -31,6 +31,7 @@ from rig.analysis.ways import with_ways
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
+from rig.estimation import coverage
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
 
@@ -161,7 +162,7 @@ def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
 
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
     """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
-    return of_all / ((SHARES + OF_THE_MODEL * by_model) * kinds)
+    return coverage.rate_of_each(of_all, (SHARES + OF_THE_MODEL * by_model) * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:

@@ -15,9 +15,10 @@ from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.history.address import own_place, place
+from rig.history.change_words import comparison_in_words
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import PAGE, Finished, finished_run
-from rig.history.series import changes, effects, rig_states, subjects, trends
+from rig.history.series import changes_between, effects, rig_states, subjects, trends
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.tables import (
     calibrations_table,
@@ -165,19 +166,21 @@ def compare(options: Namespace) -> int:
     """Two calibrations of one sensor. Raises Refused `not_in_history`, `not_comparable`."""
     with opened(options) as history:
         first, second = history.calibration(options.first), history.calibration(options.second)
+        before, now = ([*history.of_run(each.run_id), each] for each in (first, second))
     if first.subject != second.subject:
         raise Refused(
             "not_comparable",
             f"{first.id} is of {title_of(first.subject)}, {second.id} of {title_of(second.subject)}",
             "Give two calibrations of one sensor at one range",
         )
-    found = changes(first, second)
+    found = changes_between(before, now)[second.subject]
     if options.json:
         numbers = {"before": first.id, "now": second.id}
         document = {**numbers, "parameters": {each.name: change_entry(each) for each in found}}
         print(json.dumps(document, indent=2, allow_nan=False))
         return 0
     Console(highlight=False).print(changes_table(f"{title_of(first.subject)}: {first.id} and {second.id}", found))
+    say(comparison_in_words(found))
     return 0
 
 

@@ -113,25 +113,26 @@ def journal_end(folder: Path, history: str | None = None) -> tuple[int, str] | N
 
 
 def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
-    """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
+    """How calibrations lie beside those of before, in words: each that has changed, then the others together."""
     if not calibrations:  # as with the history off, which costs no import of it
         return ()
-    from rig.history.change_words import beyond_u, change_in_short
+    from rig.history.change_words import change_in_short, changed_values
 
-    changed = [(each, beyond) for each in calibrations if (beyond := beyond_u(each.changes))]
-    same = [each for each in calibrations if not beyond_u(each.changes)]
+    changed = [(each, values) for each in calibrations if (values := changed_values(each.changes))]
+    same = [each for each in calibrations if not changed_values(each.changes)]
     lines = []
-    for each, beyond in changed:
+    for each, values in changed:
         of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"
         whose = f"{each.now.serial_number}{of} " if len(calibrations) > 1 else ""
         compare = f"`rig history compare {each.before.id} {each.now.id}`"
-        more = f"; {len(beyond) - 1} more: {compare}" if len(beyond) > 1 else ""
+        more = f"; {len(values) - 1} more: {compare}" if len(values) > 1 else ""
         since = f"since {each.before.started_utc[:10]} (no. {each.before.id})"
-        lines.append(f"{whose}{since}: {change_in_short(beyond[0])}{more}")
+        lines.append(f"{whose}{since}: {change_in_short(values[0])}{more}")
     if same:
         before = ", ".join(str(each.before.id) for each in same)
         whose = " of the other sensors" if changed else ""
-        lines.append(f"nothing changed beyond U since the last calibration{whose} (no. {before})")
+        count = sum(len(each.changes) for each in same)
+        lines.append(f"none of {count} values changed since the last calibration{whose} (no. {before})")
     return tuple(lines)
 
 
@@ -172,17 +173,19 @@ def _since(calibration: Beside) -> Since:
         calibration.before.started_utc[:10],
         {change.name: (change.before.value, change.before.expanded) for change in calibration.changes},
         {change.name: change.normalised_error for change in calibration.changes},
+        tuple(change.name for change in calibration.changes if change.has_changed),
     )
 
 
 def _beside(history: "History", run_id: int) -> "list[Beside]":
-    from rig.history.series import changes, subjects
+    """The calibrations of a run that have one before, which are one comparison."""
+    from rig.history.series import changes_in, subjects
     from rig.history.store import Selection
 
-    found = []
+    pairs = []
     for now in history.of_run(run_id):
         series = subjects(history.calibrations(Selection(serial_number=now.serial_number))).get(now.subject, [])
         earlier = [each for each in series if (each.started_utc, each.id) < (now.started_utc, now.id)]
-        if earlier:
-            found.append(Beside(earlier[-1], now, changes(earlier[-1], now)))
-    return found
+        pairs += [(earlier[-1], now)] if earlier else []
+    found = changes_in([(before.parameters, now.parameters) for before, now in pairs])
+    return [Beside(before, now, changed) for (before, now), changed in zip(pairs, found, strict=True)]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import rate_of_each
 from rig.estimation.refusals import check_count, check_finite, check_variances, require_shape
 
 FALSE_ALARM = 0.02  # of a run whose bias is steady
@@ -117,7 +118,7 @@ def _moves(bias: Array, std: Array, start: int, end: int, places: int) -> Iterat
     """Moves of the bias from `start` to `end`, in a run that has so many `places` where it could have moved."""
     from scipy.special import ndtri
 
-    sure = -float(ndtri(FALSE_ALARM / (2 * 3 * places)))
+    sure = -float(ndtri(rate_of_each(FALSE_ALARM, 2 * 3 * places)))
     best, largest = None, sure
     for place in range(start + 1, end):
         before, after = _mean(bias[start:place], std[start:place]), _mean(bias[place:end], std[place:end])

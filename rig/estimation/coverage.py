@@ -45,6 +45,37 @@ def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
     return found
 
 
+def rate_of_each(of_all: float, tests: int) -> float:
+    """Return the rate of false alarms of each of so many `tests`, so that one of them at least is rarer than `of_all`.
+
+    Bonferroni's inequality: it holds however the tests depend on each other.
+    """
+    return of_all / tests
+
+
+def joint_factors(values: int, freedom: ArrayLike) -> Array:
+    """Return the k by which so many `values` ± k u hold all true values at once, with 95.45 % at least.
+
+    `freedom` are degrees of freedom of any shape; for one value it is `coverage_factors`.
+    """
+    from scipy.special import ndtri, stdtrit
+
+    whole, tail = _whole(freedom), rate_of_each(1 - PROBABILITY, values) / 2
+    factors = np.full(np.shape(freedom), -float(ndtri(tail)))
+    known = np.isfinite(whole)
+    factors[known] = -stdtrit(whole[known], tail)
+    return factors
+
+
+def freedom_of(factor: float) -> float:
+    """Return the whole number of degrees of freedom whose coverage factor this is: infinite for 2."""
+    if factor <= COVERAGE_FACTOR:
+        return math.inf
+    from scipy.special import stdtridf
+
+    return float(round(stdtridf((1 + PROBABILITY) / 2, factor)))
+
+
 def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
     """ν (…) of sums of independent `variances` (n, …), each known with `freedom` (n, …): Welch–Satterthwaite.
 

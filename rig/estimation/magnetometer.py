@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import effects, whitening_with
+from rig.estimation.coverage import rate_of_each
 from rig.estimation.reference_model import most_likely, predicted, whitened
 from rig.estimation.refusals import converging
 from rig.estimation.triaxial import TriaxialSolution
@@ -98,5 +99,5 @@ def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: 
     stds = np.sqrt(v[1:] + v[0] + 2 * (repeatability_rad * np.linalg.norm(m[0])) ** 2)
     squares = np.sum((changes / stds) ** 2, axis=1)
     worst = int(np.argmax(squares))
-    limit = float(chdtri(3, FALSE_ALARM / len(changes)))
+    limit = float(chdtri(3, rate_of_each(FALSE_ALARM, len(changes))))
     return FieldDrift(changes[worst], stds[worst], float(squares[worst]), limit)

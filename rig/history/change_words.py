@@ -1,6 +1,6 @@
 """What has changed since another calibration of the same sensor, in sentences. Pure."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import pi
 
 from rig.data.installed_kinds import quantities
@@ -13,9 +13,23 @@ PERCENT, PPM = 1e-2, 1e-6
 DEGREE_RAD = pi / 180
 
 
-def beyond_u(changes: Iterable[Change]) -> list[Change]:
-    """The changes that are more than the uncertainties of both calibrations explain, the largest for its U first."""
-    return sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
+def changed_values(changes: Iterable[Change]) -> list[Change]:
+    """Return the values that have changed by more than chance explains, the largest change for its U first."""
+    return sorted((change for change in changes if change.has_changed), key=lambda change: -change.normalised_error)
+
+
+def comparison_in_words(changes: Sequence[Change]) -> str:
+    """Return how many of the values of one sensor have changed, and from which E_n on one has."""
+    if not changes:
+        return "the two have no value in common"
+    changed, limits, compared = changed_values(changes), [change.limit for change in changes], changes[0].compared
+    share = f"{len(changed) or 'none'} of {len(changes)} values changed"
+    others = f" (with {compared - len(changes)} of the run's other sensors)" if compared > len(changes) else ""
+    limit = " to ".join(dict.fromkeys(f"{size:.2f}" for size in (min(limits), max(limits))))
+    return (
+        f"{share}. As {compared} are compared{others}, one has changed if its E_n is above {limit}: "
+        "chance alone takes one of them that far in fewer than 5 of 100 comparisons"
+    )
 
 
 def change_in_short(change: Change) -> str:

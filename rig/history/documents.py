@@ -129,6 +129,8 @@ def change_entry(change: Change) -> dict[str, Any]:
         "before": _parameter(change.before),
         "now": _parameter(change.now),
         "normalised_error": change.normalised_error,
+        "normalised_error_limit": change.limit,
+        "changed": change.has_changed,
     }
 
 

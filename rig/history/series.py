@@ -11,6 +11,7 @@ import numpy as np
 from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import effective_freedom, joint_factors
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
@@ -111,22 +112,35 @@ class RigState:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A parameter beside the one of the calibration before."""
+    """A parameter beside the one of the calibration before; `compared` is how many values are compared at once."""
 
     name: str
     unit: str
     before: Parameter
     now: Parameter
+    compared: int = 1
 
     @property
     def normalised_error(self) -> float:
-        """E_n = |y₂ − y₁| / √(U₁² + U₂²) (ISO 13528:2022, 9.7); above 1 the change is beyond the uncertainty."""
+        """E_n = |y₂ − y₁| / √(U₁² + U₂²) (ISO 13528:2022, 9.7); above 1 the change of a single value is significant."""
         return abs(self.now.value - self.before.value) / math.hypot(self.before.expanded, self.now.expanded)
 
     @property
-    def beyond(self) -> bool:
-        """Whether it is more than the uncertainties of both explain."""
-        return self.normalised_error > 1
+    def limit(self) -> float:
+        """The E_n that of all values compared none exceeds by chance in 95.45 % of comparisons.
+
+        By Student's t for the effective degrees of freedom of the difference, and Bonferroni's inequality: parameters
+        of one calibration are correlated in ways that no history keeps.
+        """
+        both = (self.before, self.now)
+        freedom = effective_freedom([each.std**2 for each in both], [each.freedom for each in both])
+        factor = float(joint_factors(self.compared, freedom))
+        return factor * math.hypot(self.before.std, self.now.std) / math.hypot(self.before.expanded, self.now.expanded)
+
+    @property
+    def has_changed(self) -> bool:
+        """Whether it is more than chance explains, among so many values."""
+        return self.normalised_error > self.limit
 
 
 def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
@@ -148,14 +162,31 @@ def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
     return found
 
 
-def changes(before: Past, now: Past) -> tuple[Change, ...]:
-    """The changes of the parameters that both calibrations have."""
-    return changed(before.parameters, now.parameters)
+Parameters = Mapping[str, Parameter]
 
 
-def changed(before: Mapping[str, Parameter], now: Mapping[str, Parameter]) -> tuple[Change, ...]:
-    """The changes of what both have, in the order of `now`; parameters by their names."""
-    return tuple(Change(name, now[name].unit, before[name], now[name]) for name in now if name in before)
+def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
+    """Return the changes within each pair, before and now, of the parameters by their names that both have.
+
+    All pairs are those of one comparison, as of all sensors of a run: the values of all count.
+    """
+    shared = [[name for name in now if name in before] for before, now in pairs]
+    compared = sum(map(len, shared))
+    return tuple(
+        tuple(Change(name, now[name].unit, before[name], now[name], compared) for name in names)
+        for (before, now), names in zip(pairs, shared, strict=True)
+    )
+
+
+def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject, tuple[Change, ...]]:
+    """Return the changes of everything that both have, by what it is; they are one comparison.
+
+    Each are the calibrations of one run; of two of the same thing the last counts.
+    """
+    earlier, later = ({past.subject: past for past in pasts} for pasts in (before, now))
+    both = [subject for subject in later if subject in earlier]
+    found = changes_in([(earlier[subject].parameters, later[subject].parameters) for subject in both])
+    return dict(zip(both, found, strict=True))
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:

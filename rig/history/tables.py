@@ -76,7 +76,7 @@ def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
         Column("parameter", [_with_unit(each.name, each.unit) for each in changes]),
         Column("before ± U", [value_text(each.before) for each in changes], rank=1, number=True),
         Column("now ± U", [value_text(each.now) for each in changes], number=True),
-        Column("E_n", [f"{'beyond U ' * each.beyond}{each.normalised_error:.2f}" for each in changes], number=True),
+        Column("E_n", [f"{'changed ' * each.has_changed}{each.normalised_error:.2f}" for each in changes], number=True),
     )
     return FittingTable(title, columns)
 

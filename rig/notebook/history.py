@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import Refused
 from rig.history.address import own_place, place
 from rig.history.documents import COLUMNS, change_entry
-from rig.history.series import Change, changed, time_of
+from rig.history.series import Change, changes_in, time_of
 from rig.history.store import Past, Selection, open_history
 from rig.history.tables import title_of, value_text
 from rig.notebook.frames import frame
@@ -63,15 +63,15 @@ class Calibrations(Sequence[Past]):
 
 @dataclass(frozen=True, eq=False)
 class SensorChanges:
-    """The changes of one sensor's parameters; above 1 the normalised error E_n says: beyond both uncertainties."""
+    """The changes of one sensor's parameters with their normalised errors E_n, and which chance does not explain."""
 
     title: str
     changes: tuple[Change, ...]
 
     @property
-    def beyond(self) -> tuple[Change, ...]:
-        """The changes that are more than the uncertainties of both explain."""
-        return tuple(each for each in self.changes if each.beyond)
+    def changed(self) -> tuple[Change, ...]:
+        """Return the values that have changed by more than chance explains, among all values of the two runs."""
+        return tuple(each for each in self.changes if each.has_changed)
 
     def to_frame(self) -> "DataFrame":
         """One row for each parameter, SI units, as a pandas table. Raises Refused `missing_extra`."""
@@ -82,6 +82,8 @@ class SensorChanges:
             "now": [each.now.value for each in self.changes],
             "now_expanded": [each.now.expanded for each in self.changes],
             "normalised_error": [each.normalised_error for each in self.changes],
+            "normalised_error_limit": [each.limit for each in self.changes],
+            "changed": [each.has_changed for each in self.changes],
         }
         return frame(columns, [each.name for each in self.changes], "parameter")
 
@@ -90,8 +92,8 @@ class SensorChanges:
         return {each.name: change_entry(each) for each in self.changes}
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{each.name} (E_n {each.normalised_error:.1f})" for each in self.beyond)
-        return f"<{self.title}: {'changed beyond U: ' + told if told else 'nothing changed beyond U'}>"
+        told = ", ".join(f"{each.name} (E_n {each.normalised_error:.1f})" for each in self.changed)
+        return f"<{self.title}: {f'changed: {told}' if told else f'none of {len(self.changes)} values changed'}>"
 
     def _repr_html_(self) -> str:
         return table(self.title, HEADINGS, map(_row, self.changes))
@@ -147,11 +149,12 @@ def changes(before: Run | Result, now: Run | Result) -> Changes:
     """
     first, second = ({_same(each): each for each in _followed(of)} for of in (before, now))
     found = {}
-    for subject in (each for each in second if each in first):
-        old, new = first[subject], second[subject]
+    both = [subject for subject in second if subject in first]
+    pairs = [tuple({one.name: one for one in each[subject].parameters} for each in (first, second)) for subject in both]
+    for subject, changed in zip(both, changes_in(pairs), strict=True):
+        new = second[subject]
         name = new.sensor if new.quantity == "rate" else f"{new.sensor}, {new.quantity}"
-        parameters = ({one.name: one for one in each.parameters} for each in (old, new))
-        found[name] = SensorChanges(title_of((*subject, False)), changed(*parameters))
+        found[name] = SensorChanges(title_of((*subject, False)), changed)
     if not found:
         raise Refused(
             "not_comparable",
@@ -189,5 +192,5 @@ def _about(past: Past, name: str) -> Any:
 
 def _row(change: Change) -> tuple[str, ...]:
     name = change.name if change.unit == "1" else f"{change.name} {change.unit}"
-    beyond = "beyond U " if change.beyond else ""
-    return name, value_text(change.before), value_text(change.now), f"{beyond}{change.normalised_error:.2f}"
+    changed = "changed " if change.has_changed else ""
+    return name, value_text(change.before), value_text(change.now), f"{changed}{change.normalised_error:.2f}"

@@ -58,8 +58,9 @@ def since_rows(since: Iterable[Since]) -> dict[str, Row]:
                     "values": [each.before[name][0] / size for name in names],
                     "expanded": [each.before[name][1] / size for name in names],
                     "normalised_error": [round(each.normalised_error[name], 2) for name in names],
+                    "changed": [name in each.changed for name in names],
                 }
-        row["beyond"] = [name for name, error in each.normalised_error.items() if error > 1]
+        row["changed"] = list(each.changed)
         rows[quantity.of(each.sensor)] = row
     return rows
 

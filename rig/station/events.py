@@ -290,7 +290,8 @@ class RunFolderWritten:
 class Since:
     """What the calibration before, its number and day, found of the `quantity` of a `sensor`, by parameter (`kx`).
 
-    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since.
+    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since. `changed` are those
+    that have changed by more than chance explains, among all values of the run.
     """
 
     sensor: str
@@ -299,6 +300,7 @@ class Since:
     day: str
     before: Mapping[str, tuple[float, float]]
     normalised_error: Mapping[str, float]
+    changed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

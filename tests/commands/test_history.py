@@ -117,7 +117,12 @@ def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFi
     assert json.loads(told(capsys, "show", "1", "--json"))["schema"] == "rig.result/1"
     found = json.loads(told(capsys, "compare", "1", "12", "--json"))["parameters"]
     assert found["kx"]["normalised_error"] > 1 > found["bx"]["normalised_error"]
-    assert "beyond U" in told(capsys, "compare", "1", "12")
+    assert found["kx"]["changed"] and not found["bx"]["changed"]
+    assert found["kx"]["normalised_error"] > found["kx"]["normalised_error_limit"] > 1
+    said = " ".join(told(capsys, "compare", "1", "12").split())
+    assert "changed" in said and re.search(
+        r"of 10 values changed. As 10 are compared, one has changed if its E_n", said
+    )
     with open_history(year) as history:
         history.enter(finished(400, serial_number="G-2"))
     assert main(["history", "compare", "1", "13"]) == 2

@@ -23,7 +23,7 @@ from rig.history.address import chosen_place, place
 from rig.history.engine import engine_of
 from rig.history.finished import Finished, compact, content_sha256, finished_run
 from rig.history.issued import Issued
-from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
+from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
 from rig.history.store import History, Selection, open_history
 from rig.report.budget_entry import budget_entry
 from rig.report.kinds.registry import followed
@@ -102,8 +102,9 @@ def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(his
     before, now = history.calibrations()
     assert before.parameters["bx"].expanded == pytest.approx(2 * u)
     assert now.parameters["bx"].expanded == pytest.approx(2.649 * u, rel=1e-3)
-    (change,) = (each for each in changes(before, now) if each.name == "bx")
-    assert change.normalised_error == pytest.approx(3.2 / np.hypot(2, 2.649), rel=1e-3) and not change.beyond
+    (change,) = (each for each in changes_between([before], [now])[now.subject] if each.name == "bx")
+    assert change.normalised_error == pytest.approx(3.2 / np.hypot(2, 2.649), rel=1e-3) and not change.has_changed
+    assert (change.before.freedom, change.now.freedom) == (np.inf, 5.0)
     assert now.parameters["k"].coverage_factor == now.parameters["kx"].coverage_factor
     assert list(history.broken()) == []
 
@@ -292,11 +293,11 @@ def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
         engine_of(place("nonsense://x"))
 
 
-def test_a_change_beyond_u_is_named(history: History) -> None:
+def test_what_has_changed_is_named(history: History) -> None:
     history.enter(finished(0))
     history.enter(finished(30, (1.01 + 4e-4, 0.99, 1.0)))
     before, now = history.calibrations()
-    assert [each.name for each in changes(before, now) if each.beyond] == ["k", "kx"]
+    assert [each.name for each in changes_between([before], [now])[now.subject] if each.has_changed] == ["k", "kx"]
 
 
 def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -> None:

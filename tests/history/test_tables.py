@@ -11,7 +11,7 @@ from rich.console import Console
 
 from rig.data.absent import NO_ARM
 from rig.history.fitting_table import Column, FittingTable
-from rig.history.series import Trend, changes, rig_states, subjects, trends
+from rig.history.series import Trend, changes_between, rig_states, subjects, trends
 from rig.history.store import History, Past, open_history
 from rig.history.tables import calibrations_table, changes_table, parameters_table, trend_lines, trends_table
 from support.past_runs import FIRST, SCALE, STD, finished
@@ -56,7 +56,7 @@ def test_names_and_headings_are_whole_in_a_narrow_terminal(history: History, wid
     tables = (
         calibrations_table(pasts),
         trends_of(pasts)[0],
-        changes_table("1 and 12", changes(pasts[0], pasts[-1])),
+        changes_table("1 and 12", changes_between(pasts[:1], pasts[-1:])[pasts[-1].subject]),
         parameters_table(pasts[-1]),
     )
     for table in tables:

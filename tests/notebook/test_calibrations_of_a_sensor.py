@@ -51,11 +51,12 @@ def test_changes_between_two_results_are_those_of_the_command_line(
     found = rig.changes(before, now)["gyro"]
     assert main(["history", "compare", "1", "2", "--json"]) == 0
     assert found.to_dict() == json.loads(capsys.readouterr().out)["parameters"]
-    assert "kx" in [each.name for each in found.beyond]
-    assert "changed beyond U: " in repr(found) and "kx (E_n" in repr(found)
+    assert "kx" in [each.name for each in found.changed]
+    assert ": changed: " in repr(found) and "kx (E_n" in repr(found)
     frame = found.to_frame()
     assert frame.loc["kx", "normalised_error"] > 1 > frame.loc["ky", "normalised_error"]
-    assert "beyond U" in rig.changes(before, now)._repr_html_()
+    assert frame.loc["kx", "changed"] and frame.loc["kx", "normalised_error_limit"] > 1
+    assert "changed" in rig.changes(before, now)._repr_html_()
 
 
 @pytest.mark.slow

@@ -30,11 +30,13 @@ def test_each_thing_found_has_a_row_with_its_serial_number_and_its_limits() -> N
 def test_what_was_before_stands_beside_the_row_of_its_sensor_in_that_rows_unit() -> None:
     before = {"kx": (1.01, 1e-4), "ky": (0.99, 1e-4), "kz": (1.0, 1e-4), "bx": (2e-5, 1e-7), "by": (0.0, 1e-7)}
     errors = dict.fromkeys(before, 0.5) | {"ky": 1.5}
-    field = Since("mag", "field", 7, "2026-11-20", before | {"bz": (1e-6, 1e-7)}, errors | {"bz": 0.1})
+    field = Since("mag", "field", 7, "2026-11-20", before | {"bz": (1e-6, 1e-7)}, errors | {"bz": 0.1}, ("ky",))
     rows = since_rows([field, replace(field, sensor="gyro", quantity="rate"), replace(field, quantity="a drift")])
     assert set(rows) == {"mag, magnetometer", "gyro"}
     assert rows["mag, magnetometer"]["bias"]["values"] == pytest.approx([20.0, 0.0, 1.0])  # µT
-    assert rows["mag, magnetometer"]["beyond"] == ["ky"] and rows["mag, magnetometer"]["worst"] == ["ky", 1.5]
+    found = rows["mag, magnetometer"]
+    assert (found["changed"], found["worst"]) == (["ky"], ["ky", 1.5])
+    assert found["scale"]["changed"] == [False, True, False]
 
 
 @pytest.mark.parametrize(

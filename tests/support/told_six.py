@@ -73,5 +73,5 @@ def _since(found: ResultDocument) -> Iterator[Since]:
     values = [*scale[:2], scale[2] - 0.004, *bias]
     before = {name: (value, 0.0012 if name[0] == "k" else 0.0005) for name, value in zip(names, values, strict=True)}
     errors = {name: 2.4 if name == "kz" else 0.3 for name in names}
-    yield Since("lsm9ds1", "rate", 8, "2026-11-20", before, errors)
+    yield Since("lsm9ds1", "rate", 8, "2026-11-20", before, errors, ("kz",))
     yield Since("mpu9250", "rate", 9, "2026-11-20", before, {**errors, "kz": 0.4})

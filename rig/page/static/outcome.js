@@ -26,7 +26,7 @@ function summary(row, past, since) {
     make("span", { className: "of" }, make("strong", { textContent: row.name }), make("small", { textContent: row.part })),
     ...triad("scale factor", row.scale, "", past?.scale, "scale"),
     ...triad(row.scale ? "bias" : "value", row.bias, row.unit, past?.bias, "bias"),
-    make("span", { className: `since ${past?.beyond.length ? "bad" : ""}`, textContent: comparison(past, since) }));
+    make("span", { className: `since ${past?.changed.length ? "bad" : ""}`, textContent: comparison(past, since) }));
 }
 
 function comparison(past, since) {
@@ -34,7 +34,8 @@ function comparison(past, since) {
   if (!past) return "the first";
   const when = `since no ${past.number}, ${past.day}`;
   const [name, error] = past.worst;
-  return past.beyond.length ? `⚠ ${past.beyond.join(", ")} changed beyond U ${when}` : `nothing beyond U ${when} (${name}: E_n ${error.toFixed(1)})`;
+  if (past.changed.length) return `⚠ ${past.changed.join(", ")} changed ${when}`;
+  return `nothing changed ${when} (${name}: E_n ${error.toFixed(1)})`;
 }
 
 /** Three numbers with the largest U of theirs, and their picture. */
@@ -54,7 +55,7 @@ function table(row, past) {
     if (!found) return [];
     return [make("td", { textContent: `${found.texts[i]} ± ${found.u[i]}` }), make("td", {}, picture(found, then, [i])),
       ...(then ? [make("td", { textContent: then.values[i].toFixed(decimals(found.texts[i])).replace("-", "−") }),
-        make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.normalised_error[i] > 1 ? "bad" : "" })] : [])];
+        make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.changed[i] ? "bad" : "" })] : [])];
   };
   const head = ["axis", ...heading("scale", ""), ...heading("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
   const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: row.labels[i] }), ...cells("scale", i), ...cells("bias", i)));

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.estimation.coverage import COVERAGE_FACTOR, freedom_of
 
 if TYPE_CHECKING:
     from rig.data.budget_entries import BudgetEntry
@@ -47,6 +47,11 @@ class Parameter:
     def expanded(self) -> float:
         """U as the result states it."""
         return (self.coverage_factor or COVERAGE_FACTOR) * self.std
+
+    @property
+    def freedom(self) -> float:
+        """The degrees of freedom of its standard uncertainty, by its coverage factor."""
+        return freedom_of(self.coverage_factor or COVERAGE_FACTOR)
 
     @property
     def nominal(self) -> float:
