@@ -1,6 +1,7 @@
 """The host's client over real sockets and a real pseudo-terminal; at the far end answers the firmware's core."""
 
 import os
+import re
 import select
 import socket
 import threading
@@ -29,7 +30,7 @@ from rig.plans.temperature_course import Course
 from rig.runner.acquisition import Acquisition
 from rig.runner.warming import Warming
 from support.host_board import HostBoard, configured, convert, settle
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for, wait_for_error
 from support.worlds import fresh_host
 
 PERIOD_US = 4202  # 238 Hz
@@ -93,7 +94,7 @@ def wire(request: pytest.FixtureRequest) -> Iterator[tuple[BoardOnAWire, str]]:
         os.close(slave)
         return
     with socket.create_server((HOST, 0)) as server:
-        server.settimeout(10)
+        server.settimeout(PATIENCE_S)
         connections: list[socket.socket] = []
 
         def accept() -> int:
@@ -115,18 +116,6 @@ ON_ONE_WIRE = pytest.mark.parametrize(
 
 def ignore(batch: SampleBatch) -> None:
     """A consumer for tests that look at something else."""
-
-
-def fault_of(board: Board, deadline_s: float = 60.0) -> tuple[BoardError, float]:
-    """The error that check() raises, and how long it took, s."""
-    start_s = time.monotonic()
-    while time.monotonic() < start_s + deadline_s:
-        try:
-            board.check()
-        except BoardError as error:
-            return error, time.monotonic() - start_s
-        time.sleep(0.005)
-    raise AssertionError("no fault was noticed")
 
 
 @pytest.mark.slow
@@ -523,7 +512,7 @@ def test_a_board_that_restarts_is_reported_where_every_frame_comes_twice(wire: t
     with closing(streaming(wire)) as board:
         board.check()
         wire[0].reset.set()
-        error, _ = fault_of(board)
+        error = wait_for_error(BoardError, board.check)
     assert error.name == "board_error" and "restarted" in error.what
 
 
@@ -552,14 +541,12 @@ def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
 
 
 @pytest.mark.slow
-def test_a_board_that_falls_silent_while_streaming_is_noticed_within_two_seconds_and_a_bit(
-    wire: tuple[BoardOnAWire, str],
-) -> None:
+def test_a_board_that_falls_silent_while_streaming_is_noticed_after_two_seconds(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         board.check()
         wire[0].hold.set()
-        error, after_s = fault_of(board)
-    assert error.name == "board_link_lost" and 1.0 < after_s < 4.0
+        error = wait_for_error(BoardError, board.check)
+    assert error.name == "board_link_lost" and re.search(r" for [2-9]\.\d s", error.what), error
 
 
 @pytest.mark.slow
@@ -567,13 +554,13 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_within_two_seconds
 def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
-        error, after_s = fault_of(board)
-    assert error.name == "board_link_lost" and after_s < 4.0
+        error = wait_for_error(BoardError, board.check)
+    assert error.name == "board_link_lost" and "no readable frame" in error.what
 
 
-def test_a_closed_socket_is_noticed_at_once() -> None:
+def test_a_closed_socket_is_noticed_as_such() -> None:
     with socket.create_server((HOST, 0)) as server:
-        server.settimeout(10)
+        server.settimeout(PATIENCE_S)
         accepted: list[socket.socket] = []
 
         def accept() -> int:
@@ -585,8 +572,8 @@ def test_a_closed_socket_is_noticed_at_once() -> None:
         with closing(streaming((far_end, f"socket://{HOST}:{server.getsockname()[1]}"))) as board:
             far_end.finish()
             accepted[0].close()
-            error, after_s = fault_of(board)
-            assert error.name == "board_link_lost" and after_s < 0.5
+            error = wait_for_error(BoardError, board.check)
+            assert error.name == "board_link_lost" and "no readable frame" not in error.what, "it waited for a silence"
             with pytest.raises(BoardError, match="board_link_lost"):
                 board.status()
 
@@ -594,7 +581,7 @@ def test_a_closed_socket_is_noticed_at_once() -> None:
 def test_a_board_that_restarts_while_streaming_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].reset.set()
-        error, _ = fault_of(board)
+        error = wait_for_error(BoardError, board.check)
     assert error.name == "board_error" and "restarted" in error.what
 
 
@@ -632,7 +619,7 @@ def test_what_came_before_the_port_closed_is_read() -> None:
 def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].board.gyro.values[0x10] = 0  # powered down behind the board's back: no more data-ready
-        error, _ = fault_of(board)
+        error = wait_for_error(BoardError, board.check)
     assert error.name == "sensor_silent" and "LSM9DS1" in error.what
 
 

@@ -1,7 +1,6 @@
 """What is wrong with a sensor on a port of its own has the name that its part gives it: part by fault."""
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
@@ -20,6 +19,7 @@ from rig.world.board.serial_line import misread
 from support import autopilot_on_a_wire as autopilots
 from support import kvh_on_a_wire as kvhs
 from support.printed_lines import pty_printing, sensor_section
+from support.waiting import wait_for
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 
@@ -107,8 +107,7 @@ def of_mavlink(fault: str, patience: Patience) -> Iterator[Bench]:
             "begins anew": wire.switch_on,  # it has forgotten what it was asked for
         }
         if fault not in LATER:
-            spoil.get(fault, lambda: None)()
-            time.sleep(0.05)  # what was under way before
+            wire.wire.order(spoil.get(fault, lambda: None))
         port = NO_PORT if fault == "no such port" else wire.port
         changes: dict[str, Any] = {"baud": 57600, "rate_hz": 20} if fault == "wrong baud rate" else {}
         sections = {"imu": autopilots.section(port, **changes)}
@@ -147,9 +146,6 @@ def test_a_fault_has_its_parts_name(part: str, fault: str, name: str) -> None:
         assert fault in LATER, "it connects in spite of it"
         source.start()
         spoil()
-        until_s = time.monotonic() + 30
-        while time.monotonic() < until_s:
-            source.check()
-            time.sleep(0.005)
+        wait_for(source.check, "its fault")
     assert caught.value.name == name
     assert f"sensors.{'kvh' if part == 'kvh1775' else 'imu'}" in str(caught.value)

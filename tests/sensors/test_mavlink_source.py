@@ -1,6 +1,5 @@
 """An autopilot's IMUs as a source: what it corrects is undone or refused, what goes wrong has a name."""
 
-import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -14,7 +13,7 @@ from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.source import MavlinkSource, look, mavlink
 from support.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
-from support.waiting import wait_for
+from support.waiting import wait_for, wait_for_error
 
 UNCORRECTED = {
     "ardupilot": {"INS_GYROFFS_X": 0.01, "INS_ACCOFFS_Z": 0.3, "INS_ACCSCAL_Z": 1.05, "AHRS_ORIENTATION": 6},
@@ -40,29 +39,15 @@ class Listening:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def hear(self, count: int, name: str = "imu") -> Any:
-        """The first samples of one, so many at least."""
+    def hear(self, count: int, name: str = "imu", until_us: float = 0.0) -> Any:
+        """The first samples of one, so many at least, until its clock shows that."""
 
         def enough() -> bool:
-            self.source.check()
-            return sum(map(len, self.samples[name])) >= count
+            parts = self.samples[name]
+            return sum(map(len, parts)) >= count and bool(parts[-1]["board_time_us"][-1] >= until_us)
 
-        wait_for(enough, "samples")
+        wait_for(enough, "samples", meanwhile=self.source.check)
         return np.concatenate(self.samples[name])
-
-    def fails(self) -> SensorError:
-        """What `check` raises before long."""
-        caught: list[SensorError] = []
-
-        def failed() -> bool:
-            try:
-                self.source.check()
-            except SensorError as error:
-                caught.append(error)
-            return bool(caught)
-
-        wait_for(failed, "an error")
-        return caught[0]
 
 
 @pytest.mark.one_in(3)
@@ -115,11 +100,14 @@ def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> Non
 
 @pytest.mark.slow
 def test_milliseconds_that_begin_anew_go_on() -> None:
+    wrap_us = 2**32 * 1e3
     with (
-        autopilot_on_a_wire(on_for_s=2**32 / 1000 - 4.0) as wire,
+        autopilot_on_a_wire(on_for_s=wrap_us * 1e-6 - 30.0, pace=1.0) as wire,
         Listening({"imu": section(wire.port, "SCALED_IMU")}) as heard,
     ):
-        steps = np.diff(heard.hear(600)["board_time_us"].astype(np.int64))
+        assert heard.hear(1)["board_time_us"][0] < wrap_us, "they had begun anew before it streamed"
+        wire.wire.clock.pace(100.0)
+        steps = np.diff(heard.hear(1, until_us=wrap_us + 1e6)["board_time_us"].astype(np.int64))
     assert steps.min() > 0 and steps.max() < 20_000
 
 
@@ -164,8 +152,7 @@ def test_what_is_not_ready_is_refused(
 ) -> None:
     """More of it: tests/sensors/test_faults_by_part.py."""
     with autopilot_on_a_wire() as wire, pytest.raises(SensorError) as caught:
-        spoil(wire)
-        time.sleep(0.05)  # what was under way before
+        wire.wire.order(lambda: spoil(wire))
         Listening({"imu": section(wire.port, **changes)})
     assert caught.value.problem.name == name
 
@@ -176,7 +163,7 @@ def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
         heard.hear(10)
         assert wire.autopilot is not None
         wire.autopilot.armed = True
-        assert heard.fails().problem.name == "autopilot_armed"
+        assert wait_for_error(SensorError, heard.source.check).problem.name == "autopilot_armed"
 
 
 @pytest.mark.slow

@@ -1,8 +1,5 @@
 """A simulated autopilot on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
 
-import selectors
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,9 +12,8 @@ from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSens
 from rig.world.autopilot.autopilot import SimulatedAutopilot
 from rig.world.autopilot.imu import Imu
 from rig.world.autopilot.parameters import Parameters
-from rig.world.board.pty_port import PtyPort
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.board.serial_line import SerialLine
+from support.device_on_a_wire import DeviceOnAWire
 
 UID = "0a0b0c0d0e0f"
 TICK_S = 0.0025
@@ -39,7 +35,7 @@ def section(port: str, imu: str = "HIGHRES_IMU", **changes: Any) -> SensorSectio
 
 
 class AutopilotOnAWire:
-    """The autopilot, `pace` times as fast as the clock on the wall."""
+    """The autopilot, at most `pace` times as fast as the clock on the wall."""
 
     def __init__(
         self,
@@ -57,20 +53,18 @@ class AutopilotOnAWire:
         clock_ppm: float = 0.0,
     ) -> None:
         self.parameters = Parameters(firmware, imus, left, file)
-        self._firmware, self._motion_at, self._imus, self._pace = firmware, motion_at, imus, pace
+        self._firmware, self._motion_at, self._imus = firmware, motion_at, imus
         self._on_for_s, self._armed = on_for_s, armed
         self._simulated, self._clock_ppm = simulated, clock_ppm
-        self.time_s = 0.0
         self.autopilot: SimulatedAutopilot | None = None
-        self.line = SerialLine(lambda: self.autopilot, seed=5)
-        self.line.silent = dead
-        self._selector = selectors.DefaultSelector()
-        self._pty = PtyPort(self.line, self._selector)
-        self.port = self._pty.path
-        self._ending = threading.Event()
+        self.wire = DeviceOnAWire(lambda: self.autopilot, TICK_S, pace, dead=dead)
+        self.line, self.port = self.wire.line, self.wire.port
         self.switch_on()
-        self._thread = threading.Thread(target=self._live, daemon=True)
-        self._thread.start()
+        self.wire.live(self._advance)
+
+    @property
+    def time_s(self) -> float:
+        return self.wire.time_s
 
     def switch_on(self) -> None:
         truth = SensorTruth(section("x"), self._simulated)
@@ -101,23 +95,11 @@ class AutopilotOnAWire:
         return self.autopilot.faults
 
     def close(self) -> None:
-        self._ending.set()
-        self._thread.join()
-        self._pty.close()
-        self._selector.close()
+        self.wire.close()
 
-    def _live(self) -> None:
-        began_s = time.monotonic()
-        while not self._ending.is_set():
-            behind = self.time_s < (time.monotonic() - began_s) * self._pace
-            for key, events in self._selector.select(0.0 if behind else 0.001):
-                key.data(events)
-            if behind:
-                self.time_s += TICK_S
-                if (alive := self.autopilot) is not None:
-                    alive.advance(self.time_s)
-                self.line.tick()
-                self._pty.tick()
+    def _advance(self, time_s: float) -> None:
+        if (alive := self.autopilot) is not None:
+            alive.advance(time_s)
 
 
 @contextmanager

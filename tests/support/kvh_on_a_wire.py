@@ -1,8 +1,5 @@
 """A simulated KVH 1775 on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
 
-import selectors
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -10,11 +7,10 @@ import numpy as np
 
 from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import SimulatedKvhSection, SimulatedSensorSection
-from rig.world.board.pty_port import PtyPort
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.board.serial_line import SerialLine
 from rig.world.kvh1775.instrument import Kvh1775, no_field
 from rig.world.kvh1775.memory import Memory
+from support.device_on_a_wire import DeviceOnAWire
 
 SERIAL_NUMBER = "1775-7"
 TICK_S = 0.002
@@ -32,7 +28,7 @@ def section(port: str, **changes: object) -> SensorSection:
 
 
 class KvhOnAWire:
-    """The instrument, `pace` times as fast as the clock on the wall, or `at_once`; it stands still at `limit_s`.
+    """The instrument, at most `pace` times as fast as the clock on the wall.
 
     `motion_at`: what it feels at a time, rad/s and g; `field_at`: the magnetic field in its axes, T.
     """
@@ -49,20 +45,12 @@ class KvhOnAWire:
     ) -> None:
         self.memory = Memory(left)
         self._field_at = field_at
-        self._motion_at, self.on_for_s, self._pace = motion_at, on_for_s, pace
-        self.time_s = 0.0
+        self._motion_at, self._on_for_s = motion_at, on_for_s
         self.kvh: Kvh1775 | None = None
-        self.line = SerialLine(lambda: self.kvh, seed=5)
-        self.line.silent = dead  # before a byte is under way
-        self.limit_s, self.at_once = np.inf, False
-        self._selector = selectors.DefaultSelector()
-        self._pty = PtyPort(self.line, self._selector)
-        self.port = self._pty.path
-        self._ending = threading.Event()
-        self._orders: list[Callable[[], None]] = []
+        self.wire = DeviceOnAWire(lambda: self.kvh, TICK_S, pace, dead=dead)
+        self.line, self.port = self.wire.line, self.wire.port
         self.switch_on()
-        self._thread = threading.Thread(target=self._live, daemon=True)
-        self._thread.start()
+        self.wire.live(self._advance)
 
     def switch_on(self) -> None:
         sensor = section("x", acceleration={"range_g": 10})
@@ -74,45 +62,26 @@ class KvhOnAWire:
             field_at=self._field_at,
             serial_number=SERIAL_NUMBER,
             oscillator_ppm=SimulatedKvhSection().oscillator_ppm,
-            on_for_s=self.on_for_s,
+            on_for_s=self._on_for_s,
             seed=np.random.SeedSequence(1),
-            time_s=self.time_s,
+            time_s=self.wire.time_s,
         )
 
     def order(self, what: Callable[[Kvh1775], None]) -> None:
         """Let the instrument's own thread do it, and wait until it is done."""
-        done = threading.Event()
 
         def carry_out() -> None:
             assert self.kvh is not None
             what(self.kvh)
-            done.set()
 
-        self._orders.append(carry_out)
-        assert done.wait(5.0)
+        self.wire.order(carry_out)
 
     def close(self) -> None:
-        self._ending.set()
-        self._thread.join()
-        self._pty.close()
-        self._selector.close()
+        self.wire.close()
 
-    def _live(self) -> None:
-        began_s = time.monotonic()
-        while not self._ending.is_set():
-            while self._orders:
-                self._orders.pop(0)()
-            behind = self.at_once or self.time_s < (time.monotonic() - began_s) * self._pace
-            for key, events in self._selector.select(0.0 if behind else 0.001):
-                key.data(events)
-            if self.time_s >= self.limit_s:  # it makes up for nothing afterwards: no reader need take a second at once
-                began_s = time.monotonic() - self.time_s / self._pace
-            elif behind:
-                self.time_s += TICK_S
-                if self.kvh is not None:
-                    self.kvh.advance(self.time_s)
-                self.line.tick()
-                self._pty.tick()
+    def _advance(self, time_s: float) -> None:
+        if self.kvh is not None:
+            self.kvh.advance(time_s)
 
 
 @contextmanager

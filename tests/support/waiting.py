@@ -1,14 +1,43 @@
-"""Waiting for what another process or thread does."""
+"""Waiting for what another process or thread does: for the event itself, never for so long."""
 
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
+
+PATIENCE_S = 600.0  # of wall time, after which what is waited for has failed: no busy computer takes as long
+LOOK_S = 0.005
+
+Error = TypeVar("Error", bound=Exception)
 
 
-def wait_for(condition: Callable[[], Any], what: str, limit_s: float = 60.0) -> Any:
-    """Wait until `condition` is true; the wait is wall time, as a client's would be."""
-    end = time.monotonic() + limit_s
+def wait_for(
+    condition: Callable[[], Any],
+    what: str,
+    limit_s: float = PATIENCE_S,
+    *,
+    meanwhile: Callable[[], object] = lambda: None,
+) -> Any:
+    """Wait until `condition` is true, and return what it said; `what` is for whoever reads that it never was.
+
+    `meanwhile` is done again and again: it raises what makes waiting vain.
+    """
+    end_s = time.monotonic() + limit_s
     while not (answer := condition()):
-        assert time.monotonic() < end, f"waited {limit_s} s for: {what}"
-        time.sleep(0.005)
+        meanwhile()
+        assert time.monotonic() < end_s, f"waited {limit_s} s for: {what}"
+        time.sleep(LOOK_S)
     return answer
+
+
+def wait_for_error(kind: type[Error], act: Callable[[], object], limit_s: float = PATIENCE_S) -> Error:
+    """Do `act` again and again until it raises an error of that kind, and return the error."""
+
+    def raised() -> Error | None:
+        try:
+            act()
+        except kind as error:
+            return error
+        return None
+
+    error: Error = wait_for(raised, kind.__name__, limit_s)
+    return error

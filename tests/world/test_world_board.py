@@ -3,7 +3,6 @@
 import hashlib
 import math
 import socket
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,8 +26,8 @@ from rig.world.section import world_section
 from support.ideal import ideal
 from support.laboratory_host import Host, booted, host
 from support.paths import DEMO
-from support.waiting import wait_for
-from support.worlds import World
+from support.waiting import wait_for, wait_for_error
+from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
 
@@ -209,6 +208,9 @@ def test_a_wrong_baud_rate_spoils_every_frame(sent: float, read: float) -> None:
     assert not FrameReader().feed(seen)
 
 
+READS = 10  # of a port, that bring nothing
+
+
 def connect(port: str, baud: int = 921600, timeout_s: float = 1.0) -> tuple[Board, list[SampleBatch]]:
     batches: list[SampleBatch] = []
     return Board(port, baud, batches.append, timeout_s), batches
@@ -218,11 +220,7 @@ def stream(board: Board, batches: Sequence[SampleBatch], samples: int) -> None:
     """Configure, start, and wait for so many samples."""
     board.configure(0, 238.0, 245.0)
     board.start()
-    end = time.monotonic() + 10.0
-    while sum(len(batch.samples) for batch in batches) < samples:
-        board.check()
-        assert time.monotonic() < end, "no samples"
-        time.sleep(0.005)
+    wait_for(lambda: sum(len(batch.samples) for batch in batches) >= samples, "samples", meanwhile=board.check)
 
 
 def test_the_board_streams_over_tcp_and_takes_the_next_client(world: World) -> None:
@@ -245,8 +243,7 @@ def test_unplugging_loses_the_link_and_plugging_in_boots_afresh(world: World) ->
     with board:
         stream(board, batches, 100)
         running.control({"do": "unplug_board"})
-        with pytest.raises(BoardError, match="board_link_lost"):
-            watch(board)
+        assert wait_for_error(BoardError, board.check).name == "board_link_lost"
     with pytest.raises(BoardError, match="no_port"):
         connect(running.board_port)
     running.control({"do": "plug_in_board"})
@@ -256,22 +253,13 @@ def test_unplugging_loses_the_link_and_plugging_in_boots_afresh(world: World) ->
         stream(board, batches, 100)
 
 
-def watch(board: Board, limit_s: float = 5.0) -> None:
-    """Check until the board's fault shows."""
-    end = time.monotonic() + limit_s
-    while time.monotonic() < end:
-        board.check()
-        time.sleep(0.005)
-
-
 def test_a_silent_line_is_noticed(world: World) -> None:
     running = world()
     board, batches = connect(running.board_port, timeout_s=0.5)
     with board:
         stream(board, batches, 100)
         running.control({"do": "silence_board", "on": True})
-        with pytest.raises(BoardError, match="board_link_lost"):
-            watch(board)
+        assert wait_for_error(BoardError, board.check).name == "board_link_lost"
         running.control({"do": "silence_board", "on": False})
 
 
@@ -339,21 +327,21 @@ def test_arm_and_board_run_on_one_clock(world: World) -> None:
     with board:
         stream(board, batches, 10)
         running.control({"do": "hold"})
-        start, uptime = running.state()["time_s"], board_time(batches)
+        start, uptime = running.state()["time_s"], newest_s(running, board, batches)
         running.control({"do": "advance", "duration_s": 2.0})
         passed = running.state()["time_s"] - start
-        elapsed = board_time(batches) - uptime
+        elapsed = newest_s(running, board, batches) - uptime
         running.control({"do": "run"})
     assert passed == pytest.approx(2.0)
     assert elapsed == pytest.approx(2.0 * (1 - 541e-6), abs=1.5 / 238 * 8)  # samples come in batches
 
 
-def board_time(batches: Sequence[SampleBatch]) -> float:
-    """The board's time of the newest sample."""
-    count = -1
-    while count != len(batches):  # the clock is held: once no batch comes, none is under way
-        count = len(batches)
-        time.sleep(0.05)
+def newest_s(running: WorldHandle, board: Board, batches: Sequence[SampleBatch]) -> float:
+    """The board's time of the newest sample, while the clock is held."""
+    for _ in range(2):  # the world has come round, and sent what was due
+        running.state()
+    reads = board._link._reads_without_frame
+    wait_for(lambda: board._link._reads_without_frame >= reads + READS, "that nothing is under way")
     return float(batches[-1].samples["board_time_us"][-1]) * 1e-6
 
 
@@ -368,8 +356,7 @@ def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None
         )
         idle.sendall(encode("start", 2, {"sensors": 0}))
         before = running.state()["time_s"]
-        time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way
-        assert running.state()["time_s"] > before + 1.0
+        wait_for(lambda: running.state()["time_s"] > before + 10.0, "what fills every buffer on the way, and more")
 
 
 def test_a_sensor_that_is_saturated_stuck_or_silent(world: World) -> None:
@@ -389,4 +376,4 @@ def test_a_sensor_that_is_saturated_stuck_or_silent(world: World) -> None:
         assert np.abs(counts().mean(axis=0)).max() < 500
         running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "silent"})
         with pytest.raises(BoardError, match="sensor_silent"):
-            wait_for(lambda: board.check(running.state()["time_s"]), "its silence", 20)
+            wait_for(lambda: board.check(running.state()["time_s"]), "its silence")
