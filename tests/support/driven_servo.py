@@ -1,7 +1,6 @@
 """The driver on a simulated servo, as tests take it; and as a process of its own that somebody kills."""
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,10 +9,11 @@ from rig.motion.carried import Carried
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.servo.driver import Servo
 from support.servo_on_a_wire import ServoOnAWire
+from support.yoked_clock import YokedClock
 
 MODEL = "xm430_w350"
 BOARD = Carried(0.05)
-PATIENT_S = 2.0  # a watchdog for tests that are not about it: a busy machine is no fault
+PATIENT_S = 2.0  # a watchdog for tests that are not about it
 STANDS_RAD_S = 1e-9
 
 
@@ -28,26 +28,26 @@ def turn(from_rad: float, by_deg: float, speed_deg_s: float = 120.0, ramp_s: flo
 @contextmanager
 def held(wire: ServoOnAWire, watchdog_s: float = PATIENT_S, **how: Any) -> Iterator[Servo]:
     """The servo under control."""
-    with Servo(wire.port, MODEL, watchdog_s=watchdog_s, **how) as servo:
+    with Servo(wire.port, MODEL, watchdog_s=watchdog_s, clock=wire.clock, **how) as servo:
         servo.take_control(BOARD)
         yield servo
 
 
 def at_speed(wire: ServoOnAWire, act: Callable[[], object]) -> Callable[[], None]:
     """A watch that acts once, when the shaft turns."""
-    done: list[float] = []
+    done: list[bool] = []
 
     def watch() -> None:
         if not done and abs(wire.rate_rad_s) > 1.0:
-            done.append(time.monotonic())
+            done.append(True)
             act()
 
     return watch
 
 
-def turn_on_and_on(port: str, watchdog_s: float) -> None:
+def turn_on_and_on(port: str, watchdog_s: float, clock: YokedClock) -> None:
     """A program that turns a servo to and fro until somebody ends it."""
-    with Servo(port, MODEL, watchdog_s=watchdog_s) as servo:
+    with Servo(port, MODEL, watchdog_s=watchdog_s, clock=clock) as servo:
         servo.take_control(BOARD)
         by_deg = 200.0
         while True:

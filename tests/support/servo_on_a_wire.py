@@ -1,7 +1,6 @@
-"""Simulated servos on a pseudo-terminal, in a process of their own: what the driver has before it, and its faults."""
+"""Simulated servos at a port, in a process of their own: what the driver has before it, and its faults."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
@@ -10,19 +9,28 @@ from rig.world.servo.bus import Bus
 from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import REBOOT, WRITE, Packet
-from support.bus_on_a_pty import BusOnAPty
+from support.bus_on_a_line import BusOnALine
 from support.forked import forked
+from support.yoked_clock import YokedClock
 
 # As a servo is that is set up for the rig: 1 Mbit/s, no return delay, extended position mode, time-based profile.
 SET_UP: dict[str, int] = {"Baud Rate": 3, "Return Delay Time": 0, "Operating Mode": 4, "Drive Mode": 4}
 PLAIN = LineTruth()
+BAUD = 1_000_000  # the driver's
+LINE = "servo"  # the driver's thread that has the line
 
 
 class _FarEnd:
     """What the far process does when it is asked."""
 
-    def __init__(self, truths: tuple[ServoTruth, ...], line: LineTruth) -> None:
-        self.far = BusOnAPty(lambda now: Bus([Servo(each, now()) for each in truths], line, now, seed=7))
+    def __init__(self, clock: YokedClock, truths: tuple[ServoTruth, ...], line: LineTruth, pty: bool) -> None:
+        self._now = clock.time_s
+
+        def bus(now: Callable[[], float]) -> Bus:
+            return Bus([Servo(each, now()) for each in truths], line, now, seed=7)
+
+        self.far = BusOnALine(bus, self._now, clock.move_on, pty=pty)
+        self.far.line.host_baud = None if pty else BAUD
 
     @property
     def servo(self) -> Servo:
@@ -32,10 +40,10 @@ class _FarEnd:
         return self.far.port
 
     def angle_rad(self) -> float:
-        return self.servo.angle_at(time.monotonic())
+        return self.servo.angle_at(self._now())
 
     def rate_rad_s(self) -> float:
-        return self.servo.rate_at(time.monotonic())
+        return self.servo.rate_at(self._now())
 
     def register(self, name: str) -> int:
         return self.servo.memory[name]
@@ -53,29 +61,29 @@ class _FarEnd:
         setattr(self.far.bus, name, value)
 
     def switch(self, on: bool) -> None:
-        self.servo.switch(on, time.monotonic())
+        self.servo.switch(on, self._now())
 
     def let_go(self) -> None:
         """Somebody else switches torque off."""
-        self.servo.obey(Packet(1, WRITE, b"\x40\0\0", True), time.monotonic())
+        self.servo.obey(Packet(1, WRITE, b"\x40\0\0", True), self._now())
 
     def trip(self) -> None:
         """Let the watchdog run out."""
-        self.servo.drive.trip(time.monotonic())
+        self.servo.drive.trip(self._now())
 
     def reboot(self) -> None:
         """Somebody else starts it anew."""
-        self.servo.obey(Packet(1, REBOOT, b"", True), time.monotonic())
+        self.servo.obey(Packet(1, REBOOT, b"", True), self._now())
 
     def add(self, truth: ServoTruth) -> None:
         """Another servo is plugged in."""
-        self.far.bus.servos = [*self.far.bus.servos, Servo(truth, time.monotonic())]
+        self.far.bus.servos = [*self.far.bus.servos, Servo(truth, self._now())]
 
     def pull_out(self) -> None:
         self.far.pull_out()
 
 
-def _serve(pipe: "Connection[Any, Any]") -> None:
+def _serve(pipe: "Connection[Any, Any]", clock: YokedClock) -> None:
     """Be one far end after the other, as they are asked for."""
     end: _FarEnd | None = None
     with suppress(EOFError, OSError):
@@ -83,7 +91,7 @@ def _serve(pipe: "Connection[Any, Any]") -> None:
             while pipe.poll(0.0 if end is not None else None):
                 name, arguments = pipe.recv()
                 if name == "begin":
-                    end = _FarEnd(*arguments)
+                    end = _FarEnd(clock, *arguments)
                     pipe.send(end.port())
                 elif name == "end" and end is not None:
                     end.far.close()
@@ -101,7 +109,8 @@ class _Process:
     def __init__(self) -> None:
         context = forked()
         self.pipe, far = context.Pipe()
-        self.process = context.Process(target=_serve, args=(far,), daemon=True)
+        self.clock = YokedClock(LINE)
+        self.process = context.Process(target=_serve, args=(far, self.clock), daemon=True)
         self.process.start()
         far.close()
 
@@ -110,13 +119,14 @@ _PROCESS: list[_Process] = []  # one, as soon as it is needed
 
 
 class ServoOnAWire:
-    """The servo at `port`."""
+    """The servo at `port`, and the clock that it shares with its driver."""
 
-    def __init__(self, truths: tuple[ServoTruth, ...], line: LineTruth) -> None:
+    def __init__(self, truths: tuple[ServoTruth, ...], line: LineTruth, *, pty: bool) -> None:
         if not _PROCESS or not _PROCESS[0].process.is_alive():
             _PROCESS[:] = [_Process()]
-        self._pipe = _PROCESS[0].pipe
-        self.port: str = self.do("begin", truths, line)
+        self._pipe, self.clock = _PROCESS[0].pipe, _PROCESS[0].clock
+        self.clock.begin()
+        self.port: str = self.do("begin", truths, line, pty)
 
     def do(self, name: str, *arguments: object) -> Any:
         """Let the far end do something; its answer."""
@@ -138,9 +148,12 @@ class ServoOnAWire:
 
 
 @contextmanager
-def servo_on_a_wire(*truths: ServoTruth, line: LineTruth = PLAIN) -> Iterator[ServoOnAWire]:
-    """For the length of the `with` block; one that is set up for the rig where no truth is given."""
-    wire = ServoOnAWire(truths or (ServoTruth(left=SET_UP),), line)
+def servo_on_a_wire(*truths: ServoTruth, line: LineTruth = PLAIN, pty: bool = False) -> Iterator[ServoOnAWire]:
+    """For the length of the `with` block; one that is set up for the rig where no truth is given.
+
+    Its port is a pseudo-terminal (`pty`), or one at socket://, which carries no baud rate: the host's is `BAUD`.
+    """
+    wire = ServoOnAWire(truths or (ServoTruth(left=SET_UP),), line, pty=pty)
     try:
         yield wire
     finally:

@@ -1,12 +1,12 @@
 """The maker's packet handler as this driver uses it: a reply, or an exception that says what was wrong with it."""
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from rig.errors import Problem, Refused
 from rig.errors.extras import missing_extra
+from rig.turners.servo.clock import HOST, Clock
 from rig.turners.servo.latency import lower_latency
 from rig.turners.servo.port import Port
 from rig.turners.servo.registers import RETURN_LEVEL, Register
@@ -52,18 +52,18 @@ class PortGone(BusError):
 class Bus:
     """The line to one servo. Only one thread at a time may use it."""
 
-    def __init__(self, path: str, baud: int, servo_id: int) -> None:
+    def __init__(self, path: str, baud: int, servo_id: int, clock: Clock = HOST) -> None:
         """Opens and locks the port. Raises Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
         try:
             from dynamixel_sdk import PacketHandler
         except ImportError as error:
             raise missing_extra(error, "servo") from error
-        self._id, self._path = servo_id, path
+        self._id, self._path, self.clock = servo_id, path, clock
         self._packets: Any = PacketHandler(2.0)
         self._gone = False
         self.alert = False  # of the newest reply
         try:
-            self._port = Port(path, baud, SLACK_S)
+            self._port = Port(path, baud, SLACK_S, clock)
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise Refused.of(_no_port(path, baud, error)) from error
         try:
@@ -151,9 +151,9 @@ class Bus:
         Replies do not say which instruction they answer.
         """
         with self._failing():
-            now_s = time.monotonic()
+            now_s = self.clock.now_s()
             quiet_s, give_up_s = now_s + SLACK_S, now_s + SETTLE_MOST_S
-            while (now_s := time.monotonic()) < min(quiet_s, give_up_s):
+            while (now_s := self.clock.now_s()) < min(quiet_s, give_up_s):
                 if self._port.readPort(1024):
                     quiet_s = now_s + SLACK_S
 

@@ -1,7 +1,6 @@
 """The servo as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -14,6 +13,7 @@ from rig.motion.carried import Carried
 from rig.motion.steps import Motion
 from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, Denied
+from rig.turners.servo.clock import HOST, Clock
 from rig.turners.servo.instructions import disarm, go, make_ready
 from rig.turners.servo.link import Job, Link
 from rig.turners.servo.looking import look_at
@@ -59,8 +59,9 @@ class Servo:
         baud: int = 1_000_000,
         rate_hz: float = 125.0,
         watchdog_s: float = 0.3,
+        clock: Clock = HOST,
     ) -> None:
-        self._port, self._wanted_model, self._on_state = port, model, on_state
+        self._port, self._wanted_model, self._on_state, self._clock = port, model, on_state, clock
         self._id, self._baud, self._period_s = servo_id, baud, 1 / rate_hz
         self._watchdog = max(1, min(WATCHDOG_MOST, round(watchdog_s / WATCHDOG_S)))
         self._changed = threading.Condition()  # notified when anything below changes
@@ -80,18 +81,18 @@ class Servo:
 
     def start(self) -> None:
         """Open the port, look, and receive; moves nothing. Raises `Refused` when no servo answers."""
-        self._bus = Bus(self._port, self._baud, self._id)
+        self._bus = Bus(self._port, self._baud, self._id, self._clock)
         try:
             self._report = look_at(self._bus, self._port, self._id)
         except BaseException:
             self._bus.close()
             raise
         self._link = Link(self._bus, self._report.servo, self._period_s, self._take_state, self._fail)
-        stop = Stop(self._link, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
+        stop = Stop(self._link, self._clock, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
         self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()
-        ends_s = time.monotonic() + FIRST_STATE_S
-        self._wait(lambda: bool(self._states) or time.monotonic() > ends_s)
+        ends_s = self._clock.now_s() + FIRST_STATE_S
+        self._wait(lambda: bool(self._states) or self._clock.now_s() > ends_s)
         if not self._states:
             raise Refused(
                 "servo_silent", f"no state comes from the servo at {self._port}", "Look at its cable, then start again"
@@ -137,8 +138,8 @@ class Servo:
         """Have the shaft held where it is, with the watchdog armed. Raises `Refused` by name."""
         self.check()
         refuse(self.problems(carried))
-        ends_s = time.monotonic() + STANDING_S
-        self._wait(lambda: stands(list(self._states)) or time.monotonic() > ends_s)
+        ends_s = self._clock.now_s() + STANDING_S
+        self._wait(lambda: stands(list(self._states)) or self._clock.now_s() > ends_s)
         if not stands(list(self._states)):
             raise Refused("servo_moves", "the servo's shaft is moving", "Hold the board still, then start again")
         with stopping_on_error(self.stop):
@@ -160,7 +161,7 @@ class Servo:
                 self._fail(wrong[0])
                 self.check()
             move = move_of(motion)
-            self._looked_s, self._moving = time.monotonic(), True
+            self._looked_s, self._moving = self._clock.now_s(), True
             try:
                 self._call(lambda bus: go(bus, move))
                 takes_s = 1e-3 * move.total_ms * SLOWNESS + SLOWNESS_S
@@ -255,15 +256,15 @@ class Servo:
         finished = False
         while not finished:
             with self._changed:
-                self._changed.wait_for(lambda: self._problem is not None or done(), WATCH_S)
+                self._clock.wait_for(self._changed, lambda: self._problem is not None or done(), WATCH_S)
                 finished = done()
-            self._looked_s = time.monotonic()
+            self._looked_s = self._clock.now_s()
             self.check()
             watch()
 
     def _thread_problem(self, link: Link) -> Problem | None:
         """What keeps the thread that has the line from coming round."""
-        silent_s = time.monotonic() - link.turned_s
+        silent_s = self._clock.now_s() - link.turned_s
         if not link.alive or silent_s < HUNG_S * crowding():
             return None
         return problems.driver_hung(silent_s)
@@ -279,7 +280,7 @@ class Servo:
             self._fail(error.problem)
         except Exception as error:
             self._fail(problems.state_not_taken(error))
-        if self._moving and time.monotonic() - self._looked_s > UNWATCHED_S * crowding():
+        if self._moving and self._clock.now_s() - self._looked_s > UNWATCHED_S * crowding():
             self._fail(problems.unwatched(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()
@@ -302,8 +303,8 @@ class Servo:
 
     def _seen_at_rest(self, since_s: float, timeout_s: float) -> bool:
         def at_rest() -> bool:
-            return stands([state for state in list(self._states) if state.host_time_s > since_s])
+            return stands([state for state in list(self._states) if state.time_s > since_s])
 
         with self._changed:
-            self._changed.wait_for(at_rest, timeout_s)
+            self._clock.wait_for(self._changed, at_rest, timeout_s)
             return at_rest()

@@ -13,7 +13,7 @@ from rig.turners.servo.bus import Bus, BusError, Denied, Lost, PortGone
 from rig.turners.servo.models import TICKS, ServoModel
 from rig.turners.servo.preflight import hardware_problem
 from rig.turners.servo.registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
-from rig.turners.servo.state import ServoState, decode, now_s
+from rig.turners.servo.state import ServoState, decode
 
 LOST_MOST, SILENCE_S = 5, 0.4  # so many states in a row may be lost, and so long none may come
 LOOK_S = 0.1  # between two looks at what the block of states does not hold: torque and watchdog, by turns
@@ -40,7 +40,7 @@ class Link:
         on_state: Callable[[ServoState], None],
         on_problem: Callable[[Problem], None],
     ) -> None:
-        self._bus, self._model, self._period_s = bus, model, period_s
+        self._bus, self._clock, self._model, self._period_s = bus, bus.clock, model, period_s
         self._on_state, self._on_problem = on_state, on_problem
         self._jobs: deque[Callable[[], None]] = deque()
         self._closing = threading.Event()
@@ -49,13 +49,13 @@ class Link:
         self._error_bits = 0
         self._latest: ServoState | None = None
         self._unlike = 0
-        self._lost, self._damaged, self._heard_s = 0, 0, time.monotonic()
+        self._lost, self._damaged, self._heard_s = 0, 0, self._clock.now_s()
         self._looks = 0
         self._quiet_until_s = 0.0
         self._stopping = False
         self.torque_off = False  # and not by the rig
         self.supervising = False  # torque is on and the watchdog armed: anything else is a problem
-        self.turned_s = time.monotonic()  # when the thread last came round
+        self.turned_s = self._clock.now_s()  # when the thread last came round
 
     def start(self) -> None:
         """Begin to poll."""
@@ -81,7 +81,7 @@ class Link:
 
     def keep_quiet(self, duration_s: float) -> None:
         """Send nothing for so long, so that the servo's watchdog stops it."""
-        self._quiet_until_s = time.monotonic() + duration_s
+        self._quiet_until_s = self._clock.now_s() + duration_s
 
     def call(self, job: Job, *, also_stopped: bool = False) -> Any:
         """Have something done between two states; what it returns, or raises.
@@ -102,7 +102,7 @@ class Link:
 
         self._jobs.append(carry_out)
         self._woken.set()
-        if not done.wait(JOB_S):
+        if not self._clock.wait(done, JOB_S):
             raise PortGone("the thread that has the line does not come round")
         if "error" in outcome:
             raise outcome["error"]
@@ -110,31 +110,32 @@ class Link:
 
     # Its thread -------------------------------------------------------------------------------------------------
     def _run(self) -> None:
-        due_s = looked_s = time.monotonic()
+        due_s = looked_s = self._clock.now_s()
         try:
             while not self._closing.is_set():
-                self.turned_s = time.monotonic()
+                self.turned_s = self._clock.now_s()
                 self._woken.clear()
                 if self.turned_s < self._quiet_until_s:
-                    self._closing.wait(self._period_s)
+                    self._clock.wait(self._closing, self._period_s)
                     continue
                 while self._jobs:
                     self._jobs.popleft()()
                 self._poll()
-                if time.monotonic() - looked_s > LOOK_S:
-                    looked_s = time.monotonic()
+                if self._clock.now_s() - looked_s > LOOK_S:
+                    looked_s = self._clock.now_s()
                     self._look()
-                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                due_s = max(due_s + self._period_s, self._clock.now_s() - self._period_s)
                 if not self._jobs:
-                    self._woken.wait(max(0.0, due_s - time.monotonic()))
+                    self._clock.wait(self._woken, max(0.0, due_s - self._clock.now_s()))
         except Exception as error:
             self._on_problem(problems.driver_died(error))
 
     def _poll(self) -> None:
+        clock = self._clock
         try:
-            began_s = now_s()
+            began_s = clock.reference_s()
             data = self._bus.read_bytes(STATE)
-            ended_s, host_s = now_s(), time.monotonic()
+            ended_s, host_s = clock.reference_s(), time.monotonic()
             if self._bus.alert or self._error_bits:
                 self.torque_off = True
                 (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
@@ -143,9 +144,9 @@ class Link:
             return
         except PortGone as error:
             self._fail(problems.port_lost(error))
-            self._closing.wait(self._period_s)
+            self._clock.wait(self._closing, self._period_s)
             return
-        self._heard_s, self._lost, self._damaged = time.monotonic(), 0, 0
+        self._heard_s, self._lost, self._damaged = self._clock.now_s(), 0, 0
         state = decode(data, self._model, (began_s, ended_s), host_s, self._error_bits)
         if self._fresh(state):
             self._latest = state
@@ -200,7 +201,7 @@ class Link:
     def _count_lost(self, damaged: bool) -> None:
         self._lost += 1
         self._damaged += damaged
-        silent_s = time.monotonic() - self._heard_s
+        silent_s = self._clock.now_s() - self._heard_s
         if self._lost > LOST_MOST and silent_s > SILENCE_S and silent_s > SILENCE_S * crowding():
             self._fail(problems.silent(silent_s, mostly_damaged=2 * self._damaged > self._lost))
         try:

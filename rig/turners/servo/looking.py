@@ -23,7 +23,7 @@ from rig.turners.servo.registers import (
     VELOCITY_LIMIT,
     VOLTAGE_LIMITS,
 )
-from rig.turners.servo.state import ServoReport, decode, now_s
+from rig.turners.servo.state import ServoReport, decode
 
 PINGS = 4
 LISTEN_S = 0.012  # after each ping, for another's answer
@@ -96,13 +96,13 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
     (hardware_error,) = bus.look_up(HARDWARE_ERROR)
     round_trips, states = [], []
     for _ in range(ROUND_TRIPS):
-        began_s = now_s()
+        began_s = bus.clock.reference_s()
         try:
             data = bus.read_bytes(STATE)
-            states.append(decode(data, model, (began_s, now_s()), time.monotonic(), hardware_error))
+            states.append(decode(data, model, (began_s, bus.clock.reference_s()), time.monotonic(), hardware_error))
         except Lost:
             bus.settle()
-        round_trips.append(now_s() - began_s)
+        round_trips.append(bus.clock.reference_s() - began_s)
     if not states:
         raise Lost(damaged=True)
     return ServoReport(

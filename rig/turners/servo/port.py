@@ -7,11 +7,12 @@ Here the system waits, the clock is monotonic, the time-out is the line's, the p
 failed is never used again.
 """
 
-import time
 from collections.abc import Sequence
 from contextlib import suppress
 
 import serial
+
+from rig.turners.servo.clock import Clock
 
 WAIT_S = 0.002  # a read waits so long at most for the bytes it asks for; then the time-out is looked at
 WRITE_S = 1.0  # a write that takes longer has nobody at its far end; pyserial counts what holds this program up, too
@@ -26,17 +27,20 @@ class Port:
     killed wherever something else holds the port open. `slack_s`: how much later than its bytes need a reply may come.
     """
 
-    def __init__(self, path: str, baud: int, slack_s: float) -> None:
+    def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:
         locked = True if "://" not in path else None
         self.serial = serial.serial_for_url(path, baud, timeout=WAIT_S, write_timeout=WRITE_S, exclusive=locked)
         self.is_using = False
-        self._baud, self._slack_s = baud, slack_s
+        self._baud, self._slack_s, self._clock = baud, slack_s, clock
         self._deadline_s = 0.0
 
     def close(self) -> None:
         """Give the port back; one that is gone already is no problem."""
+        sock = getattr(self.serial, "_socket", None)  # which pyserial leaves open where the far end has closed it first
         with suppress(OSError):
             self.serial.close()
+        if sock is not None:
+            sock.close()
 
     @property
     def byte_s(self) -> float:
@@ -63,12 +67,12 @@ class Port:
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         """A reply of so many bytes is due from now on."""
-        self._deadline_s = time.monotonic() + packet_length * self.byte_s + self._slack_s
+        self._deadline_s = self._clock.now_s() + packet_length * self.byte_s + self._slack_s
 
     def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
         """A reply is due within `msec`."""
-        self._deadline_s = time.monotonic() + msec / 1000
+        self._deadline_s = self._clock.now_s() + msec / 1000
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
         """Whether it is late."""
-        return time.monotonic() > self._deadline_s
+        return self._clock.now_s() > self._deadline_s

@@ -1,6 +1,5 @@
 """What a servo says about itself: one state per reply, and the report a look at it gives."""
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from operator import attrgetter
@@ -26,20 +25,11 @@ STILL_S, STILL_STATES = 0.15, 5  # so long, and in so many states, a shaft must 
 STILL_RAD = 6.5 * PULSE_RAD  # … within this: a shaft at rest is seen to dither by ±3 pulses (forum.robotis.com 7582)
 
 
-def now_s() -> float:
-    """The reference clock of a servo's states: the host's, which nobody slews or sets where the system has such a one.
-
-    The servo's own (Realtime Tick) is none: it counts milliseconds, by an oscillator that may be a per cent out.
-    """
-    raw = getattr(time, "CLOCK_MONOTONIC_RAW", None)
-    return time.monotonic() if raw is None else time.clock_gettime(raw)
-
-
 @dataclass(frozen=True, slots=True)
 class ServoState:
     """One reply of the servo.
 
-    `time_s` is `now_s` at half the transaction (the reference clock), `host_time_s` is `time.monotonic()` when the
+    `time_s` is the reference time (`clock.Clock`) at half the transaction, `host_time_s` is `time.monotonic()` when the
     reply was read, `took_s` how long the transaction took: the position was measured within it. `q_rad` (1,) is the
     shaft's angle as the encoder reads it, turns counted, ccw positive, `qd_rad_s` (1,) the servo's own and coarse rate,
     in steps of 1.4° a second. `load` is a current in A, or a share of full load (`ServoModel.load_unit`).

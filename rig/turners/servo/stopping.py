@@ -10,11 +10,11 @@ None of this is a safety function. Only the switch of the servo's supply is sure
 """
 
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 
 from rig.turners.servo.bus import Bus, BusError
+from rig.turners.servo.clock import Clock
 from rig.turners.servo.instructions import brake
 from rig.turners.servo.link import Link
 from rig.turners.servo.registers import TRIPPED, WATCHDOG
@@ -28,19 +28,25 @@ SURE = "only the switch of its supply is sure"
 class Stop:
     """How the shaft is stopped.
 
-    `seen_at_rest(since_s, timeout_s)` waits for states newer than `since_s` (monotonic time) that show the shaft at
+    `seen_at_rest(since_s, timeout_s)` waits for states newer than `since_s` (reference time) that show the shaft at
     rest; `lets_go()` tells whether the servo has switched its motor off.
     """
 
     def __init__(
-        self, link: Link, watchdog_s: float, seen_at_rest: Callable[[float, float], bool], lets_go: Callable[[], bool]
+        self,
+        link: Link,
+        clock: Clock,
+        watchdog_s: float,
+        seen_at_rest: Callable[[float, float], bool],
+        lets_go: Callable[[], bool],
     ) -> None:
-        self._link, self._watchdog_s = link, watchdog_s
+        self._link, self._clock, self._watchdog_s = link, clock, watchdog_s
         self._seen_at_rest, self._lets_go = seen_at_rest, lets_go
 
     def carry_out(self) -> StopOutcome:
         """Stop the shaft, and say what is known of it; less than 1 s."""
-        began_s = time.monotonic()
+        clock = self._clock
+        since_s, ends_s = clock.reference_s(), clock.now_s() + STOP_S
         told = threading.Event()
 
         def tell(bus: Bus) -> None:
@@ -54,9 +60,9 @@ class Stop:
                 self._link.keep_quiet(2 * self._watchdog_s)
 
         self._link.stop(tell)
-        if not told.wait(TOLD_S):
+        if not clock.wait(told, TOLD_S):
             self._link.keep_quiet(2 * self._watchdog_s)
-        seen = self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic())
+        seen = self._seen_at_rest(since_s, ends_s - clock.now_s())
         if seen and self._lets_go():
             return StopOutcome(True, "the shaft stands, but its motor is off", "Hold the board: nothing else may")
         if seen:

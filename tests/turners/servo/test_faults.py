@@ -3,13 +3,13 @@
 import math
 import os
 import signal
-import time
 from collections.abc import Callable
 from contextlib import suppress
 
 import pytest
 
 from rig.errors import Fault
+from rig.turners.servo.registers import TRIPPED
 from rig.turners.servo.state import ServoState
 from rig.world.servo.truth import ServoTruth
 from support.driven_servo import STANDS_RAD_S, at_speed, held, turn, turn_on_and_on
@@ -82,7 +82,8 @@ def test_a_driver_that_says_nothing_for_too_long_is_stopped_by_the_watchdog() ->
     def take(state: ServoState) -> None:
         if abs(state.qd_rad_s[0]) > 1.0 and not slept:
             slept.append(True)
-            time.sleep(0.6)
+            with wire.clock.without_the_driver():
+                wait_for(lambda: wire.do("register", "Bus Watchdog") == TRIPPED, "the watchdog's trip")
 
     with servo_on_a_wire() as wire:
         with pytest.raises(Fault) as fault, held(wire, 0.2, on_state=take) as servo:
@@ -123,15 +124,15 @@ def test_a_program_that_hangs_in_a_move_is_stopped_by_its_own_driver() -> None:
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_program_that_is_killed_or_frozen_leaves_a_shaft_that_stands_within_a_second(how: signal.Signals) -> None:
     with servo_on_a_wire() as wire:
-        program = forked().Process(target=turn_on_and_on, args=(wire.port, WATCHDOG_S), daemon=True)
+        program = forked().Process(target=turn_on_and_on, args=(wire.port, WATCHDOG_S, wire.clock), daemon=True)
         program.start()
         try:
             wait_for(lambda: abs(wire.rate_rad_s) > 1.0, "the shaft turns")
             assert program.pid is not None
             os.kill(program.pid, how)
-            time.sleep(1.0)
+            wire.clock.go_on_until(wire.clock.now_s() + 1.0)
             assert abs(wire.rate_rad_s) < STANDS_RAD_S
-            assert (wire.do("register", "Bus Watchdog"), wire.do("register", "Torque Enable")) == (255, 1)
+            assert (wire.do("register", "Bus Watchdog"), wire.do("register", "Torque Enable")) == (TRIPPED, 1)
         finally:
             with suppress(ProcessLookupError):
                 program.kill()

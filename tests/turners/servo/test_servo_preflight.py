@@ -52,7 +52,7 @@ def test_a_servo_is_refused_by_name_and_stays_as_it_is(what: str) -> None:
     name, truths, line = REFUSED[what]
     with servo_on_a_wire(*truths, line=line) as wire:
         before_rad = wire.angle_rad
-        with pytest.raises(Refused) as refused, Servo(wire.port, MODEL) as servo:
+        with pytest.raises(Refused) as refused, Servo(wire.port, MODEL, clock=wire.clock) as servo:
             servo.take_control(BOARD)
         assert refused.value.name == name
         assert wire.angle_rad == before_rad
@@ -63,14 +63,17 @@ def test_a_servo_is_refused_by_name_and_stays_as_it_is(what: str) -> None:
 def test_a_servo_that_acknowledges_nothing_is_made_to(level: int) -> None:
     with servo_on_a_wire() as wire:
         wire.do("put", "Status Return Level", level)
-        with Servo(wire.port, MODEL, watchdog_s=2.0) as servo:
+        with Servo(wire.port, MODEL, watchdog_s=2.0, clock=wire.clock) as servo:
             servo.take_control(BOARD)
         assert wire.do("register", "Status Return Level") == 2
 
 
 @pytest.mark.slow
 def test_an_adapter_that_echoes_is_none_of_a_second_servo() -> None:
-    with servo_on_a_wire(line=LineTruth(echo=True)) as wire, Servo(wire.port, MODEL, watchdog_s=2.0) as servo:
+    with (
+        servo_on_a_wire(line=LineTruth(echo=True)) as wire,
+        Servo(wire.port, MODEL, watchdog_s=2.0, clock=wire.clock) as servo,
+    ):
         servo.take_control(BOARD)
 
 
@@ -81,7 +84,7 @@ def test_a_port_that_is_not_there_is_refused_by_name(tmp_path: Path) -> None:
 
 
 def test_a_board_too_far_from_the_shaft_is_refused() -> None:
-    with servo_on_a_wire() as wire, Servo(wire.port, MODEL) as servo:
+    with servo_on_a_wire() as wire, Servo(wire.port, MODEL, clock=wire.clock) as servo:
         report = servo.report()
     heavy = Carried(1.0, (0.1, 0.0, 0.0))
     assert [each.name for each in servo_problems(report, MODEL, heavy, 0.1)] == ["servo_load"]
@@ -102,7 +105,7 @@ def test_of_a_run_that_goes_on_the_movements_behind_it_are_judged_too_and_nothin
 
 
 def test_the_latency_timer_of_an_ftdi_adapter_is_set_or_refused_by_name(tmp_path: Path) -> None:
-    with servo_on_a_wire() as wire:
+    with servo_on_a_wire(pty=True) as wire:
         timer = tmp_path / Path(wire.port).name / "latency_timer"
         timer.parent.mkdir()
         timer.write_text("16\n")

@@ -11,6 +11,7 @@ from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import Packet, Receiver, encode, encode_status
 from support.servo_on_a_wire import PLAIN, ServoOnAWire, servo_on_a_wire
+from support.waiting import wait_for
 
 dynamixel_sdk = pytest.importorskip("dynamixel_sdk")
 from dynamixel_easy_sdk.control_table import ControlTable  # noqa: E402
@@ -23,10 +24,12 @@ FAST = {"Baud Rate": 3, "Return Delay Time": 0}
 
 
 @contextmanager
-def client(*truths: ServoTruth, line: LineTruth = PLAIN) -> Iterator[tuple[Any, Any, ServoOnAWire]]:
-    """Port and packet handler of the client, and what they talk to."""
-    with servo_on_a_wire(*truths, line=line) as wire:
-        dynamixel_sdk.port_handler.LATENCY_TIMER = 100  # a busy machine is no lost reply
+def client(
+    *truths: ServoTruth, line: LineTruth = PLAIN, patience_ms: float = 200_000.0
+) -> Iterator[tuple[Any, Any, ServoOnAWire]]:
+    """Port and packet handler of the client, and what they talk to; `patience_ms` is for a reply."""
+    with servo_on_a_wire(*truths, line=line, pty=True) as wire:
+        dynamixel_sdk.port_handler.LATENCY_TIMER = patience_ms / 2  # no busy machine is a lost reply
         port = dynamixel_sdk.PortHandler(wire.port)
         assert port.openPort()
         try:
@@ -88,13 +91,13 @@ def test_sync_read_is_answered_by_one_after_the_other() -> None:
         assert group.txRxPacket() == 0
         assert abs(group.getData(1, 132, 4) - 30 / 360 * 4096) < 20
         assert abs(group.getData(2, 132, 4) - 90 / 360 * 4096) < 20
-        found, result = packets.broadcastPing(port)
-        assert (result, found) == (0, {1: [1020, 48], 2: [1020, 48]})
+        both = {1: [1020, 48], 2: [1020, 48]}
+        wait_for(lambda: packets.broadcastPing(port) == (both, 0), "both answers")
 
 
 @pytest.mark.slow
 def test_two_with_one_id_spoil_each_other_s_answers() -> None:
-    with client(ServoTruth(left=FAST), ServoTruth(left=FAST, start_deg=200.0)) as (port, packets, _):
+    with client(ServoTruth(left=FAST), ServoTruth(left=FAST, start_deg=200.0), patience_ms=200.0) as (port, packets, _):
         results = [packets.readTxRx(port, 1, 120, 27)[1] for _ in range(5)]
         assert CORRUPT in results
 
@@ -105,10 +108,10 @@ def test_an_echo_is_skipped_by_the_client() -> None:
 
 
 def test_another_baud_rate_is_silence() -> None:
-    with client(ServoTruth(left=FAST | {"Baud Rate": 1})) as (port, packets, _):
+    with client(ServoTruth(left=FAST | {"Baud Rate": 1}), patience_ms=200.0) as (port, packets, _):
         assert packets.ping(port, 1)[1] in (NO_REPLY, CORRUPT)
         assert port.setBaudRate(57600)
-        assert packets.ping(port, 1) == (1020, 0, 0)
+        wait_for(lambda: packets.ping(port, 1) == (1020, 0, 0), "its answer")
 
 
 def test_the_alert_bit_is_in_every_reply_until_a_reboot() -> None:
