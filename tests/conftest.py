@@ -73,6 +73,12 @@ def thorough(request: pytest.FixtureRequest) -> bool:
 
 
 @pytest.fixture
+def no_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rig takes this machine for one that nobody else uses, and stretches none of its limits."""
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+
+
+@pytest.fixture
 def read_by_system() -> Iterator[None]:
     """Run files are read by processes that the system starts, for what is asked of those themselves."""
     with readers_of_system():

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 LINT = [str(Path(sys.executable).with_name("lint-imports")), "--no-cache"]
 
@@ -28,7 +29,13 @@ def copy(tmp_path: Path) -> Path:
 
 def lint(folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        LINT, cwd=folder, env={"PYTHONPATH": str(folder)}, capture_output=True, text=True, timeout=50, check=False
+        LINT,
+        cwd=folder,
+        env={"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
     )
 
 

@@ -84,7 +84,6 @@ def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | 
 
 
 @pytest.mark.proof
-@pytest.mark.timeout(1800)  # two hundred recordings on a busy computer
 @pytest.mark.parametrize(
     "world",
     [pytest.param(world, marks=() if world is HAND else pytest.mark.thorough) for world in WORLDS.values()],

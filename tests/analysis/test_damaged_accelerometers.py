@@ -58,7 +58,6 @@ def just_below(damage: Damage, session: Session) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_what_is_just_not_told_is_within_the_uncertainty(part: str, name: str) -> None:

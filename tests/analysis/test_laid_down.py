@@ -41,7 +41,6 @@ def off(found: dict[str, Any], laid: Laid) -> Array:
 
 @pytest.mark.thorough
 @pytest.mark.proof
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("box", BOXES.values(), ids=BOXES)
 def test_uncertainties_are_those_of_many_sessions(
     box: Box, tmp_path: Path, capsys: pytest.CaptureFixture[str], thorough: bool

@@ -119,7 +119,6 @@ BY_SHEET = {
 
 
 @pytest.mark.proof
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize(("session", "without"), [(accelerometer, 1.25), (magnetometer, 2.0)])
 def test_the_stated_uncertainty_covers_the_truth(
     session: Callable[[int], Session], without: float, thorough: bool
@@ -130,7 +129,6 @@ def test_the_stated_uncertainty_covers_the_truth(
 
 @pytest.mark.one_in(3)
 @pytest.mark.proof
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
 def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: str, thorough: bool) -> None:
     """It bends, and follows its temperature, as far as its data sheet says at most; its arm always errs alike."""

@@ -100,7 +100,6 @@ def chance_of(values: list[float], below: float) -> float:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("evenly", "below"), [(False, 1.0), (True, SMALL)], ids=["normal", "even"])
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
 def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(

@@ -27,7 +27,6 @@ def off(source: Source, seed: int) -> Array:
 
 @pytest.mark.one_in(2)
 @pytest.mark.slow
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("source", SOURCES)
 def test_a_servo_calibrates_what_is_on_a_port_of_its_own(source: str) -> None:
     assert np.abs(off(SOURCES[source], 3)).max() < 4

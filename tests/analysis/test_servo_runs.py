@@ -58,7 +58,6 @@ def test_a_run_errs_by_what_it_says_and_the_turning_adds_next_to_nothing() -> No
 
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(1800)
 def test_error_over_uncertainty_is_about_one_in_many_runs() -> None:
     """Each with an encoder ±1.3° out, 7 % of ripple, 0.25° of play, an adapter a degree off in each mounting."""
     runs = [ran(seed, "turner.state_rate_hz=100") for seed in range(RUNS)]
@@ -72,7 +71,6 @@ def test_error_over_uncertainty_is_about_one_in_many_runs() -> None:
 
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(1800)
 def test_so_it_is_of_a_gyroscope_that_hides_nothing() -> None:
     """The biases' u is that of the Earth's rate, which nobody simulates here."""
     runs = [ran(seed, "turner.state_rate_hz=100", *SQUARE, noise_rad_s=QUIET_RAD_S) for seed in range(RUNS)]

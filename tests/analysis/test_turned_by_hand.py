@@ -57,7 +57,6 @@ def test_a_hands_turns_tell_the_scale_to_a_thousandth(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.one_in(2)
 @pytest.mark.proof
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("hand", HANDS.values(), ids=HANDS)
 def test_uncertainties_are_those_of_many_sessions(tmp_path: Path, hand: Hand, thorough: bool) -> None:
     sessions = [turn(hand, seed) for seed in range(200 if thorough else 20)]

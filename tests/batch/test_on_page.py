@@ -14,7 +14,7 @@ from rig.batch.operators import Question
 from rig.page.control import Control
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"
 Asking = Callable[..., int]
@@ -34,7 +34,7 @@ def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
         port = urlsplit(url).port or 0
 
         def asked(method: str, path: str, body: object = None, **headers: str) -> int:
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
             sent = {"Authorization": f"Bearer {TOKEN}", **headers}
             connection.request(method, path, json.dumps(body), {name: text for name, text in sent.items() if text})
             status = connection.getresponse().status
@@ -43,7 +43,7 @@ def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
 
         number = Question("number", "part 1, serial number:")
         threading.Thread(target=lambda: answers.put(voice.answer(number)), daemon=True).start()
-        wait_for(lambda: b'"number":1' in sections.whole(), "the question", 30)
+        wait_for(lambda: b'"number":1' in sections.whole(), "the question")
         yield asked
 
 
@@ -58,7 +58,7 @@ def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answer
         assert ask("POST", "/say", wrong) == 400
     assert answers.empty()
     assert ask("POST", "/say", right) == 202
-    assert answers.get(timeout=30) == "G-001"
+    assert answers.get(timeout=PATIENCE_S) == "G-001"
     assert ask("POST", "/say", right) == 409
     assert ask("POST", "/stop") == 409  # nothing runs
 

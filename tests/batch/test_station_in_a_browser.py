@@ -18,7 +18,8 @@ from rig.batch.status import Now, Present
 from rig.page.control import STOPPED
 from rig.page.serving import Address
 from rig.station.events import Interrupted
-from support.browser import legible, needs_browser, picture, screen, text, typed, until
+from support.browser import legible, needs_browser, picture, screen, text, typed
+from support.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -39,7 +40,7 @@ def answered(asked: Asked, *questions: str) -> Iterator["SimpleQueue[object]"]:
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()
     yield answers
-    thread.join(30)
+    thread.join(PATIENCE_S)
 
 
 def replaced(button: WebElement) -> bool:
@@ -55,37 +56,37 @@ def test_a_number_is_scanned_and_go_is_typed_or_ticked(driver: Chrome) -> None:
     questions = "number", "go", "go"
     with on_page(Present(NOW), Address(port=0)) as (voice, url), answered(Asked(voice), *questions) as answers:
         driver.get(url)
-        until(lambda: "serial number" in text(driver, "text"), "the question for a number")
+        wait_for(lambda: "serial number" in text(driver, "text"), "the question for a number")
         assert text(driver, "part") == "<b>G-003</b>" and "A. Person" in text(driver, "who")
         assert [each.text for each in driver.find_elements(By.CSS_SELECTOR, "#tray li strong")] == ["✓", "✗", "◉"]
         legible(driver)
         picture(driver, "station-number")
         typed(driver, "G-004")
-        assert answers.get(timeout=30) == "G-004"
-        until(lambda: "Type go" in text(driver, "text"), "the question whether to go")
+        assert answers.get(timeout=PATIENCE_S) == "G-004"
+        wait_for(lambda: "Type go" in text(driver, "text"), "the question whether to go")
         assert all(each in text(driver, "lines") for each in WORDS)
         typed(driver, "G-005")  # scanned too early: no answer
-        until(lambda: "answers nothing" in text(driver, "hint"), "that a number is no answer")
+        wait_for(lambda: "answers nothing" in text(driver, "hint"), "that a number is no answer")
         assert answers.empty()
         picture(driver, "station-go")
         with screen(driver, 390, 800):
             assert driver.execute_script("return document.documentElement.scrollWidth") <= 390
         answered_go = driver.find_element(By.CSS_SELECTOR, "#buttons .go")
         typed(driver, "go")
-        assert answers.get(timeout=30) is True
-        until(lambda: replaced(answered_go), "the next question")
+        assert answers.get(timeout=PATIENCE_S) is True
+        wait_for(lambda: replaced(answered_go), "the next question")
         assert not driver.find_element(By.CSS_SELECTOR, "#buttons .go").is_enabled()
         driver.find_element(By.ID, "clear").click()
         driver.find_element(By.CSS_SELECTOR, "#buttons .go").click()
-        assert answers.get(timeout=30) is True
-        until(lambda: not driver.find_element(By.ID, "ask").is_displayed(), "that nothing is asked")
+        assert answers.get(timeout=PATIENCE_S) is True
+        wait_for(lambda: not driver.find_element(By.ID, "ask").is_displayed(), "that nothing is asked")
 
 
 def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: Chrome) -> None:
     present = Present(NOW)
     with pytest.raises(KeyboardInterrupt), on_page(present, Address(port=0)) as (voice, url):
         driver.get(url)
-        until(lambda: "checks" in text(driver, "state"), "what the station does")
+        wait_for(lambda: "checks" in text(driver, "state"), "what the station does")
         stop = driver.find_element(By.ID, "halt")
         try:
             threading.Timer(0, stop.click).start()
@@ -93,7 +94,7 @@ def test_after_a_stop_the_page_says_that_and_not_that_there_is_no_news(driver: C
         except KeyboardInterrupt as interrupt:
             present.event(Interrupted(f"{interrupt} between two parts"))
             raise
-    until(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
+    wait_for(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
     assert text(driver, "state") == "■ stopped" and text(driver, "doing") == f"{STOPPED} between two parts"
     shown = [each for each in ("stale", "halt", "ask") if driver.find_element(By.ID, each).is_displayed()]
     assert not shown

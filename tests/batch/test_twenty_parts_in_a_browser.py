@@ -7,17 +7,16 @@ import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
-from support.browser import needs_browser, picture, text, typed, until
+from support.browser import needs_browser, picture, text, typed
 from support.command_with_a_page import with_a_page
 from support.commands import configuration, wait_for_log
-from support.crowd import kept, timed, told
 from support.processes import grown, resident_kb
 from support.station_laboratory import Laboratory
+from support.stopwatch import timed, told
+from support.waiting import PATIENCE_S, wait_for
 
 PARTS = 20
-NEXT_S, FIRST_MOTION_S = 3.0, 2.0
 GROWTH = 0.02
-BUSY_S = 400.0  # a busy machine's patience
 NUMBER, MOUNT, GO, DOUBT, AGAIN = "serial number", "mount it", "Type go", "Go on all the same", "again?"
 pytestmark = [
     pytest.mark.slow, pytest.mark.proof, needs_browser,
@@ -31,7 +30,7 @@ def answers(driver: Chrome, question: str, words: str) -> None:
 
 
 def asks(driver: Chrome, question: str) -> None:
-    until(lambda: question in text(driver, "text"), f"the question {question!r}", BUSY_S)
+    wait_for(lambda: question in text(driver, "text"), f"the question {question!r}")
 
 
 @pytest.mark.thorough
@@ -44,7 +43,7 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
     unplugged, disturbed = numbers[1], numbers[2] if thorough else ""
     config = configuration(tmp_path, {"world": {"tray": {unplugged: {"plugged_in": False}}}})
     laboratory, out = Laboratory(config), tmp_path / "batch"
-    next_s, motion_s = list[tuple[float, float]](), list[tuple[float, float]]()
+    next_s, motion_s = list[float](), list[float]()
     memory_kb = list[int]()
     with with_a_page(tmp_path / "told.txt", "station", config, "--page", "--out", out) as (process, url):
         driver.get(url)
@@ -56,13 +55,13 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
                 answers(driver, AGAIN, "yes")
                 answers(driver, MOUNT, "")
             answers(driver, GO, "go")
-            with timed(FIRST_MOTION_S, motion_s):
-                until(lambda: laboratory("state")["moving"], "the first motion", BUSY_S)
+            with timed(motion_s):
+                wait_for(lambda: laboratory("state")["moving"], "the first motion")
             if number == disturbed:
-                wait_for_log(folder, "done: transfer to the start of sweep wrist_3 cw", timeout_s=BUSY_S)
+                wait_for_log(folder, "done: transfer to the start of sweep wrist_3 cw")
                 laboratory.disturb()
-            wait_for_log(folder, "recorded: ", timeout_s=BUSY_S, times=2 if number == disturbed else 1)
-            with timed(NEXT_S, next_s):
+            wait_for_log(folder, "recorded: ", times=2 if number == disturbed else 1)
+            with timed(next_s):
                 asks(driver, NUMBER)
             memory_kb.append(resident_kb(process.pid))
             print(f"{number}: {memory_kb[-1]} kB", flush=True)
@@ -74,9 +73,9 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
         assert tray == ["pass"] * len(numbers)
         picture(driver, "station-tray")
         answers(driver, NUMBER, "")
-        until(lambda: text(driver, "state") == "■ the batch has ended", "the end of the batch")
-        assert process.wait(BUSY_S) == 0
-        until(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
+        wait_for(lambda: text(driver, "state") == "■ the batch has ended", "the end of the batch")
+        assert process.wait(PATIENCE_S) == 0
+        wait_for(lambda: text(driver, "link-words") == "the page has ended", "that the line is closed")
         assert not driver.find_element(By.ID, "stale").is_displayed()
     print("to next:", told(next_s), "\nto the first motion:", told(motion_s))
     with (out / "batch.csv").open(encoding="utf-8", newline="") as csv_file:
@@ -84,5 +83,4 @@ def test_parts_in_a_row_are_worked_off_by_the_keyboard_of_the_page(
     assert [(row["serial_number"], row["verdict"]) for row in rows] == [(number, "pass") for number in numbers]
     assert [row["serial_number"] for row in rows if row["sweeps_repeated"] != "0"] == [disturbed] * thorough
     if thorough:
-        assert kept(motion_s) and kept(next_s)
         assert grown(memory_kb) <= GROWTH

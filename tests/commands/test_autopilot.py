@@ -21,6 +21,7 @@ from rig.sensors.mavlink.writing import unfinished
 from support.autopilot_on_a_wire import AutopilotOnAWire, autopilot_on_a_wire, section
 from support.commands import rig_here
 from support.paths import CONFIGS, ROOT
+from support.waiting import PATIENCE_S
 from support.warm import started
 
 LEFT = {"INS_GYROFFS_X": 0.1, "INS_ACCSCAL_Y": 1.01}  # of which no single-precision number is just that
@@ -103,7 +104,6 @@ def test_of_px4_offsets_are_stored_as_it_has_them(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.proof
-@pytest.mark.timeout(900)
 def test_killed_at_any_moment_the_set_is_old_or_new_or_said_to_be_a_mixture(thorough: bool, tmp_path: Path) -> None:
     moments = [(place, applied) for place in range(STORED) for applied in (False, True)]
     told = 0
@@ -146,7 +146,7 @@ def killed_after(wire: AutopilotOnAWire, arguments: list[Any], place: int, *, ap
 
     wire.parameters.set_field = setting  # type: ignore[method-assign]
     process.append(started("autopilot", "store", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
-    assert process[0].wait(120) == -signal.SIGKILL
+    assert process[0].wait(PATIENCE_S) == -signal.SIGKILL
     wire.parameters.set_field = set_field  # type: ignore[method-assign]
 
 

@@ -25,6 +25,7 @@ from rig.errors import Refused
 from support import commands
 from support.certified import over_temperature
 from support.results import SENSOR, VERIFIED, result_document
+from support.waiting import PATIENCE_S
 from support.warm import started
 from support.worlds import World, WorldHandle, worlds
 
@@ -53,7 +54,7 @@ def answered(keyboard: int, terminal: int, answer: bytes, *arguments: str | Path
         while b"Type yes to" not in said and (more := os.read(process.stderr.fileno(), 4096)):
             said += more
         os.write(keyboard, answer)
-        out, rest = process.communicate(timeout=240)
+        out, rest = process.communicate(timeout=PATIENCE_S)
     return subprocess.CompletedProcess(command, process.returncode, out.decode(), (said + rest).decode())
 
 

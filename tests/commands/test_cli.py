@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 CONFIG = ROOT / "configs" / "ci.yaml"
 PLAN = f"{sys.executable} -m rig plan {CONFIG}"
@@ -20,7 +21,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
         ["bash", "-o", "pipefail", "-c", command],
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=PATIENCE_S,
         check=False,
         env={**os.environ, **environment},
     )
@@ -88,7 +89,7 @@ def test_on_a_terminal_there_is_a_sign_of_life_at_once() -> None:
     with subprocess.Popen([*PLAN.split(), "--set", "no=1"], stdout=subprocess.DEVNULL, stderr=terminal) as process:
         os.close(terminal)
         assert os.read(operator, 4096).decode().startswith("reading the configuration")
-        assert process.wait(60) == 2
+        assert process.wait(PATIENCE_S) == 2
     os.close(operator)
 
 

@@ -14,6 +14,7 @@ from rig.cli import main
 from rig.errors import Refused
 from rig.motion.steps import Rest
 from support.paths import CONFIGS, DEMO, FIXTURES
+from support.waiting import PATIENCE_S
 from support.worlds import World, hardware
 
 
@@ -93,7 +94,7 @@ def test_nothing_moves_from_python_when_nobody_agrees(world: World, tmp_path: Pa
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.stdout.split() == ["not_confirmed"], done.stderr

@@ -27,6 +27,7 @@ from support.frozen_database import freezing_at
 from support.past_runs import finished
 from support.paths import CONFIGS, FIXTURES
 from support.postgres import postgresql
+from support.waiting import PATIENCE_S
 
 AT_ONCE_S = 3.0  # for a process to end, on a busy machine
 
@@ -126,17 +127,17 @@ def test_a_database_that_freezes_in_an_entry_costs_five_seconds_and_no_end_of_a_
         with freezing_at(b"FROM run", url) as (relay, frozen):
             done = subprocess.run(
                 [sys.executable, "-m", "rig", "report", tmp_path / "run", "--history", relay],
-                capture_output=True, text=True, timeout=60, check=False,
+                capture_output=True, text=True, timeout=PATIENCE_S, check=False,
             )  # fmt: skip
             assert frozen.is_set() and done.returncode == 0 and "has not answered within 4 s" in done.stderr
         with freezing_at(b"FROM run", url) as (relay, frozen):
             listing = subprocess.Popen(
                 [sys.executable, "-m", "rig", "history", "--history", relay], stderr=subprocess.PIPE, env=os.environ
             )
-            assert frozen.wait(60)
+            assert frozen.wait(PATIENCE_S)
             listing.send_signal(signal.SIGINT)
             began_s = time.monotonic()
-            assert b"interrupted" in listing.communicate(timeout=60)[1]
+            assert b"interrupted" in listing.communicate(timeout=PATIENCE_S)[1]
             assert listing.returncode == 130 and time.monotonic() - began_s < AT_ONCE_S
         with open_history(url) as history:
             assert list(history.kept()) == []

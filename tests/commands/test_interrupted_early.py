@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from support.waiting import PATIENCE_S
+
 WHILE_LOADING = """
 import os, signal, sys
 import rig.__main__
@@ -24,5 +26,5 @@ sys.exit(rig.__main__.main())
 @pytest.mark.parametrize("module", ["rig.cli", "argparse", "rig.station.plain_text", "rig.commands.show"])
 def test_a_command_that_still_loads_ends_with_one_line(module: str) -> None:
     command = [sys.executable, "-c", WHILE_LOADING.format(module=module)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=os.environ, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "rig: interrupted\n")

@@ -12,6 +12,7 @@ from firmware_host.emulator.flash_memory import FlashMemory
 from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
 from support.paths import FIXTURES
+from support.waiting import PATIENCE_S
 from support.warm import started
 
 WRITTEN = ("certificate.html", "calibration.h", "result.json")
@@ -34,7 +35,7 @@ def run_with(links: Sequence[str], tmp_path: Path) -> tuple[int, str, list[Path]
             assert process.poll() is None, process.communicate()[1]
             time.sleep(0.001)
         targets = [linked(out / name) for name in links]
-        errors = process.communicate(timeout=240)[1]
+        errors = process.communicate(timeout=PATIENCE_S)[1]
     return process.returncode, errors, targets
 
 

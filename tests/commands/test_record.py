@@ -19,6 +19,7 @@ from rig.turners.ur.driver import Arm
 from support.commands import rig_here
 from support.ideal import ideal_document
 from support.paths import CONFIGS
+from support.waiting import PATIENCE_S
 from support.warm import started
 from support.worlds import fresh_host, hardware, merge
 
@@ -46,7 +47,6 @@ def attitudes(states: list[ArmState]) -> str:
 
 @pytest.mark.thorough
 @pytest.mark.slow
-@pytest.mark.timeout(240)
 def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     host = fresh_host()
     document = merge(ideal_document(KVH), {"arm": {"host": host}, "world": {"time_scale": 6}})
@@ -66,7 +66,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
             table.take_control(Carried(0.95, (0.0, 0.0, 0.04)))
             for way in WAYS:
                 table.move(to(table.latest.q_rad, way))
-            said, _ = recording.communicate(timeout=120)
+            said, _ = recording.communicate(timeout=PATIENCE_S)
     assert recording.returncode == 0 and ", 0 lost" in said
     table_file = tmp_path / "table.csv"
     table_file.write_text(attitudes(states), encoding="utf-8")

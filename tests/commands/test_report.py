@@ -15,6 +15,7 @@ from rig.report.rounding import rounded
 from support.certified import everything, result, reversal
 from support.commands import rig
 from support.paths import CONFIGS, FIXTURES
+from support.waiting import PATIENCE_S
 
 SIMULATED = "Simulated laboratory: no real item was calibrated"
 
@@ -103,7 +104,7 @@ def test_what_cannot_be_made_is_told_and_the_rest_is_written(
 
 
 def told(*command: str | Path) -> str:
-    return subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=60, check=True).stdout
+    return subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
 
 
 @pytest.mark.slow

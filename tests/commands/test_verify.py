@@ -21,6 +21,7 @@ from support.forged_pdf import flipped
 from support.kept_rows import forge
 from support.signed_laboratory import PAGE, PDF, RESULT, XML, Laboratory, names_of, signed_laboratory
 from support.signing import PASSPHRASE, Key, holder, issued, revocation_list, stamping, time_server
+from support.waiting import PATIENCE_S
 
 DS = "{http://www.w3.org/2000/09/xmldsig#}"
 # WeasyPrint does not close its colour profile.
@@ -75,7 +76,7 @@ def test_it_is_told_in_words_and_nobody_is_trusted_unasked(lab: Laboratory, caps
 
 def pdfsig(file: Path) -> str:
     command = ["pdfsig", "-nocert", str(file)]
-    said: str = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    said: str = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout
     return said
 
 
@@ -100,7 +101,7 @@ def test_other_programs_find_the_signatures_valid_and_those_of_altered_files_not
         ]
         ended = subprocess.run(
             ["xmlsec1", "--verify", "--trusted-pem", lab.root, *ids, lab.folder / file],
-            capture_output=True, text=True, timeout=60, check=False,
+            capture_output=True, text=True, timeout=PATIENCE_S, check=False,
         )  # fmt: skip
         assert (ended.returncode != 0) == bool(status), ended.stderr
 
@@ -229,7 +230,7 @@ def test_a_key_in_a_token_signs_both(
 
 
 def softhsm(*arguments: str) -> None:
-    subprocess.run(["softhsm2-util", *arguments], check=True, capture_output=True, timeout=60)
+    subprocess.run(["softhsm2-util", *arguments], check=True, capture_output=True, timeout=PATIENCE_S)
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from rig.errors import Fault, Refused
 from support.as_nobody import as_nobody
 from support.full_disk import full_disk
 from support.paths import FIXTURES
+from support.waiting import PATIENCE_S
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
@@ -140,7 +141,7 @@ def interrupted_while_it_reads(file: Path, *words: str | Path) -> None:
                 assert process.poll() is None
                 time.sleep(0.01)
             process.terminate()
-            _, said = process.communicate(timeout=10)
+            _, said = process.communicate(timeout=PATIENCE_S)
         finally:
             process.kill()
     assert (process.returncode, said) == (130, b"rig: interrupted\n")

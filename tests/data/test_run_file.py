@@ -42,6 +42,7 @@ from support.paths import ROOT
 from support.results import VERIFIED
 from support.synthetic_run import PROVENANCE as SYNTHETIC
 from support.synthetic_run import UR
+from support.waiting import PATIENCE_S, wait_for
 
 SENSOR = RecordedSensor(
     part="lsm9ds1",
@@ -164,10 +165,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:
     with recorder(tmp_path / "run.h5") as recording:
         recording.add_samples("gyro", some_samples(0, 10))
-        deadline = time.monotonic() + 5
-        while len(read_run(tmp_path / "run.h5").samples["gyro"]) < 10:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait_for(lambda: len(read_run(tmp_path / "run.h5").samples["gyro"]) == 10, "the samples")
 
 
 def test_an_old_recording_is_never_overwritten(tmp_path: Path) -> None:
@@ -306,7 +304,9 @@ except Fault as fault:
 def test_a_full_disk_is_a_named_fault_and_keeps_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     script = FULL_DISK.format(tests=str(ROOT / "tests"), path=str(path))
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
     assert (done.returncode, done.stderr) == (3, "")  # no crash, no noise from the library
     name, what, added = json.loads(done.stdout)
     assert name == "recording_failed"

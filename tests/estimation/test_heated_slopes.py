@@ -43,7 +43,6 @@ def test_slopes_of_a_heated_run_lie_within_u() -> None:
 @pytest.mark.slow
 @pytest.mark.thorough
 @pytest.mark.proof
-@pytest.mark.timeout(900)
 def test_slopes_of_forty_heated_runs_lie_within_u() -> None:
     slopes, loops = errors(40)
     within, rms, of_loops = np.mean(np.abs(slopes) < 1.97), np.sqrt(np.mean(slopes**2, axis=(0, 1))), np.std(loops)

@@ -63,7 +63,6 @@ def test_u_covers_the_truth_at_five_temperatures() -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(600)
 def test_u_covers_the_truth_of_forty_sensors() -> None:
     share, rms = covered(40)
     print(f"within U {share:.3f}, RMS over u {rms:.2f}")

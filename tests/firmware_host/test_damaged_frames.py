@@ -6,7 +6,7 @@ import pytest
 
 from support.damaged_frames import build, to_firmware, to_host, write_sound
 
-pytestmark = [pytest.mark.slow, pytest.mark.thorough, pytest.mark.proof, pytest.mark.timeout(150)]
+pytestmark = [pytest.mark.slow, pytest.mark.thorough, pytest.mark.proof]
 FRAMES = 500_000
 
 

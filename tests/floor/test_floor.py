@@ -29,7 +29,7 @@ from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
 from support.past_runs import FIRST, finished
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 
 AT = "2026-11-25T08:00:00+00:00"
 
@@ -154,7 +154,7 @@ def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tm
         port = urlsplit(page).port or 0
 
         def asked(method: str, path: str, **headers: str) -> tuple[int, str]:
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
             connection.request(method, path, headers={"Authorization": f"Bearer {token}", **headers})
             answer = connection.getresponse()
             text = "" if path == "/events" and answer.status == 200 else answer.read().decode()

@@ -15,8 +15,9 @@ from rig.history.store import open_history
 from rig.page.control import Control
 from rig.page.sections import Sections
 from rig.page.serving import Address, Page, serving
-from support.browser import legible, needs_browser, picture, screen, text, until
+from support.browser import legible, needs_browser, picture, screen, text
 from support.past_runs import FIRST, finished
+from support.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -45,11 +46,11 @@ def feed(tmp_path: Path) -> Iterator[Sections]:
 def test_the_floor_shows_each_rig_and_a_dead_one(driver: Chrome, feed: Sections) -> None:
     with serving(feed, Control(may_answer=False), None, Address(port=0), Page("floor.html")) as url:
         driver.get(url)
-        until(lambda: len(cards(driver)) == len(SAID), "a card for each rig")
+        wait_for(lambda: len(cards(driver)) == len(SAID), "a card for each rig")
         assert cards(driver, " h3 span:first-child") == list(SAID)  # a name is text, whatever is in it
-        until(lambda: "no sign of life" in cards(driver)[2], "that nothing comes from the third")
+        wait_for(lambda: "no sign of life" in cards(driver)[2], "that nothing comes from the third")
         assert "fault" in cards(driver)[1] and "board_link_lost" in cards(driver)[1] and "G-104" in cards(driver)[1]
-        until(lambda: "in control" in text(driver, "standards"), "the check standard")
+        wait_for(lambda: "in control" in text(driver, "standards"), "the check standard")
         assert "CHECK" in text(driver, "today") and "None." in text(driver, "recalls")
         legible(driver)
         picture(driver, "floor")

@@ -12,6 +12,7 @@ import pytest
 
 from rig.cli import main
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 SHOWN = "from firmware_host.installation import install_command; print(install_command('study'))"
 
@@ -30,7 +31,7 @@ def printed(folder: Path, said: dict[str, Any] | None) -> list[str]:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=True,
         env={**os.environ, "PYTHONPATH": path},
     )

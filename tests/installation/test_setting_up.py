@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 TOOLS = (
     "bash",
@@ -61,7 +62,7 @@ def run(checkout: Path, script: str, *arguments: str, **more: str) -> subprocess
         env={"PATH": str(checkout / "bin"), "HOME": str(checkout), **more},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
         check=False,
     )
 
@@ -80,7 +81,7 @@ def test_who_may_not_install_is_told_the_command(checkout: Path) -> None:
         user=NOBODY,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert ended.returncode == 2

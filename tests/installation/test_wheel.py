@@ -12,6 +12,7 @@ import pytest
 
 from support.demo_runs import normalised_errors
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 NO_SOURCES = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info", "__pycache__", "tests")
@@ -19,7 +20,7 @@ NO_SOURCES = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info",
 
 def python(*arguments: str | Path, cwd: Path) -> str:
     command = [sys.executable, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, cwd=cwd)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=cwd)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -36,7 +37,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("installed")
     shutil.copytree(ROOT, folder / "source", ignore=NO_SOURCES)
     sdist = built("sdist", folder / "source", folder)
-    subprocess.run(["tar", "-xzf", sdist, "-C", folder], check=True, timeout=60)
+    subprocess.run(["tar", "-xzf", sdist, "-C", folder], check=True, timeout=PATIENCE_S)
     wheel = built("wheel", folder / sdist.name.removesuffix(".tar.gz"), folder)
     home = folder / "home"
     venv.create(home, symlinks=True)

@@ -5,6 +5,7 @@ import pytest
 from nbclient import NotebookClient
 
 from support.paths import DOCS
+from support.waiting import PATIENCE_S
 
 NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
 
@@ -13,7 +14,7 @@ NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of Jupyter's own packages
 def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:
     notebook = nbformat.read(NOTEBOOK, as_version=4)
-    NotebookClient(notebook, timeout=100, resources={"metadata": {"path": NOTEBOOK.parent}}).execute()
+    NotebookClient(notebook, timeout=PATIENCE_S, resources={"metadata": {"path": NOTEBOOK.parent}}).execute()
     shown = [output.get("data", {}) for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert sum("image/png" in data for data in shown) == 3
     assert sum(data.get("text/html", "").startswith("<table>") for data in shown) == 5

@@ -13,6 +13,7 @@ from rig.errors import Refused
 from rig.observation.windows import swept
 from support.paths import DOCS, FIXTURES
 from support.stated import SHARE, differences
+from support.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +33,9 @@ def test_importing_it_loads_no_arm_driver_and_nothing_heavy() -> None:
         "print([name for name in before if name.split('.')[0] in ('numpy', 'scipy', 'pydantic', 'h5py')])\n"
         "print([name for name in sys.modules if name.startswith('rtde') or name.startswith('rig.turners.ur.driver')])"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    )
     assert done.stdout.split() == ["[]", "[]"]
 
 

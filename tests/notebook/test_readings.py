@@ -9,6 +9,7 @@ import pytest
 import rig
 from rig.errors import Refused
 from support.paths import FIXTURES, ROOT
+from support.waiting import PATIENCE_S
 
 RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"
 
@@ -80,5 +81,7 @@ def test_nothing_loads_pandas_before_a_table_is_asked_for() -> None:
         "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.turners.ur.driver')"
         " if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    )
     assert done.stdout.strip() == "[]"

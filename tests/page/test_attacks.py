@@ -16,9 +16,8 @@ import pytest
 
 from rig.motion.state import REST_SPEED_RAD_S
 from support.commands import configuration, wait_for_log
-from support.crowd import soon
 from support.flood import flooded
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 from support.worlds import World, WorldHandle, hardware
 
 pytestmark = pytest.mark.slow
@@ -91,7 +90,7 @@ def moving(laboratory: WorldHandle) -> bool:
 def test_half_requests_end_no_run(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
     with flooded(running.url, MANY):
-        stdout, _ = running.process.communicate(timeout=120)
+        stdout, _ = running.process.communicate(timeout=PATIENCE_S)
     assert running.process.returncode == 0, running.told()
     assert "verdict: PASS" in stdout and "[Errno" not in running.told()
 
@@ -104,12 +103,12 @@ def test_the_stop_button_works_while_half_requests_are_held(
     with flooded(running.url, MANY):
         wait_for(lambda: moving(laboratory), "motion")
         place = urlsplit(running.url)
-        asking = HTTPConnection(place.hostname or "", place.port, timeout=10)
+        asking = HTTPConnection(place.hostname or "", place.port, timeout=PATIENCE_S)
         asking.request("POST", "/stop", headers={"Authorization": f"Bearer {place.fragment}"})
         assert asking.getresponse().status == 202
         asking.close()
-        soon(lambda: not moving(laboratory), "rest", 1.0)
-        assert running.process.wait(60) == 130, running.told()
+        wait_for(lambda: not moving(laboratory), "rest")
+        assert running.process.wait(PATIENCE_S) == 130, running.told()
 
 
 @pytest.mark.thorough
@@ -120,8 +119,8 @@ def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
     with flooded(running.url, MANY):
         wait_for(lambda: moving(laboratory), "motion")
         os.kill(running.child(b"multiprocessing.spawn"), signal.SIGSTOP)
-        soon(lambda: not moving(laboratory), "rest", 1.0)
-        assert running.process.wait(60) == 3
+        wait_for(lambda: not moving(laboratory), "rest")
+        assert running.process.wait(PATIENCE_S) == 3
     assert "the controller says that its program has ended" in running.told()
 
 
@@ -131,6 +130,6 @@ def test_a_run_whose_pages_helper_is_killed_ends_with_its_verdict(start: Start, 
     wait_for_log(running.out, "sweep")
     helper: Any = wait_for(lambda: running.child(b"rig.page.live_analysis"), "the helper")
     os.kill(helper, signal.SIGKILL)
-    stdout, _ = running.process.communicate(timeout=120)
+    stdout, _ = running.process.communicate(timeout=PATIENCE_S)
     assert running.process.returncode == 0, running.told()
     assert "verdict: PASS" in stdout and "The page shows no more of observations" in running.told()

@@ -15,8 +15,9 @@ from rig.page.arm import built
 from rig.plans.by_hand import Wanted, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
 from rig.turners.registry import installed
-from support.browser import legible, needs_browser, picture, screen, text, until
+from support.browser import legible, needs_browser, picture, screen, text
 from support.told_page import showing
+from support.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 KIND = installed()["hand"]
@@ -38,9 +39,9 @@ def test_the_line_the_drawing_and_what_is_open(driver: Chrome, tmp_path: Path) -
     with showing(driver, tmp_path, about=ABOUT) as tell:
         tell(ArmConnected(KIND.look(SECTION)), PhaseStarted("by_hand", Plan((), (), ()), {"gyro": "raw"}))
         tell(HandAsked(Instruction("lay", "+z")), seen("starting", 0, [], []))
-        until(lambda: text(driver, "hand-line").startswith("Lay it down with the side +z up"), "the line")
+        wait_for(lambda: text(driver, "hand-line").startswith("Lay it down with the side +z up"), "the line")
         tell(HandRested(1, 2, "+z"), HandAsked(Instruction("lay", "-x")), seen("resting", 90, [], ["+z"]))
-        until(lambda: "side −x up" in text(driver, "hand-line"), "the next line")
+        wait_for(lambda: "side −x up" in text(driver, "hand-line"), "the next line")
         drawing = driver.find_element(By.CSS_SELECTOR, "#hand-drawing svg")
         assert "−x up" in (drawing.get_attribute("aria-label") or "").replace("side ", "")
         named = [each.text for each in drawing.find_elements(By.CSS_SELECTOR, ".wanted")]
@@ -60,8 +61,8 @@ def test_what_is_too_fast_or_to_be_done_again_is_said(driver: Chrome, tmp_path: 
         tell(HandMoveRefused(1, 2, "turn_not_closed"))
         tell(HandAsked(Instruction("turn", "+z", 1), "turn_not_closed", "that turn ended 2.0° from where it began"))
         tell(seen("moving", 470, [], ["+z"]))
-        until(lambda: "Again: that turn ended 2.0°" in text(driver, "hand-why"), "why")
-        until(lambda: "too fast" in text(driver, "hand-peak"), "the peak")
+        wait_for(lambda: "Again: that turn ended 2.0°" in text(driver, "hand-why"), "why")
+        wait_for(lambda: "too fast" in text(driver, "hand-peak"), "the peak")
         picture(driver, "by_hand_again")
         legible(driver)
 
@@ -71,12 +72,12 @@ def test_a_tone_comes_once_somebody_has_tapped(driver: Chrome, tmp_path: Path) -
     count += "AudioContext.prototype.createOscillator = function () { window.waves += 1; return make.call(this); };"
     with showing(driver, tmp_path, about=ABOUT) as tell:
         tell(HandAsked(Instruction("lay", "+z")), seen("starting", 0, [], []))
-        until(lambda: driver.execute_script(SHOWN), "the panel")
+        wait_for(lambda: driver.execute_script(SHOWN), "the panel")
         driver.execute_script(count)
         tell(HandRested(1, 2, "+z"))
         assert driver.execute_script("return window.waves") == 0
         driver.find_element(By.ID, "hand-sound").click()
-        until(lambda: text(driver, "hand-sound") == "Sound is on", "the switch")
+        wait_for(lambda: text(driver, "hand-sound") == "Sound is on", "the switch")
         before = driver.execute_script("return window.waves")
         tell(HandMoveRefused(1, 2, "clipping"))
-        until(lambda: driver.execute_script("return window.waves") > before, "a tone")
+        wait_for(lambda: driver.execute_script("return window.waves") > before, "a tone")

@@ -17,7 +17,7 @@ from rig.page.feed import Feed
 from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
 from support.flood import alive, half_a_request, opened
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def page(folder: Path) -> Iterator[str]:
 
 def status(url: str, method: str, path: str, **headers: str) -> int:
     place = urlsplit(url)
-    connection = HTTPConnection(place.hostname or "", place.port, timeout=10)
+    connection = HTTPConnection(place.hostname or "", place.port, timeout=PATIENCE_S)
     connection.request(method, path, headers=headers)
     answer = connection.getresponse()
     connection.close()
@@ -40,7 +40,7 @@ def test_half_requests_hold_few_descriptors_and_the_page_answers_all_the_same(tm
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
         many = [held.enter_context(half_a_request(url)) for _ in range(400)]
-        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left", 10)
+        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left")
         assert alive(many[-1])
         token = {"Authorization": f"Bearer {urlsplit(url).fragment}"}
         assert (status(url, "GET", "/"), status(url, "POST", "/stop", **token)) == (200, 409)
@@ -52,7 +52,7 @@ def test_an_address_that_opens_many_loses_its_own_and_no_others(tmp_path: Path) 
         url = held.enter_context(page(tmp_path))
         other = held.enter_context(half_a_request(url, source="127.0.0.9"))
         many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS)]
-        wait_for(lambda: sum(map(alive, many)) < STRANGERS, "that only so many are left", 10)
+        wait_for(lambda: sum(map(alive, many)) < STRANGERS, "that only so many are left")
         assert alive(other)
 
 
@@ -62,10 +62,10 @@ def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path
         url = held.enter_context(page(tmp_path))
         token = f"Authorization: Bearer {urlsplit(url).fragment}\r\n"
         operator = held.enter_context(opened(url, "/events", token))
-        operator.settimeout(10)
+        operator.settimeout(PATIENCE_S)
         assert b" 200 " in operator.recv(4096)
         many = [held.enter_context(half_a_request(url)) for _ in range(2 * STRANGERS + KNOWN)]
-        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left", 10)
+        wait_for(lambda: sum(map(alive, many)) <= STRANGERS, "that only so many are left")
         assert alive(operator)
 
 
@@ -74,7 +74,7 @@ def test_browsers_without_the_token_leave_places_for_those_with_it(tmp_path: Pat
         url = held.enter_context(page(tmp_path))
         for _ in range(40):
             stranger = held.enter_context(opened(url, "/events"))
-            stranger.settimeout(10)
+            stranger.settimeout(PATIENCE_S)
             assert stranger.recv(4096)
         assert status(url, "GET", "/events") == 503
         assert status(url, "GET", "/events", Authorization=f"Bearer {urlsplit(url).fragment}") == 200
@@ -85,7 +85,7 @@ def test_a_header_without_end_is_not_kept(tmp_path: Path) -> None:
         with suppress(ConnectionError):
             for _ in range(20):
                 endless.sendall(b"x" * 1000)
-        endless.settimeout(10)
+        endless.settimeout(PATIENCE_S)
         with suppress(ConnectionError):
             assert b" 400 " in endless.recv(4096)
 
@@ -101,7 +101,7 @@ def test_headers_that_do_not_come_end_the_connection() -> None:
         reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
         writer.write(b"GET / HTTP/1.1\r\n")
         try:
-            return await asyncio.wait_for(reader.read(), 10)
+            return await asyncio.wait_for(reader.read(), PATIENCE_S)
         finally:
             writer.close()
             server.close()
@@ -124,6 +124,6 @@ def test_a_page_that_fails_says_so_and_what_it_showed_goes_on(
             raise ZeroDivisionError("a defect")
 
     with serving(Broken(Shown(About("", ""))), Control(may_answer=False), tmp_path, Address(port=0)) as url:
-        wait_for(lambda: "The page has ended" in capsys.readouterr().err, "what it says", 10)
+        wait_for(lambda: "The page has ended" in capsys.readouterr().err, "what it says")
         with pytest.raises(OSError):
-            socket.create_connection((urlsplit(url).hostname, urlsplit(url).port or 0), timeout=5)
+            socket.create_connection((urlsplit(url).hostname, urlsplit(url).port or 0), timeout=PATIENCE_S)

@@ -11,10 +11,11 @@ from selenium.webdriver.common.keys import Keys
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
-from support.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text, until
+from support.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
 from support.told_page import Telling, showing
 from support.told_runs import before_it_moves, judged, look, moving, planned
 from support.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
+from support.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -67,11 +68,11 @@ def test_six_sensors_are_measured_and_judged_without_scrolling(
 ) -> None:
     name = f"{size[0]}x{size[1]}"
     with screen(driver, *size):
-        until(lambda: len(driver.find_elements(By.CSS_SELECTOR, ".plot")) == 6, "six plots")
+        wait_for(lambda: len(driver.find_elements(By.CSS_SELECTOR, ".plot")) == 6, "six plots")
         picture(driver, f"six-measuring-{name}")
         assert below(driver, DURING, 13) == []
         six(*six_judged(tmp_path))
-        until(lambda: "E_n" in text(driver, "found"), "the comparison")
+        wait_for(lambda: "E_n" in text(driver, "found"), "the comparison")
         picture(driver, f"six-passed-{name}")
         assert below(driver, AFTER, 11) == []
         for dark in (False, True):
@@ -93,7 +94,7 @@ def test_one_sensor_has_each_value_with_its_u_in_the_first_screen(
 
 def test_what_was_found_is_in_print_as_the_certificate_has_it(driver: Chrome, tmp_path: Path, six: Telling) -> None:
     six(*six_judged(tmp_path))
-    until(lambda: "E_n" in text(driver, "found"), "the comparison")
+    wait_for(lambda: "E_n" in text(driver, "found"), "the comparison")
     rows = [row.text for row in driver.find_elements(By.CSS_SELECTOR, "#found summary")]
     assert len(rows) == 6
     assert all(PARTS[name] in rows[n] and f"{name}, accelerometer" in rows[n + 3] for n, name in enumerate(PARTS))
@@ -106,14 +107,14 @@ def test_what_was_found_is_in_print_as_the_certificate_has_it(driver: Chrome, tm
     first = driver.find_element(By.CSS_SELECTOR, "#found summary")
     assert not driver.find_element(By.CSS_SELECTOR, "#found table").is_displayed()
     first.send_keys(Keys.ENTER)
-    until(lambda: driver.find_element(By.CSS_SELECTOR, "#found table").is_displayed(), "the rest")
+    wait_for(lambda: driver.find_element(By.CSS_SELECTOR, "#found table").is_displayed(), "the rest")
     cells = [td.text for td in driver.find_elements(By.CSS_SELECTOR, "#found tbody tr:nth-child(3) td")]
     assert cells[3] == "2.4" and len(driver.find_elements(By.CSS_SELECTOR, "#found details:first-child td svg")) == 6
 
 
 def test_a_run_that_failed_says_what_failed_and_what_to_do(driver: Chrome, tmp_path: Path, six: Telling) -> None:
     six(*six_judged(tmp_path, passed=False))
-    until(lambda: kind(driver) == "failed", "the verdict")
+    wait_for(lambda: kind(driver) == "failed", "the verdict")
     assert text(driver, "failed").splitlines() == ["✗ lsm9ds1.scale_deviation 0.177, allowed 0.1"]
     assert "the part beyond its limits" in text(driver, "next-words")
     assert text(driver, "next-command") == f"rig show {SIX.folder} --all"
@@ -127,7 +128,7 @@ def test_of_a_run_of_six_that_failed_the_first_screen_has_the_verdict_and_what_f
 ) -> None:
     with screen(driver, *TABLET):
         six(*six_judged(tmp_path, broken=("scale_deviation", "bias", "residuals")))
-        until(lambda: kind(driver) == "failed" and "E_n" in text(driver, "found"), "the verdict and the comparison")
+        wait_for(lambda: kind(driver) == "failed" and "E_n" in text(driver, "found"), "the verdict and the comparison")
         picture(driver, "six-failed-1280x800")
         assert below(driver, f"{AFTER}, #failed li", 15) == []
         said = text(driver, "failed").splitlines()
@@ -142,20 +143,20 @@ def test_of_a_run_of_six_that_failed_the_first_screen_has_the_verdict_and_what_f
 @pytest.mark.one_in(2)
 def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: Telling) -> None:
     with screen(driver, *TELEPHONE):
-        until(lambda: len(driver.find_elements(By.CSS_SELECTOR, ".plot")) == 6, "six plots")
+        wait_for(lambda: len(driver.find_elements(By.CSS_SELECTOR, ".plot")) == 6, "six plots")
         picture(driver, "six-measuring-telephone")
         assert wide(driver) == []
         six.silent.set()
-        until(lambda: driver.find_element(By.ID, "stale").is_displayed(), "the bar")
+        wait_for(lambda: driver.find_element(By.ID, "stale").is_displayed(), "the bar")
         assert wide(driver) == []
         six(Prompt(("The arm at 127.0.0.2 will move for 66 s.", "Nobody may be within its reach.")))
-        until(lambda: kind(driver) == "asking", "the question")
+        wait_for(lambda: kind(driver) == "asking", "the question")
         assert wide(driver) == []
         six(Failed(Fault("arm_link_lost", "the arm at 127.0.0.2 has been silent for 0.8 s", "Look at it")))
-        until(lambda: kind(driver) == "fault", "the fault")
+        wait_for(lambda: kind(driver) == "fault", "the fault")
         assert wide(driver) == []
         six(*six_judged(tmp_path))
-        until(lambda: kind(driver) == "passed", "the verdict")
+        wait_for(lambda: kind(driver) == "passed", "the verdict")
         for each in driver.find_elements(By.CSS_SELECTOR, "#found summary"):
             each.send_keys(Keys.ENTER)
         picture(driver, "six-passed-telephone")
@@ -170,6 +171,6 @@ def test_an_oblique_turn_is_held_against_the_part_of_it_that_an_axis_feels(drive
     with showing(driver, tmp_path) as tell:
         tell(*before_it_moves(planned()), *moving(planned(), 1.0))
         tell.observed([row])
-        until(lambda: "0.72676" in text(driver, "observations"), "what is expected")
+        wait_for(lambda: "0.72676" in text(driver, "observations"), "what is expected")
         assert "0.86728" in text(driver, "observations")
         driver.get("about:blank")

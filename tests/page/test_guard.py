@@ -24,6 +24,7 @@ from rig.page.guard import Door
 from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
 from rig.station.events import Prompt
+from support.waiting import PATIENCE_S
 
 TOKEN = "a-token-of-two-and-twenty"
 
@@ -38,7 +39,7 @@ class Asking:
     def __call__(
         self, method: str, path: str, body: str | None = None, **headers: str
     ) -> tuple[int, str, dict[str, str]]:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
         sent = {
             "Authorization": f"Bearer {self.token}",
             **{name.replace("_", "-"): text for name, text in headers.items()},
@@ -207,7 +208,7 @@ def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path
         wrong = asking("POST", "/answer", json.dumps({"number": 2, "agreed": True}))[0]
         while (right := asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]) == 409:
             time.sleep(0.01)
-        asked.join(10)
+        asked.join(PATIENCE_S)
         again = asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]
     assert (wrong, right, again, answers) == (409, 202, 409, [True])
 
@@ -217,7 +218,7 @@ def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
     with server(tmp_path, control) as asking:
         with pytest.raises(KeyboardInterrupt, match=STOPPED), control.stoppable():
             threading.Thread(target=asking, args=("POST", "/stop")).start()
-            threading.Event().wait(30)
+            threading.Event().wait(PATIENCE_S)
         assert asking("POST", "/stop")[0] == 409
 
 

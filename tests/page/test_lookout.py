@@ -50,11 +50,11 @@ def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(
         wait_for(lambda: helper() > 0, "the helper")
         if asked == "after":
             lookout.event(swept())
-            wait_for(lambda: not lookout.wanted.is_set(), "that it is asked", 10)
+            wait_for(lambda: not lookout.wanted.is_set(), "that it is asked")
         looking = helper()
         assert looking > 0
         os.kill(looking, getattr(signal, kind))
         lookout.event(swept())
-        wait_for(told, "what is said of it", 10)
+        wait_for(told, "what is said of it")
         lookout.event(swept())
     assert "Traceback" not in said and said.count("\n") == 1

@@ -15,10 +15,11 @@ from selenium.webdriver import Chrome
 from rig.errors import Fault
 from rig.motion.state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
-from support.browser import kind, legible, needs_browser, picture, severe, text, until
+from support.browser import kind, legible, needs_browser, picture, severe, text
 from support.paths import ROOT
 from support.told_page import showing
 from support.told_runs import before_it_moves, judged, moving, planned
+from support.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -98,8 +99,8 @@ def test_after_the_end_no_text_says_that_it_goes_on(driver: Chrome, tmp_path: Pa
         tell(*moved)
         tell.word("Measuring")
         tell(*ends[how])
-        until(lambda: kind(driver) == {"arm lost": "fault"}.get(how, how), how)
-        until(lambda: "as at " in text(driver, "readings"), "when that was")
+        wait_for(lambda: kind(driver) == {"arm lost": "fault"}.get(how, how), how)
+        wait_for(lambda: "as at " in text(driver, "readings"), "when that was")
         consistent(driver)
         assert re.fullmatch(r"the run ended at [\d:]{8}", text(driver, "link-words"))
         speed, program = facts(driver)["speed"], facts(driver)["program"]
@@ -107,15 +108,15 @@ def test_after_the_end_no_text_says_that_it_goes_on(driver: Chrome, tmp_path: Pa
         picture(driver, f"over-{how.replace(' ', '-')}")
         legible(driver)
         driver.refresh()  # who comes later is told the same
-        until(lambda: "as at " in text(driver, "readings"), "when that was")
+        wait_for(lambda: "as at " in text(driver, "readings"), "when that was")
         consistent(driver)
-    until(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
+    wait_for(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
     consistent(driver)
 
 
 def consistent(driver: Chrome) -> None:
     """What is drawn and named at the next frame is as what is written at once."""
-    until(lambda: not contradictions(driver), f"that nothing contradicts it: {contradictions(driver)}", 5)
+    wait_for(lambda: not contradictions(driver), f"that nothing contradicts it: {contradictions(driver)}")
 
 
 FACTS = """
@@ -133,7 +134,7 @@ def test_while_it_is_solved_the_readings_have_their_age(driver: Chrome, tmp_path
     with showing(driver, tmp_path) as tell:
         tell(*moved, recorded, let_go(moved))
         tell.word("Solving")
-        until(lambda: re.search(r"\d s ago", text(driver, "readings")), "their age")
+        wait_for(lambda: re.search(r"\d s ago", text(driver, "readings")), "their age")
         assert facts(driver)["speed"] == "0.0 °/s" and facts(driver)["program"] == "stopped"
         assert not driver.find_element("id", "stale").is_displayed()
 
@@ -152,7 +153,7 @@ def test_a_line_that_is_lost_says_nothing_of_now(driver: Chrome, tmp_path: Path)
         tell(*sweeping())
         tell.word("Measuring")
     untrusted(driver)
-    until(lambda: text(driver, "link-words").startswith("no connection"), "the light")
+    wait_for(lambda: text(driver, "link-words").startswith("no connection"), "the light")
     driver.get("about:blank")  # so that it asks no longer
     assert all("ERR_CONNECTION_REFUSED" in entry for entry in severe(driver))
 
@@ -178,19 +179,19 @@ def test_a_process_that_is_halted_is_not_to_be_trusted_until_it_goes_on(
 ) -> None:
     process, url = page_of_its_own
     driver.get(url)
-    until(lambda: text(driver, "state-word") in ("Moving", "Measuring", "Resting"), "motion")
+    wait_for(lambda: text(driver, "state-word") in ("Moving", "Measuring", "Resting"), "motion")
     process.send_signal(signal.SIGSTOP)
     untrusted(driver)
     process.send_signal(signal.SIGCONT)
-    until(lambda: text(driver, "state-word") in ("Moving", "Measuring", "Resting"), "motion again")
-    until(lambda: not driver.find_element("id", "stale").is_displayed(), "that it is trusted again")
+    wait_for(lambda: text(driver, "state-word") in ("Moving", "Measuring", "Resting"), "motion again")
+    wait_for(lambda: not driver.find_element("id", "stale").is_displayed(), "that it is trusted again")
     driver.get("about:blank")
 
 
 def untrusted(driver: Chrome) -> None:
     """The bar stands there, and nothing beside it says otherwise."""
     said = r"No news for \d+ s\s+– do not trust this page, look at the arm"
-    until(lambda: re.search(said, text(driver, "stale")), "the bar", 20)
+    wait_for(lambda: re.search(said, text(driver, "stale")), "the bar")
     consistent(driver)
     assert text(driver, "state-word") == "No news" and facts(driver)["speed"] == "–"
     assert text(driver, "state-text").startswith("Heard last: ")

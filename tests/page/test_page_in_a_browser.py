@@ -19,8 +19,9 @@ from selenium.webdriver.common.keys import Keys
 
 from rig.data.run_file import read_run
 from rig.motion.state import REST_SPEED_RAD_S
-from support.browser import kind, needs_browser, picture, text, until
+from support.browser import kind, needs_browser, picture, text
 from support.commands import configuration, rig
+from support.waiting import PATIENCE_S, wait_for
 from support.warm import started
 from support.worlds import World, hardware
 
@@ -38,7 +39,7 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
         with told.open("w", encoding="utf-8") as errors:
             process = started(*words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True)
         running.append(process)
-        found = until(lambda: re.search(r"^page: (\S+)$", told.read_text(encoding="utf-8"), re.M), "the address")
+        found = wait_for(lambda: re.search(r"^page: (\S+)$", told.read_text(encoding="utf-8"), re.M), "the address")
         return process, found[1]
 
     yield start
@@ -55,7 +56,7 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     config = hardware(laboratory.config_path, tmp_path)
     process, url = page("run", config, "--out", out, "--page", "--confirm-on-page")
     driver.get(url)
-    until(lambda: kind(driver) == "asking", "the question")
+    wait_for(lambda: kind(driver) == "asking", "the question")
     assert "The arm at" in text(driver, "prompt-words") and not driver.find_element(By.ID, "yes").is_enabled()
     # By the keyboard alone: on from the question's heading to the box, a tick, on to the button.
     driver.switch_to.active_element.send_keys(Keys.TAB)
@@ -63,22 +64,22 @@ def test_a_run_is_agreed_to_followed_and_stopped_on_the_page_and_resumed(
     driver.switch_to.active_element.send_keys(Keys.TAB)
     assert driver.switch_to.active_element.get_attribute("id") == "yes"
     driver.switch_to.active_element.send_keys(Keys.ENTER)
-    until(lambda: kind(driver) in ("moving", "measuring"), "motion")
-    until(lambda: int(re.findall(r"\d+", text(driver, "step-number"))[0]) >= 5, "the fifth step")
+    wait_for(lambda: kind(driver) in ("moving", "measuring"), "motion")
+    wait_for(lambda: int(re.findall(r"\d+", text(driver, "step-number"))[0]) >= 5, "the fifth step")
     rate = driver.find_element(By.CSS_SELECTOR, "#plot-gyro-rate_rad_s canvas").get_attribute("aria-label")
     assert rate is not None and "now x" in rate
-    until(lambda: "0." in text(driver, "observations"), "an observation")
-    until(lambda: kind(driver) == "measuring", "a sweep")
+    wait_for(lambda: "0." in text(driver, "observations"), "an observation")
+    wait_for(lambda: kind(driver) == "measuring", "a sweep")
     picture(driver, "run-moving")
     driver.find_element(By.ID, "halt").click()
     clicked_s = time.monotonic()
-    assert process.wait(60) == 130
+    assert process.wait(PATIENCE_S) == 130
     states = read_run(out / "run.h5").states
     moved = states["time_s"][abs(states["qd_rad_s"]).max(axis=1) > REST_SPEED_RAD_S]
     at_the_click = np.interp(clicked_s, states["host_time_s"], states["time_s"])
     assert len(moved) and moved[-1] - at_the_click < 1.0  # of the controller's time
     assert max(map(abs, laboratory.state()["qd_rad_s"])) < REST_SPEED_RAD_S
-    until(lambda: kind(driver) == "stopped", "that it was stopped")
+    wait_for(lambda: kind(driver) == "stopped", "that it was stopped")
     assert "stopped from the page" in text(driver, "state-text") and "rig resume" in text(driver, "state-text")
     picture(driver, "run-stopped")
     resumed = rig("resume", out, "--yes")
@@ -93,9 +94,9 @@ def test_a_run_goes_on_to_its_verdict_while_browsers_stall_and_is_replayed(
     process, url = page("run", config, "--out", out, "--page")
     stalled = [stalling(url) for _ in range(5)]
     driver.get(url)
-    until(lambda: kind(driver) == "passed", "the verdict", 200)
+    wait_for(lambda: kind(driver) == "passed", "the verdict")
     picture(driver, "run-passed")
-    assert process.wait(60) == 0
+    assert process.wait(PATIENCE_S) == 0
     for one in stalled:
         one.close()
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
@@ -108,12 +109,12 @@ def test_a_run_goes_on_to_its_verdict_while_browsers_stall_and_is_replayed(
 
     watching, url = page("watch", out, "--speed", "40")
     driver.get(url)
-    until(lambda: kind(driver) == "passed", "the verdict again", 100)
+    wait_for(lambda: kind(driver) == "passed", "the verdict again")
     assert f"{result['sensors']['gyro']['scale'][0]:.5f}" in text(driver, "parameters")
     assert len(driver.find_elements(By.CSS_SELECTOR, "#observations tbody tr")) == 6
     assert not driver.find_element(By.ID, "halt").is_displayed()
     watching.send_signal(signal.SIGINT)
-    assert watching.wait(60) == 0
+    assert watching.wait(PATIENCE_S) == 0
 
 
 def stalling(url: str) -> socket.socket:

@@ -18,9 +18,10 @@ from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support import told_runs
-from support.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text, until
+from support.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text
 from support.told_page import showing
 from support.told_runs import ABOUT, before_it_moves, judged, moving, planned
+from support.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -67,7 +68,7 @@ def test_every_state_of_a_run_has_its_word_and_its_sign(driver: Chrome, tmp_path
     with showing(driver, tmp_path) as tell:
         for state, events in (*before.items(), *moves.items(), ("judging", [recorded])):
             tell(*events)
-            until(partial(in_state, driver, state), state)
+            wait_for(partial(in_state, driver, state), state)
             assert text(driver, "state-word") and text(driver, "sign") and text(driver, "state-text")
             picture(driver, state)
 
@@ -90,7 +91,7 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         lines = driver.find_elements(By.CSS_SELECTOR, "#lines li")
         assert newest in lines and newest != lines[-1]  # still the same one: it is not read out again
         assert not driver.find_element(By.ID, "prompt").is_displayed()
-        until(lambda: "Step 13 of 16" in text(driver, "step-number"), "the step")
+        wait_for(lambda: "Step 13 of 16" in text(driver, "step-number"), "the step")
         assert text(driver, "left").startswith("0:15")
         assert driver.find_element(By.ID, "bar").get_attribute("aria-valuetext") == "step 13 of 16, 0:15 left"
         plots = driver.find_elements(By.CSS_SELECTOR, ".plot canvas")
@@ -119,12 +120,12 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         assert not driver.find_element(By.ID, "halt").is_displayed()
         picture(driver, "pass-dark")
         driver.find_element(By.ID, "certificate").click()
-        until(lambda: len(driver.window_handles) == 2, "the certificate")
+        wait_for(lambda: len(driver.window_handles) == 2, "the certificate")
         driver.switch_to.window(driver.window_handles[1])
-        until(lambda: driver.title == "Certificate", "the certificate")
+        wait_for(lambda: driver.title == "Certificate", "the certificate")
         driver.close()
         driver.switch_to.window(driver.window_handles[0])
-    until(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
+    wait_for(lambda: "this is how it ended" in text(driver, "link"), "the end of the line")
     tell.word("PASS")
 
 
@@ -162,7 +163,7 @@ def test_a_line_that_is_lost_makes_all_of_it_old(driver: Chrome, tmp_path: Path)
         tell(*before_it_moves(plan), *moving(plan, 52.0))
         tell.word("Resting")
         assert text(driver, "link-words") == "connected"
-    until(lambda: text(driver, "link-words") == "no connection: what stands here is old", "that the line is down")
+    wait_for(lambda: text(driver, "link-words") == "no connection: what stands here is old", "that the line is down")
     picture(driver, "line-lost")
     driver.get("about:blank")  # so that it asks no longer
     assert all("ERR_CONNECTION_REFUSED" in entry for entry in severe(driver))
@@ -179,12 +180,12 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
     address = Address(host, 0, "a-token-of-forty-characters-and-no-other")
     with serving(feed, Control(may_answer=True), tmp_path, address) as url:
         driver.get(url.split("#")[0])
-        until(lambda: "lacks its token" in text(driver, "link-words"), "what is missing")
+        wait_for(lambda: "lacks its token" in text(driver, "link-words"), "what is missing")
         assert text(driver, "state-word") == "Not shown" and text(driver, "state-text") == text(driver, "link-words")
         picture(driver, "without-token")
         assert [("403" in entry, "/events" in entry) for entry in severe(driver)] == [(True, True)]  # it asks but once
         driver.get(url)
-        until(lambda: text(driver, "state-word") == "Your answer is needed", "the question")
+        wait_for(lambda: text(driver, "state-word") == "Your answer is needed", "the question")
         assert text(driver, "prompt-tick") == Prompt(ANNOUNCED).to_tick
         assert asked_hosts(driver) == {host}
 

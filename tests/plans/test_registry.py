@@ -19,6 +19,7 @@ from rig.plans.phase import first_phase
 from rig.plans.registry import installed, sections
 from rig.plans.script_file import installed_script, load_script
 from support.paths import CONFIGS, ROOT
+from support.waiting import PATIENCE_S
 
 OWN = """
 from dataclasses import replace
@@ -101,7 +102,7 @@ def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: 
     del hardware["world"]
     config.write_text(yaml.safe_dump({**hardware, "board": {"port": "socket://127.9.9.9:1"}}), encoding="utf-8")
     command = [sys.executable, str(own), str(config), "--out", str(tmp_path / "run")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 2 and "rig: no_port: " in done.stderr, done.stderr
     assert (tmp_path / "run" / "script.py").read_text(encoding="utf-8") == OWN
 
@@ -116,6 +117,7 @@ def test_an_installed_procedure_that_cannot_be_loaded_has_a_name(tmp_path: Path)
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     done = subprocess.run(
         [sys.executable, "-m", "rig", "plan", str(VERIFIED)],
-        capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": path},
     )  # fmt: skip
     assert done.returncode == 2 and "rig: procedure_not_loaded: " in done.stderr, done.stderr

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 SCALE, BIAS_RAD = (1.02, 0.97), (0.004, -0.007)
 SHOWN = """
@@ -54,7 +55,13 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 def ran(environment: dict[str, str], *command: str) -> str:
     done = subprocess.run(
-        [sys.executable, *command], capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=environment
+        [sys.executable, *command],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+        cwd=ROOT,
+        env=environment,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -95,7 +102,7 @@ def test_a_certificate_is_none_where_a_package_knows_the_noise_alone(tmp_path: P
     (run / "result.json").write_text(json.dumps(result), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-m", "rig", "report", str(run), "--dcc", "--set", "site.country=DE"],
-        capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=installed,
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=ROOT, env=installed,
     )  # fmt: skip
     assert done.returncode == 2 and "no_digital_certificate" in done.stderr, done.stderr
     ran(installed, "-m", "rig", "report", str(run))
@@ -112,7 +119,7 @@ def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed:
     ran(without, "-m", "rig", "report", run)
     done = subprocess.run(
         [sys.executable, "-m", "rig", "solve", run],
-        capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=without,
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=ROOT, env=without,
     )  # fmt: skip
     assert done.returncode == 2 and "not_a_run_file" in done.stderr, done.stderr
 

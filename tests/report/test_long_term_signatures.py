@@ -26,6 +26,7 @@ from rig.report.signatures.signatory import signatory
 from rig.report.signatures.signing import signed_pdf
 from rig.report.signatures.trust import Trust
 from support.signing import PASSPHRASE, Holder, holder, revocation_list, stamping, time_server
+from support.waiting import PATIENCE_S
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,11 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
     assert not looked.problems and by.long_term and by.time_server == "CN=Time server"
     (signing.folder / "made.pdf").write_bytes(made)
     told = subprocess.run(
-        ["pdfsig", "-nocert", signing.folder / "made.pdf"], capture_output=True, text=True, timeout=60, check=True
+        ["pdfsig", "-nocert", signing.folder / "made.pdf"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=True,
     ).stdout
     assert "Signature is Valid" in told and "Total document signed" in told
     # pyHanko, which asks for lists of that time: what is in the file is enough, and without it nothing is.

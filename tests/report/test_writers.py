@@ -15,6 +15,7 @@ from rig.data.run_file import read_run
 from rig.report import writers
 from rig.station.events import DocumentWritten, RunEvent
 from support.paths import FIXTURES, ROOT
+from support.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
         cwd=house,
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.stdout == "calibration.h toy.txt certificate.html result.json\n", done

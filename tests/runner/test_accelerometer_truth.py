@@ -69,7 +69,7 @@ def finished(seed: int, folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     folder.mkdir()
     config, out = folder / "config.yaml", folder / "run"
     config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    done = rig("run", config, "--out", out, timeout_s=900)
+    done = rig("run", config, "--out", out)
     assert done.returncode in (0, 1), done.stderr + done.stdout
     return document, json.loads((out / "result.json").read_text(encoding="utf-8"))
 

@@ -20,6 +20,7 @@ from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
 from support.commands import configuration, rig, rig_here, wait_for_log
 from support.stated import solved_otherwise
+from support.waiting import PATIENCE_S
 from support.worlds import merge
 
 ACCELEROMETER: dict[str, Any] = {
@@ -53,7 +54,7 @@ NINE += [[-135, -90, 135], [0, -90, -135]]
 ATTITUDES = {"name": "static_attitudes", "attitudes": NINE, "dwell_s": 0.6, "acceleration_deg_s2": 700}
 IMU = {**ATTITUDES, "name": "imu", "axes": 3, "speed_deg_s": 150, "rest_s": 0.5}
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.slow
 
 Finished = tuple[Path, dict[str, Any], dict[str, Any], str]
 
@@ -147,8 +148,8 @@ def test_the_header_corrects_readings_as_the_result_says(imu: Finished, tmp_path
         encoding="utf-8",
     )
     program = tmp_path / "try"
-    subprocess.run(["gcc", "-Wall", "-Werror", f"-I{out}", source, "-o", program], check=True, timeout=60)
-    said = subprocess.run([program], capture_output=True, text=True, check=True, timeout=10).stdout
+    subprocess.run(["gcc", "-Wall", "-Werror", f"-I{out}", source, "-o", program], check=True, timeout=PATIENCE_S)
+    said = subprocess.run([program], capture_output=True, text=True, check=True, timeout=PATIENCE_S).stdout
     found = result["accelerometers"]["gyro"]
     expected = np.array(found["correction_matrix"]) @ (np.array([1.0, -2.0, 9.0]) - found["bias_m_s2"])
     assert np.array(said.split(), dtype=np.float64) == pytest.approx(expected, rel=1e-5)
@@ -242,7 +243,7 @@ def test_an_interrupted_run_goes_on_where_it_stood(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
         wait_for_log(out, "done: dwell at", times=5)  # in fewer attitudes the board's clock is not told
         running.send_signal(signal.SIGINT)
-        running.communicate(timeout=60)
+        running.communicate(timeout=PATIENCE_S)
     assert running.returncode == 130
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr

@@ -42,7 +42,6 @@ def off(folder: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_what_a_run_found_is_stored_corrects_and_is_undone_in_the_next(tmp_path: Path) -> None:
     kept = {"world": {"sensors": {"imu1": {"autopilot": {"parameter_file": str(tmp_path / "memory.json")}}}}}
     config = configuration(tmp_path, kept)

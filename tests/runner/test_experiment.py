@@ -5,7 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,12 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.data.run_file import read_run
-from support.commands import configuration, rig, rig_here
+from support.commands import configuration, rig, rig_here, wait_for_log
 from support.drawn_laboratory import truth
 from support.ideal import ideal_document
 from support.paths import CONFIGS
 from support.stated import solved_otherwise
+from support.waiting import PATIENCE_S, alive, wait_for
 from support.worlds import QUICK_EXPERIMENT, fresh_host, merge
 
 EXPERIMENTS = [
@@ -28,7 +28,7 @@ EXPERIMENTS = [
 ]
 VERIFIED = {"gyro.verification_rms", "gyro.verification_mean", "gyro.verification_reference"}
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # a whole experiment or two
+pytestmark = pytest.mark.slow  # a whole experiment or two
 
 Finished = tuple[Path, dict[str, Any], dict[str, Any]]
 
@@ -163,15 +163,15 @@ def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Pa
     addressed = [*on_fresh_host(), "--set", f"world.board.flash_file={tmp_path / 'flash.bin'}"]
     script = CONFIGS.parent / "procedures" / "verify.py"
     nothing = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "nothing")]
-    refused = subprocess.run(nothing, capture_output=True, text=True, timeout=240, check=False)
+    refused = subprocess.run(nothing, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert refused.returncode == 2 and "no_calibration" in refused.stderr, refused.stderr
     stored = subprocess.run(
         command("board", "calibration", "write", config, out, "--yes", *addressed),
-        capture_output=True, text=True, timeout=240, check=False,
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert stored.returncode == 0, stored.stderr
     again = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "again"), "--json"]
-    verified = subprocess.run(again, capture_output=True, text=True, timeout=240, check=False)
+    verified = subprocess.run(again, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert verified.returncode == 0, verified.stdout + verified.stderr
     document = json.loads(verified.stdout)
     assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
@@ -191,7 +191,7 @@ def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
     config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     done = subprocess.run(
         command("run", config, "--out", out, *chosen, *on_fresh_host()),
-        capture_output=True, text=True, timeout=240, check=False,
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
@@ -213,7 +213,7 @@ def test_the_script_runs_as_the_command_does_and_stores_and_verifies_no_calibrat
     config = configuration(tmp_path, merge(QUICK_EXPERIMENT, {"limits": {"scale_deviation": 0.01}}))
     done = subprocess.run(
         [sys.executable, str(script), str(config)],
-        cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False,
+        cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 1, done.stderr
     (out,) = (tmp_path / "runs").glob("*-six_observation")
@@ -231,13 +231,11 @@ def test_an_interrupted_verification_is_resumed(tmp_path: Path) -> None:
         command("run", configuration(tmp_path, QUICK_EXPERIMENT), "--out", out),
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    deadline_s = time.monotonic() + 200
-    while not (out / "verify.h5").exists() or "stored on the board" not in (out / "log.txt").read_text():
-        assert time.monotonic() < deadline_s and process.poll() is None, process.communicate()[1]
-        time.sleep(0.05)
+    wait_for((out / "verify.h5").exists, "the verification", meanwhile=alive(process))
+    wait_for_log(out, "stored on the board")
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=240)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130 and f"rig resume {out}" in errors
-    resumed = subprocess.run(command("resume", out), capture_output=True, text=True, timeout=240, check=False)
+    resumed = subprocess.run(command("resume", out), capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
     assert json.loads((out / "result.json").read_text())["verification"]["gyro"]["before"] is not None

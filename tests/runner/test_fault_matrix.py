@@ -18,7 +18,7 @@ SPAN_S = {"six_observation": 29.0, "imu": 50.0}  # of the arm's motions, by the 
 FEW = ["board: wire half-closed"]
 PROOF = [pytest.mark.proof, pytest.mark.thorough]
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.slow
 
 
 @pytest.mark.thorough

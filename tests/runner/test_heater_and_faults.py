@@ -37,7 +37,7 @@ HEATED: dict[str, Any] = merge(
 FEW = ["board: wire stalls", "sensor: silent: no data-ready"]
 PROOF = [pytest.mark.proof, pytest.mark.thorough]
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.slow
 
 
 def heats(here: Bench) -> bool:

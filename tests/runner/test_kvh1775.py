@@ -131,14 +131,13 @@ def test_its_magnetometer_is_calibrated_in_format_c(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(900)
 def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path: Path) -> None:
     imu: dict[str, Any] = {
         "sensors": {"kvh": {"rate_hz": 250, "acceleration": {"range_g": 10}}},
         "procedure": {"name": "imu", "dwell_s": 2},
         "site": {"gravity_m_s2": 9.80665, "gravity_uncertainty_m_s2": 1e-4},
     }
-    done = rig("run", configuration(tmp_path, imu), "--out", tmp_path / "run", timeout_s=800)
+    done = rig("run", configuration(tmp_path, imu), "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr + done.stdout
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     entry = result["accelerometers"]["kvh"]
@@ -185,7 +184,7 @@ def earth_run(folder: Path, changes: dict[str, Any]) -> dict[str, Any]:
     document["sensors"]["kvh"]["serial"]["port"] = f"socket://{host}:7331"
     path = folder / "config.yaml"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    done = rig("run", path, "--out", folder / "run", timeout_s=800)
+    done = rig("run", path, "--out", folder / "run")
     assert done.returncode == 0, done.stderr + done.stdout
     assert "the Earth's rate in the arm's base, °/h" in done.stdout
     assert "Earth's rate found: 1" in rig("show", folder / "run", "--all").stdout

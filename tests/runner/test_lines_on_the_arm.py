@@ -103,7 +103,6 @@ def test_its_noise_is_what_its_errors_are(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(1800)
 def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
     """The laboratory goes at the computer's pace, for its clock is the sensor's: a busy computer cannot tell."""
     columns = ["-", "gx", "gy", "gz", "ax", "ay", "az", "temperature"]

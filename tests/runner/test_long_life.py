@@ -6,7 +6,7 @@ import pytest
 
 from support.long_life import Life, complaints, live
 
-pytestmark = [pytest.mark.slow, pytest.mark.thorough, pytest.mark.proof, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.slow, pytest.mark.thorough, pytest.mark.proof]
 RUNS, WARM_UP = 16, 13  # the station loads and caches during its first dozen
 SIGMA = 5.0  # that few runs tell little of a drift, and nothing may fail by chance
 

@@ -23,6 +23,7 @@ from support.commands import rig_here, wait_for_log
 from support.drawn_laboratory import truth
 from support.handled_body import FAST_RAD_S, LSM9DS1
 from support.paths import CONFIGS
+from support.waiting import PATIENCE_S
 from support.warm import started
 from support.worlds import fresh_host, merge
 
@@ -84,7 +85,7 @@ def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
         try:
             wait_for_log(out, "sampling: ")
             began_s = began(laboratory, (out / "log.txt").read_text(encoding="utf-8"))
-            said, _ = process.communicate(timeout=560)
+            said, _ = process.communicate(timeout=PATIENCE_S)
         finally:
             process.kill()
     assert process.returncode == 0, said
@@ -102,7 +103,7 @@ def began(laboratory: dict[str, Any], log: str) -> float:
     """When the run's own world began, by this computer's clock, while it goes on as fast as it is to."""
     section = world_section(parse(yaml.safe_dump(laboratory), turners=sections()))
     (host,) = set(re.findall(r" at socket://([\d.]+):", log))
-    with socket.create_connection((host, section.control_port), 30) as control:
+    with socket.create_connection((host, section.control_port), PATIENCE_S) as control:
         control.sendall(b'{"do": "state"}\n')
         with control.makefile() as replies:
             now_s = float(json.loads(replies.readline())["time_s"])
@@ -111,7 +112,6 @@ def began(laboratory: dict[str, Any], log: str) -> float:
 
 @pytest.mark.one_in(2)
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("source", SOURCES)
 def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Path) -> None:
     found = ran(source, tmp_path, SHORT)

@@ -15,6 +15,7 @@ import yaml
 from support.commands import configuration, python, rig, rig_here, wait_for_log
 from support.paths import ROOT
 from support.stated import solved_otherwise
+from support.waiting import PATIENCE_S
 from support.worlds import merge
 
 OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
@@ -43,7 +44,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     )  # fmt: skip
     wait_for_log(out, "done: sweep wrist_1 cw")
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=240)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130, errors
     copy.write_text("a later version, which is another script", encoding="utf-8")
     yield out

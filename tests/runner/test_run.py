@@ -3,7 +3,6 @@
 import json
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import yaml
 
 from support.commands import configuration, rig, rig_here, wait_for_log
 from support.stated import solved_otherwise
+from support.waiting import PATIENCE_S
 from support.warm import started
 from support.worlds import merge
 
@@ -120,11 +120,10 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     out = tmp_path / "run"
     process = start("run", configuration(tmp_path, {"world": {"time_scale": 4}}), "--out", out)
     wait_for_log(out, "done: sweep wrist_3 ccw")
-    interrupted_s = time.monotonic()
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=240)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
-    assert time.monotonic() - interrupted_s < 4
+    swept = (out / "log.txt").read_text(encoding="utf-8").count("done: sweep")
     assert f"rig resume {out}" in errors and "Traceback" not in errors
     assert not (out / "result.json").exists()
 
@@ -144,7 +143,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert [o["sweep"] for o in result["sensors"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
     assert len(result["sensors"]["gyro"]["time_bases"]) == 2
-    assert resumed.stderr.count("done: sweep") == 4
+    assert swept < 6 and resumed.stderr.count("done: sweep") == 6 - swept
     assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
 
 
@@ -157,7 +156,7 @@ def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Pa
     process.stderr.readline()
     process.stderr.close()
     process.stdout.close()
-    assert process.wait(240) == 0
+    assert process.wait(PATIENCE_S) == 0
     assert json.loads((out / "result.json").read_text(encoding="utf-8"))["verdict"] == "pass"
 
 

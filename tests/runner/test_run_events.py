@@ -37,9 +37,10 @@ from rig.station.events import (
     VerdictReached,
 )
 from rig.station.station import Stations, always_yes
+from support.waiting import PATIENCE_S
 from support.worlds import QUICK_EXPERIMENT, worlds
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # a whole experiment
+pytestmark = pytest.mark.slow  # a whole experiment
 
 
 class Failing:
@@ -198,5 +199,5 @@ def test_nothing_is_imported_while_the_arm_is_under_way(tmp_path: Path) -> None:
     once = {**QUICK_EXPERIMENT, "procedure": {**QUICK_EXPERIMENT["procedure"], "verify": False}}
     with worlds(tmp_path) as start:
         command = [sys.executable, "-c", IMPORTS, str(start(once).config_path), str(tmp_path)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0 and done.stdout == "[]\n", done.stdout + done.stderr

@@ -19,6 +19,7 @@ import pytest
 from rig.data.run_file import read_run
 from support.commands import rig as command
 from support.fault_matrix.setups import SETUPS
+from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started
 from support.worlds import World, WorldHandle, fresh_host, hardware, merge
 
@@ -68,30 +69,38 @@ class RunningRig:
         """A signal to the command and all its processes in the foreground, as a terminal sends it."""
         os.killpg(self.process.pid, number)
 
-    def until(self, condition: Callable[[dict[str, Any]], bool], timeout_s: float = 30.0) -> dict[str, Any]:
+    def until(self, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """Wait for a state of the world."""
-        deadline_s = time.monotonic() + timeout_s
-        while not condition(state := self.world.state()):
-            assert time.monotonic() < deadline_s and self.process.poll() is None, self.process.communicate()
-            time.sleep(0.005)
-        return state
+        states: list[dict[str, Any]] = []
+
+        def so() -> bool:
+            states[:] = [self.world.state()]
+            return condition(states[0])
+
+        wait_for(so, "a state of the world", meanwhile=alive(self.process))
+        return states[0]
 
     def until_sweeping(self) -> None:
         """Wait until wrist 3 turns clockwise through the middle of its first sweep."""
         self.until(lambda state: state["qd_rad_s"][5] < -0.5 and abs(state["q_rad"][5]) < 1.0)
 
-    def stopped_after_s(self) -> float:
-        """How long the arm still moved, in wall time; 0 when it stood at the first question, however long that took."""
-        began_s = asked_s = time.monotonic()
-        while self.world.state()["moving"]:
-            assert asked_s - began_s < 10, "the arm still moves"
-            time.sleep(0.005)
-            asked_s = time.monotonic()
-        return asked_s - began_s
+    def until_sweeping_slowly(self) -> None:
+        """… in a laboratory that goes on half as fast as a real one: the rest of the sweep takes eight seconds."""
+        self.until_sweeping()
+        self.world.control({"do": "pace", "time_scale": 0.5})
+
+    @property
+    def moving(self) -> bool:
+        return bool(self.world.state()["moving"])
+
+    def stops_in_its_sweep(self) -> bool:
+        """Whether the arm comes to stand before the end of the sweep."""
+        wait_for(lambda: not self.moving, "that the arm stands")
+        return bool(abs(self.world.state()["q_rad"][5]) < 3.0)
 
     def end(self) -> tuple[int, str]:
         """Exit status and stderr."""
-        _, errors = self.process.communicate(timeout=240)
+        _, errors = self.process.communicate(timeout=PATIENCE_S)
         assert "Traceback" not in errors
         return self.process.returncode, errors
 
@@ -128,11 +137,11 @@ def ignored(number: signal.Signals) -> Iterator[None]:
     [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGQUIT, marks=THOROUGH), signal.SIGTSTP],
     ids=["Ctrl-C", "SIGTERM", "Ctrl-backslash", "Ctrl-Z"],
 )
-def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal.Signals) -> None:
+def test_an_interrupt_stops_the_arm_in_its_sweep(start: Start, number: signal.Signals) -> None:
     rig = start()
-    rig.until_sweeping()
+    rig.until_sweeping_slowly()
     rig.send(number)
-    assert rig.stopped_after_s() < 1.0
+    assert rig.stops_in_its_sweep()
     status, errors = rig.end()
     assert status == 130
     assert "interrupted; the arm is stopped and at rest; " in errors
@@ -146,9 +155,9 @@ def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal
 def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt_too(start: Start) -> None:
     with ignored(signal.SIGINT):
         rig = start()
-    rig.until_sweeping()
+    rig.until_sweeping_slowly()
     rig.send(signal.SIGINT)
-    assert rig.stopped_after_s() < 1.0
+    assert rig.stops_in_its_sweep()
     status, errors = rig.end()
     assert status == 130 and "interrupted; the arm is stopped and at rest; " in errors
 
@@ -180,12 +189,11 @@ def test_three_ctrl_c_at_once_leave_the_word_that_the_arm_stands(start: Start) -
 @both
 def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
     rig = start()
-    rig.until_sweeping()
+    rig.until_sweeping_slowly()
     rig.send(signal.SIGKILL)
-    assert rig.stopped_after_s() < 1.0
+    assert rig.stops_in_its_sweep()
     rig.process.wait()
-    state = rig.world.state()
-    assert not state["program_running"] and abs(state["q_rad"][5]) < 3, "the arm went on to the end of its sweep"
+    wait_for(lambda: not rig.world.state()["program_running"], "the end of the program")
 
 
 def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
@@ -215,11 +223,10 @@ def test_a_program_held_up_for_a_second_misses_no_state(start: Start) -> None:
 
 
 def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
-    rig = start({"world": {"time_scale": 0.5}})
-    rig.until_sweeping()
+    rig = start()
+    rig.until_sweeping_slowly()
     rig.process.send_signal(signal.SIGSTOP)
-    assert rig.stopped_after_s() < 5.0, "the sweep goes on for 6 s"
-    assert abs(rig.world.state()["q_rad"][5]) < 3.3, "the arm swept on to its end"
+    assert rig.stops_in_its_sweep()
     rig.process.send_signal(signal.SIGCONT)
     assert rig.end()[0] == 3
 
@@ -250,14 +257,15 @@ def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
     assert status == 3
     assert f"rig: {name}: " in errors, errors
     assert f"rig resume {rig.out}" in errors
-    assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
+    assert not rig.moving
     assert len(read_run(rig.out / "run.h5").states) > 0
 
 
 def test_nothing_moves_when_the_board_goes_while_the_sensors_are_first_listened_to(start: Start) -> None:
     rig = start(merge(SETUPS["imu"], {"world": {"time_scale": 1}}))
     began_s = rig.until(lambda state: state["program_running"])["time_s"]
-    rig.until(lambda state: state["time_s"] > began_s + 1.5)  # of 3 s
+    rig.world.control({"do": "pace", "time_scale": 0.2})
+    rig.until(lambda state: state["time_s"] > began_s + 0.6)  # of 3 s
     rig.world.control({"do": "unplug_board"})
     status, errors = rig.end()
     assert status == 3 and "rig: board_link_lost: " in errors, errors
@@ -273,7 +281,7 @@ def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Sta
     status, errors = rig.end()
     assert status == 3 and "rig: run_folder_removed: " in errors, errors
     assert "rig resume" not in errors, "there is nothing to go on with"
-    assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
+    assert not rig.moving
 
 
 @pytest.mark.proof
@@ -341,13 +349,12 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
             said += os.read(operator, 4096)
         with socket.create_connection((handle.host, 30002)) as pendant:
             pendant.sendall(b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
-            while (state := handle.state())["program_running"] or state["q_rad"][0] < 0.19:
-                time.sleep(0.01)
+            wait_for(lambda: handle.state()["q_rad"][0] > 0.19 and not handle.state()["program_running"], "the nudge")
         os.write(operator, b"yes\n")
         with suppress(OSError):  # a terminal whose other end has closed
             while more := os.read(operator, 4096):
                 said += more
-        assert process.wait(240) == 2
+        assert process.wait(PATIENCE_S) == 2
     os.close(operator)
     assert b"rig: arm_moved: " in said, said
     assert handle.state()["q_rad"][0] == pytest.approx(0.2, abs=1e-3)

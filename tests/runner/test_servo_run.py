@@ -36,7 +36,6 @@ def frozen(seen: Seen) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.timeout(300)
 def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> None:
     config, out = configured(tmp_path), tmp_path / "run"
     off = asked(do="servo_power", on=False)
@@ -65,7 +64,6 @@ def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> Non
     assert "verdict: PASS" in rig_here("show", out).stdout
 
 
-@pytest.mark.timeout(120)
 def test_what_is_there_is_looked_at_and_nothing_turns(tmp_path: Path) -> None:
     config = configured(tmp_path, {"world": {"servo": {"firmware": 37}}})
     done = rig("check", config)
@@ -111,7 +109,6 @@ KNOWN_S = {"shaft held fast": 2.0, "the board silent": 5.0, "the board's line at
 
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("moment", MOMENTS)
 @pytest.mark.parametrize("what", FAULTS)
 def test_whatever_happens_the_shaft_stands_the_data_are_kept_and_the_run_goes_on(

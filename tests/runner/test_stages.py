@@ -12,6 +12,7 @@ import pytest
 
 from rig.data.run_file import read_run
 from support.commands import configuration, rig, wait_for_log
+from support.waiting import PATIENCE_S
 from support.worlds import hardware
 
 QUARTER = {"x": "+y", "y": "-x", "z": "+z"}  # about wrist 3
@@ -73,10 +74,10 @@ def test_a_run_that_was_interrupted_in_its_second_stage_goes_on_there(tmp_path: 
     config = configuration(tmp_path, in_stages([{}, QUARTER]))
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as begun:
-        wait_for_log(out, "Stage 2 of 2", timeout_s=240)
-        wait_for_log(out, "sweep wrist_2", timeout_s=240)
+        wait_for_log(out, "Stage 2 of 2")
+        wait_for_log(out, "sweep wrist_2")
         begun.send_signal(signal.SIGINT)
-        _, errors = begun.communicate(timeout=120)
+        _, errors = begun.communicate(timeout=PATIENCE_S)
     assert "rig resume" in errors
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stderr + resumed.stdout

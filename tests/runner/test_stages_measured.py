@@ -44,7 +44,7 @@ def ran(document: dict[str, Any], folder: Path) -> tuple[int, str]:
     folder.mkdir()
     config = folder / "config.yaml"
     config.write_text(yaml.safe_dump(at_address(document, fresh_host()), sort_keys=False), encoding="utf-8")
-    done = rig("run", config, "--out", folder / "run", timeout_s=900)
+    done = rig("run", config, "--out", folder / "run")
     return done.returncode, done.stderr + done.stdout
 
 

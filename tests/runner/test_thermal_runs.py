@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import time
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,13 @@ from rig.data.run_file import RunData, read_run
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
 from rig.observation.windows import finished_sweeps
 from support.commands import configuration, rig, wait_for_log
+from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started
 from support.worlds import World, hardware, merge, world
 
 __all__ = ["world"]
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.slow
 
 PROCEDURE: dict[str, Any] = {
     "name": "thermal",
@@ -68,7 +68,7 @@ def thermal(folder: Path, procedure: dict[str, Any], body: dict[str, Any]) -> tu
     """A run of such a procedure with such a body: its exit status, what it said, its folder."""
     laboratory = merge(LABORATORY, {"world": {"thermal": body}})
     config, out = configuration(folder, laboratory, {**PROCEDURE, **procedure}), folder / "run"
-    ended = rig("run", config, "--out", out, "--yes", timeout_s=500)
+    ended = rig("run", config, "--out", out, "--yes")
     return ended.returncode, ended.stdout + ended.stderr, out
 
 
@@ -205,9 +205,9 @@ def test_the_operator_is_told_what_is_wanted(tmp_path: Path, world: World) -> No
     config, out = hardware(laboratory.config_path, tmp_path), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
-        wait_for_log(out, "to do: warm the board until it is at", timeout_s=300)
+        wait_for_log(out, "to do: warm the board until it is at")
         laboratory.control({"do": "air", "temperature_c": 41})
-        said = run.communicate(timeout=400)[1]
+        said = run.communicate(timeout=PATIENCE_S)[1]
     assert run.returncode in (0, 1), said
     assert not any(each.heated for each in of_events(read_run(out / "run.h5"), TemperatureWanted))
 
@@ -217,11 +217,11 @@ def test_an_interrupted_run_goes_on_with_its_sets(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
     command = ("run", config, "--out", out, "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
-        wait_for_log(out, "set made", timeout_s=300)
-        wait_for_log(out, "done: sweep", timeout_s=300, times=8)
+        wait_for_log(out, "set made")
+        wait_for_log(out, "done: sweep", times=8)
         run.send_signal(signal.SIGINT)
     first = of_events(read_run(out / "run.h5"), SetMeasured)
-    ended = rig("resume", out, "--yes", timeout_s=500)
+    ended = rig("resume", out, "--yes")
     assert ended.returncode in (0, 1), ended.stdout + ended.stderr
     again = read_run(out / "run-2.h5")
     assert 0 not in finished_sweeps(again), "a whole set is not made again"
@@ -233,10 +233,8 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
     config = hardware(laboratory.config_path, tmp_path)
     command = ("run", config, "--out", tmp_path / "run", "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as run:
-        deadline_s = time.monotonic() + 300
-        while laboratory.control({"do": "heater"})["duty"] == 0:
-            assert run.poll() is None and time.monotonic() < deadline_s, run.communicate()[1]
-            time.sleep(0.02)
+        goes_on = alive(run)
+        wait_for(lambda: laboratory.control({"do": "heater"})["duty"] > 0, "the heater", meanwhile=goes_on)
         laboratory.control({"do": "hold"})
         run.kill()
         laboratory.control({"do": "advance", "duration_s": 2.5})

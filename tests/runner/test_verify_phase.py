@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from support.waiting import PATIENCE_S
 from support.worlds import QUICK_EXPERIMENT, World, hardware
 
 pytestmark = pytest.mark.slow
@@ -49,7 +50,7 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         with suppress(OSError):  # a terminal whose other end has closed
             while more := os.read(operator, 4096):
                 said += more
-        assert process.wait(240) == 3
+        assert process.wait(PATIENCE_S) == 3
         failed.pop_all()
     os.close(operator)
     assert b"rig: not_confirmed: " in said and b"go on with: rig resume" in said, said

@@ -100,7 +100,6 @@ def damaged(count: int, seed: int) -> tuple[bytes, np.ndarray, list[int]]:
 
 
 @pytest.mark.parametrize("count", [6_000, pytest.param(1_000_000, marks=[pytest.mark.proof, pytest.mark.thorough])])
-@pytest.mark.timeout(1200)
 def test_damaged_lines_pass_a_sum_no_oftener_than_one_in_256(count: int) -> None:
     """One wrong byte never passes; several do by chance, and most of what does is no number any more."""
     section = lines_section(prefix="$IMU,", checksum="nmea")

@@ -10,7 +10,6 @@ from rig.study.report import Settings
 @pytest.mark.slow
 @pytest.mark.one_in(3)
 @pytest.mark.proof
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("noise_rad_s", [0.002, 0.035])
 @pytest.mark.parametrize("speed_deg_s", [60, 90, 120])
 def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s: float, thorough: bool) -> None:

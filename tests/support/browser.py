@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
 from support.paths import ROOT
-from support.waiting import wait_for
 
 PICTURES = ROOT / "build" / "page"
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -128,11 +127,6 @@ def typed(driver: Chrome, words: str) -> None:
 def kind(driver: Chrome) -> str:
     """The run's state, by the page's own name for it."""
     return str(driver.execute_script("return document.body.dataset.kind"))
-
-
-def until(true: Callable[[], Any], what: str, within_s: float = 120.0) -> Any:
-    """As `wait_for`, with the patience that a browser needs on a busy computer."""
-    return wait_for(true, what, within_s)
 
 
 def severe(driver: Chrome) -> list[str]:

@@ -9,7 +9,6 @@ from support.waiting import wait_for
 from support.warm import started
 
 TOLD = "page: "
-BUSY_S = 400.0  # a busy machine's patience
 
 
 @contextmanager
@@ -20,7 +19,7 @@ def with_a_page(told: Path, *words: str | Path) -> Iterator[tuple["subprocess.Po
         started(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
     ):
         try:
-            yield process, wait_for(lambda: _address(told), "its page", BUSY_S)
+            yield process, wait_for(lambda: _address(told), "its page")
         finally:
             process.kill()
 

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -13,6 +12,7 @@ import yaml
 from rig.cli import main
 from rig.config.load import load
 from support.paths import CONFIGS
+from support.waiting import PATIENCE_S, wait_for
 from support.warm import started
 from support.worlds import fresh_host, merge
 
@@ -20,7 +20,7 @@ CI = CONFIGS / "ci.yaml"
 
 
 def rig(
-    *arguments: str | Path, timeout_s: float = 240, stdin: int = subprocess.DEVNULL
+    *arguments: str | Path, timeout_s: float = PATIENCE_S, stdin: int = subprocess.DEVNULL
 ) -> subprocess.CompletedProcess[str]:
     """`rig …`, until it has ended."""
     with started(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -31,7 +31,7 @@ def rig(
     return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, said, errors)
 
 
-def python(*arguments: str | Path, timeout_s: float = 240) -> subprocess.CompletedProcess[str]:
+def python(*arguments: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
     """`python …`, until it has ended."""
     command = [sys.executable, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
@@ -58,10 +58,11 @@ def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure
     return path
 
 
-def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0, times: int = 1) -> None:
+def wait_for_log(folder: Path, words: str, times: int = 1) -> None:
     """Until the run's log says so, so many times."""
     log = folder / "log.txt"
-    deadline_s = time.monotonic() + timeout_s
-    while not (log.exists() and log.read_text(encoding="utf-8").count(words) >= times):
-        assert time.monotonic() < deadline_s, f"{log} never said {words!r}"
-        time.sleep(0.01)
+
+    def said() -> bool:
+        return log.exists() and log.read_text(encoding="utf-8").count(words) >= times
+
+    wait_for(said, f"{words!r} in {log}")

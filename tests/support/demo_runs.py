@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from support.waiting import PATIENCE_S
 from support.worlds import fresh_host
 
 
@@ -18,7 +19,7 @@ def normalised_errors(rig: Sequence[str | Path], config: Path, seed: int, out: P
     changes = {"world.seed": seed, "arm.host": host, "board.port": f"socket://{host}:7321"}
     for path, value in changes.items():
         command += ["--set", f"{path}={value}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, cwd=out.parent)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=out.parent)
     assert done.returncode == 0, done.stderr
     sensor = json.loads(done.stdout)["sensors"]["gyro"]
     truth = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]

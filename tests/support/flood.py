@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from urllib.parse import urlsplit
 
+from support.waiting import PATIENCE_S
+
 
 @contextmanager
 def opened(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
@@ -65,8 +67,8 @@ def flooded(url: str, connections: int) -> Iterator[None]:
     thread = threading.Thread(target=attack, daemon=True)
     thread.start()
     try:
-        full.wait(20)  # before the limits were there it could not come to so many
+        full.wait(PATIENCE_S)  # before the limits were there it could not come to so many
         yield
     finally:
         over.set()
-        thread.join(30)
+        thread.join(PATIENCE_S)

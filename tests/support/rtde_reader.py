@@ -4,6 +4,8 @@ import select
 import socket
 import struct
 
+from support.waiting import PATIENCE_S
+
 TIMESTAMP = struct.Struct(">HBBd")  # size, type, recipe, the one variable asked for
 
 
@@ -15,7 +17,7 @@ class RtdeReader:
     """Receives the controller's time stamps at `rate_hz` of its own time."""
 
     def __init__(self, host: str, rate_hz: float = 125.0) -> None:
-        self._socket = socket.create_connection((host, 30004), 10.0)
+        self._socket = socket.create_connection((host, 30004), PATIENCE_S)
         self._socket.sendall(package("V", struct.pack(">H", 2)))
         self._receive(4)
         self._socket.sendall(package("O", struct.pack(">d", rate_hz) + b"timestamp"))

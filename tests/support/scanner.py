@@ -5,15 +5,13 @@ import pty
 import subprocess
 import termios
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from support.waiting import PATIENCE_S
 from support.warm import started
-
-TIMEOUT_S = 150.0
 
 
 class Scanner:
@@ -24,13 +22,13 @@ class Scanner:
         self._terminal = terminal
         self._told = ""
         self._read = 0  # what was waited for already ends here
+        self._over = False  # it says no more
         self._more = threading.Condition()
         threading.Thread(target=self._listen, daemon=True).start()
 
-    def types(self, line: str) -> float:
-        """A line and Enter; the monotonic time at which it was sent."""
+    def types(self, line: str) -> None:
+        """A line and Enter."""
         os.write(self._terminal, f"{line}\n".encode())
-        return time.monotonic()
 
     def waits_for(self, words: str) -> None:
         """Until that is said, after what was waited for before."""
@@ -39,7 +37,7 @@ class Scanner:
     def sees(self, words: str) -> int:
         """Until that is said; it can be waited for again."""
         with self._more:
-            self._more.wait_for(lambda: self._end(words) >= 0 or self.process.poll() is not None, TIMEOUT_S)
+            self._more.wait_for(lambda: self._end(words) >= 0 or self._over, PATIENCE_S)
             end = self._end(words)
             assert end >= 0, f"{words!r} not said after:\n{self._told[max(0, self._read - 2000) :]}"
             return end
@@ -61,6 +59,7 @@ class Scanner:
                 self._told += data.decode(errors="replace")
                 self._more.notify_all()
         with self._more:
+            self._over = True
             self._more.notify_all()
 
 

@@ -20,6 +20,7 @@ from rig.world.servo.servo import Servo
 from support.autopilot_on_a_wire import autopilot_on_a_wire, section
 from support.drawn_servo import BEGINS_S, Until
 from support.printed_lines import pty_printing, sensor_section
+from support.waiting import PATIENCE_S
 
 STILL_S = BEGINS_S - 0.9  # it stands from then on, before it is told to turn
 RATE_HZ = 200.0
@@ -58,7 +59,7 @@ def by_lines(
         time_s = STILL_S - 10.0
         while time_s < end_s:
             if time_s > STILL_S:
-                listening.wait(60.0)
+                listening.wait(PATIENCE_S)
             time_s += CHUNK_S
             printer.advance(time_s)
             yield printer.transmitted()

@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from support.paths import CONFIGS
+from support.waiting import PATIENCE_S
 from support.warm import started
 from support.worlds import fresh_host, merge
 
@@ -40,7 +41,7 @@ class Seen:
 
     def control(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """One request of the laboratory, one reply."""
-        with socket.create_connection(self.control_at, 5.0) as channel:
+        with socket.create_connection(self.control_at, PATIENCE_S) as channel:
             channel.sendall(json.dumps(dict(request)).encode() + b"\n")
             reply: dict[str, Any] = json.loads(channel.makefile("rb").readline())
         assert reply["ok"], reply
@@ -93,16 +94,16 @@ def carried_out(*command: str | Path, config: Path, when: str = "", times: int =
             seen.acted_s = time.monotonic()
             act(seen)
     process.stdout.close()
-    process.wait(60)
+    process.wait(PATIENCE_S)
     if seen.acted_s:
-        watching.join(10.0)
+        watching.join(PATIENCE_S)
     return seen
 
 
 def _watch(seen: Seen) -> None:
     """How fast the shaft is, until the laboratory has ended."""
     try:
-        with socket.create_connection(seen.control_at, 5.0) as channel:
+        with socket.create_connection(seen.control_at, PATIENCE_S) as channel:
             replies = channel.makefile("rb")
             while True:
                 channel.sendall(b'{"do": "state"}\n')

@@ -21,8 +21,9 @@ from rig.page.page_state import Shown
 from rig.page.rows import Look
 from rig.page.serving import Address, serving
 from rig.station.events import ArmSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
-from support.browser import text, until
+from support.browser import text
 from support.told_runs import ABOUT, before_it_moves, look, moving, planned
+from support.waiting import wait_for
 
 AGAIN_S = 0.2  # a run that goes on tells so all the time
 GOING_ON = (StepStarted, StepFinished, Progress, SamplesTaken)
@@ -56,7 +57,7 @@ class Telling:
         self._feed.look(Look(rows, []))
 
     def word(self, expected: str) -> None:
-        until(
+        wait_for(
             lambda: text(self._driver, "state-word") == expected, f"{expected}, not {text(self._driver, 'state-word')}"
         )
         assert text(self._driver, "sign")

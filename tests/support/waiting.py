@@ -1,10 +1,11 @@
 """Waiting for what another process or thread does: for the event itself, never for so long."""
 
+import subprocess
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-PATIENCE_S = 600.0  # of wall time, after which what is waited for has failed: no busy computer takes as long
+PATIENCE_S = 900.0  # of wall time, after which what is waited for has failed: no busy computer takes as long
 LOOK_S = 0.005
 
 Error = TypeVar("Error", bound=Exception)
@@ -41,3 +42,12 @@ def wait_for_error(kind: type[Error], act: Callable[[], object], limit_s: float 
 
     error: Error = wait_for(raised, kind.__name__, limit_s)
     return error
+
+
+def alive(process: "subprocess.Popen[Any]") -> Callable[[], None]:
+    """For `wait_for`, `meanwhile` a process goes on: once it has ended, what it said fails the test."""
+
+    def check() -> None:
+        assert process.poll() is None, process.communicate()
+
+    return check

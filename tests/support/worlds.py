@@ -15,6 +15,7 @@ import yaml
 
 from support.ideal import ideal_document
 from support.paths import DEMO
+from support.waiting import PATIENCE_S
 from support.warm import started
 
 START_TIMEOUT_S = 20.0
@@ -92,7 +93,7 @@ class WorldHandle:
         assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.close()
         try:
-            self.process.wait(5.0)
+            self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

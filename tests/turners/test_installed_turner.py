@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 ENTRIES = """
 [rig.turners]
@@ -54,7 +55,13 @@ def recorded(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory
 
 def ran(environment: dict[str, str], *command: str, status: int = 0) -> str:
     done = subprocess.run(
-        [sys.executable, *command], capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=environment
+        [sys.executable, *command],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+        cwd=ROOT,
+        env=environment,
     )
     assert done.returncode == status, done.stderr
     return done.stdout + (done.stderr if status else "")

@@ -18,6 +18,7 @@ from rig.world import process
 from rig.world.process import World
 from rig.world.ur10e.rtde import package
 from support.paths import CONFIGS
+from support.waiting import PATIENCE_S
 from support.worlds import fresh_host, merge
 
 OUTPUTS = "timestamp,actual_q,actual_qd,actual_TCP_pose,runtime_state,speed_scaling,output_int_register_0"
@@ -44,9 +45,9 @@ class Laboratory:
         self._thread.start()
         host = loaded.config.arm.host
         self._selector = selectors.DefaultSelector()
-        self.control = socket.create_connection((host, 7322), 20.0)
+        self.control = socket.create_connection((host, 7322), PATIENCE_S)
         self._replies = b""
-        self.wires = {name: socket.create_connection((host, port), 20.0) for name, port in ports.items()}
+        self.wires = {name: socket.create_connection((host, port), PATIENCE_S) for name, port in ports.items()}
         self.heard = dict.fromkeys(ports, b"")
         for name, wire in [*self.wires.items(), ("control", self.control)]:
             wire.setblocking(False)
@@ -89,7 +90,7 @@ class Laboratory:
 
     def close(self) -> None:
         self.world.end()
-        self._thread.join(20.0)
+        self._thread.join(PATIENCE_S)
         for wire in (*self.wires.values(), self.control):
             wire.close()
         self._selector.close()
@@ -150,7 +151,6 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(240)
 def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     found, host = [], fresh_host()
     for leap in (1, process.LEAP):

@@ -308,12 +308,12 @@ def test_a_gathering_port_hands_on_in_one_go_what_came_about_while_ticks_were_du
     ports = network.Network(lambda: None)
     ports.listen(host, 7321, Talker, gathers=True)
     try:
-        with socket.create_connection((host, 7321), 5.0) as client:
+        with socket.create_connection((host, 7321), PATIENCE_S) as client:
             ports.poll(5.0)
             for idle in (False, False, False, True):
                 ports.tick()
                 assert ports.deliver(idle) == 0.0
-            client.settimeout(5.0)
+            client.settimeout(PATIENCE_S)
             heard = b""
             while len(heard) < 4:
                 heard += client.recv(64)

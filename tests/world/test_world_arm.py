@@ -19,7 +19,7 @@ from third_party.rtde import rtde as makers
 
 from rig.world.ur10e.forward_kinematics import flange_pose
 from support.arm_client import client
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 from support.worlds import World, WorldHandle, worlds
 
 pytestmark = pytest.mark.slow
@@ -321,7 +321,7 @@ def test_a_program_sent_as_text_is_played(world: World) -> None:
         "  write_output_integer_register(24, 7)\n"
         "end\n"
     )
-    with reports_of(running) as receive, socket.create_connection((running.host, 30003), 5.0) as script:
+    with reports_of(running) as receive, socket.create_connection((running.host, 30003), PATIENCE_S) as script:
         for part in (program[:30], program[30:]):
             script.sendall(part.encode())
         wait_for(lambda: receive.getActualQ()[0] > 0.19, "the move")
@@ -334,7 +334,7 @@ def test_a_program_sent_as_text_is_played(world: World) -> None:
 
 def test_a_statement_the_simulation_does_not_know_is_named(world: World) -> None:
     running = world()
-    with socket.create_connection((running.host, 30002), 5.0) as script:
+    with socket.create_connection((running.host, 30002), PATIENCE_S) as script:
         script.sendall(b"def odd():\n  turn = 1\nend\n")
         wait_for(lambda: any("not simulated: turn = 1" in text for text in running.state()["messages"]), "the message")
 
@@ -343,7 +343,7 @@ class Dashboard:
     """A plain dashboard client."""
 
     def __init__(self, world: WorldHandle) -> None:
-        self._socket = socket.create_connection((world.host, 29999), 5.0)
+        self._socket = socket.create_connection((world.host, 29999), PATIENCE_S)
         self._lines = self._socket.makefile("r")
         self.greeting = self._lines.readline().strip()
 
@@ -421,7 +421,7 @@ class Primary:
     """A client of the primary interface, written from the maker's description of it."""
 
     def __init__(self, world: WorldHandle, port: int = 30001) -> None:
-        self._socket = socket.create_connection((world.host, port), 5.0)
+        self._socket = socket.create_connection((world.host, port), PATIENCE_S)
         self._stream = self._socket.makefile("rb")
         self.parts: dict[int, bytes] = {}  # the newest sub-package of each kind
         self.messages: list[tuple[int, bytes]] = []

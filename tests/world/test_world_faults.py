@@ -13,7 +13,7 @@ import sys
 import pytest
 
 from support.arm_client import client
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 from support.worlds import World, WorldHandle, fresh_host
 
 pytestmark = pytest.mark.slow
@@ -284,7 +284,7 @@ def test_a_taken_port_is_a_clear_error(world: World) -> None:
         [sys.executable, "-m", "rig.world", str(running.config_path)],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert second.returncode == 2
@@ -297,7 +297,7 @@ def test_a_configuration_without_a_world_is_refused() -> None:
         [sys.executable, "-m", "rig.world", "configs/ur10e_lsm9ds1.yaml"],
         capture_output=True,
         text=True,
-        timeout=20,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert result.returncode == 2 and "Traceback" not in result.stderr
@@ -327,7 +327,7 @@ def test_ctrl_c_ends_a_world_in_the_foreground(world: World, inherited: signal.H
         signal.signal(signal.SIGINT, before)
     assert process.stdout is not None and process.stdout.readline()
     os.kill(process.pid, signal.SIGINT)
-    output, errors = process.communicate(timeout=10)
+    output, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode in (0, 130) and b"Traceback" not in errors, (output, errors)
 
 

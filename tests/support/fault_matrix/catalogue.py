@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 from support.fault_matrix.bench import Bench
 from support.fault_matrix.wires import Damage, flipping, losing, repeating
+from support.waiting import PATIENCE_S
 
 Act = Callable[[Bench, Random], object]
 
@@ -72,7 +73,7 @@ def _switch_on(bench: Bench, random: Random) -> None:
 
 
 def _dashboard(bench: Bench, line: str) -> str:
-    with socket.create_connection((bench.world.host, 29999), 5) as there, there.makefile("rw") as talk:
+    with socket.create_connection((bench.world.host, 29999), PATIENCE_S) as there, there.makefile("rw") as talk:
         talk.readline()
         talk.write(f"{line}\n")
         talk.flush()
@@ -85,7 +86,7 @@ def _controller(name: str, do: str, end: str, mend: Act = nothing, **values: obj
 
 
 def _nudge(bench: Bench, random: Random) -> None:
-    with socket.create_connection((bench.world.host, 30002), 5) as there:
+    with socket.create_connection((bench.world.host, 30002), PATIENCE_S) as there:
         there.sendall(b"def nudge():\n movej([0.1, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
 
 

@@ -17,7 +17,7 @@ from support.forked import forked
 from support.servo_on_a_wire import SET_UP, ServoOnAWire, servo_on_a_wire
 from support.waiting import wait_for
 
-pytestmark = pytest.mark.slow  # each fault takes its time to be known
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_crowd")]  # each fault takes its time to be known
 
 WATCHDOG_S = 0.3  # the driver's own
 MANY = 10**6

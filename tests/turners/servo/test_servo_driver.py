@@ -15,6 +15,8 @@ from rig.world.servo.truth import ServoTruth
 from support.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
 from support.servo_on_a_wire import SET_UP, servo_on_a_wire
 
+pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
+
 
 @pytest.mark.slow
 def test_a_look_moves_nothing_and_switches_no_torque_on() -> None:

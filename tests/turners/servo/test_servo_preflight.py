@@ -18,6 +18,8 @@ from rig.world.servo.truth import LineTruth, ServoTruth
 from support.driven_servo import BOARD, MODEL
 from support.servo_on_a_wire import PLAIN, SET_UP, servo_on_a_wire
 
+pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
+
 GOOD = ServoTruth(left=SET_UP)
 
 

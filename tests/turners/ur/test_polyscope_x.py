@@ -14,7 +14,7 @@ from rig.turners.ur.primary import PORT as PRIMARY_PORT
 from rig.turners.ur.primary_stop import MODE_DATA, PrimaryStop
 from rig.turners.ur.robot_api import RobotApi
 from rig.turners.ur.stopping import Order, independent_ways
-from support.waiting import wait_for
+from support.waiting import PATIENCE_S, wait_for
 from support.worlds import fresh_host
 
 API_PORT = 8077
@@ -34,14 +34,14 @@ def saying(port: int, answers: Sequence[bytes]) -> Iterator[tuple[str, list[byte
                 for answer in answers:
                     client, _ = listener.accept()
                     clients.append(client)
-                    client.settimeout(5.0)
+                    client.settimeout(PATIENCE_S)
                     heard.append(client.recv(4096))
                     client.sendall(answer)
 
         server = threading.Thread(target=serve)
         server.start()
         yield host, heard
-        server.join(10.0)
+        server.join(PATIENCE_S)
     for client in clients:
         client.close()
 

@@ -16,6 +16,7 @@ from rig.motion.state import JointLimits
 from rig.turners.ur.driver import look
 from rig.turners.ur.primary import PORT, Account, read_account
 from rig.turners.ur.report import ArmSetup
+from support.waiting import PATIENCE_S
 from support.worlds import World
 
 HOST = "127.0.3.252"
@@ -72,7 +73,7 @@ def saying(*pieces: bytes) -> Iterator[None]:
         with client:
             for piece in pieces:
                 client.sendall(piece)
-            client.settimeout(5.0)
+            client.settimeout(PATIENCE_S)
             client.recv(1)
 
     with socket.create_server((HOST, PORT)) as listener:

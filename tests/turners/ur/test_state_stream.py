@@ -13,6 +13,7 @@ import pytest
 from rig.errors import Refused
 from rig.turners.ur.driver import look
 from rig.turners.ur.state_stream import HEADER, PACKET, PORT, VARIABLES, StateStream
+from support.waiting import PATIENCE_S
 from support.worlds import fresh_host
 
 TYPES = ",".join(VARIABLES.values()).encode()
@@ -65,7 +66,7 @@ class Controller:
         assert self._client is not None
         self._client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # nor is it waited for more to send at once
-        self._client.settimeout(2.0)
+        self._client.settimeout(PATIENCE_S)
 
     def hang_up(self) -> None:
         if self._client is not None:
@@ -73,7 +74,7 @@ class Controller:
 
     def close(self) -> None:
         self.hang_up()
-        self._server.join(5.0)
+        self._server.join(PATIENCE_S)
         self._listener.close()
 
 
