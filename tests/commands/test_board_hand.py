@@ -1,7 +1,6 @@
 """`rig board hand`: the board, a simulated operator on its table, and the answer held against double precision."""
 
 import json
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -164,8 +163,6 @@ def first_seconds(recorded: Recorded, lasts_s: float) -> Recorded:
 
 
 def test_nobody_to_agree_is_refused_before_anything_is_done() -> None:
-    began_s = time.monotonic()
     ended = rig_here("board", "hand", BY_HAND, "--write")
     assert ended.returncode == 2
-    assert "not_confirmed" in ended.stderr and "to do" not in ended.stderr
-    assert time.monotonic() - began_s < 5, "no laboratory was begun"
+    assert ended.stderr.startswith("rig: not_confirmed: "), "something was begun before"

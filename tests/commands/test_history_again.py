@@ -4,7 +4,6 @@ import argparse
 import csv
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from support.commands import rig_here
 from support.kept_recordings import certified, keep
 from support.past_runs import finished
 from support.paths import FIXTURES
+from support.waiting import alive, wait_for
 
 VERIFIED = FIXTURES / "verified"
 
@@ -122,9 +122,11 @@ def test_a_scheduler_that_is_killed_is_named_and_a_second_call_goes_on(history: 
     with killable_cluster(tmp_path) as (scheduler, address):
         command = [sys.executable, "-m", "rig", "history", "again", "--dask", address]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as again:
-            while not journal.exists() or journal.read_text(encoding="utf-8").count("\n") < 2:
-                assert again.poll() is None
-                time.sleep(0.02)
+
+            def two_are_done() -> bool:
+                return journal.exists() and journal.read_text(encoding="utf-8").count("\n") >= 2
+
+            wait_for(two_are_done, "two calibrations", meanwhile=alive(again))
             scheduler.kill()
             said, errors = again.communicate()
     assert again.returncode == 3 and "cluster_lost" in errors and "Traceback" not in errors

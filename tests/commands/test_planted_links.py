@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from firmware_host.emulator.flash_memory import FlashMemory
 from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
 from support.paths import FIXTURES
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started
 
 WRITTEN = ("certificate.html", "calibration.h", "result.json")
@@ -31,9 +30,7 @@ def run_with(links: Sequence[str], tmp_path: Path) -> tuple[int, str, list[Path]
     out = tmp_path / "run"
     command = ("run", configuration(tmp_path), "--out", out, "--yes")
     with started(*command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-        while not (out / "config.yaml").exists():
-            assert process.poll() is None, process.communicate()[1]
-            time.sleep(0.001)
+        wait_for((out / "config.yaml").exists, "the run's folder", meanwhile=alive(process))
         targets = [linked(out / name) for name in links]
         errors = process.communicate(timeout=PATIENCE_S)[1]
     return process.returncode, errors, targets

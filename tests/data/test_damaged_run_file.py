@@ -22,7 +22,7 @@ from rig.errors import Fault, Refused
 from support.as_nobody import as_nobody
 from support.full_disk import full_disk
 from support.paths import FIXTURES
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, alive, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
@@ -95,10 +95,8 @@ def test_a_recording_whose_reading_does_not_end_is_given_up(recording: Path) -> 
     data = bytearray(recording.read_bytes())
     data[11] |= 0x05  # as if its writer had been killed
     recording.write_bytes(data[:5000])
-    begun = time.monotonic()
     with pytest.raises(Refused, match="not_a_run_file"):
         read_run(recording, 1.0)
-    assert time.monotonic() - begun < 10
 
 
 @pytest.mark.thorough
@@ -137,9 +135,7 @@ def interrupted_while_it_reads(file: Path, *words: str | Path) -> None:
     command = [sys.executable, "-m", "rig", *map(str, words)]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
         try:
-            while not is_open_in(process.pid, file):
-                assert process.poll() is None
-                time.sleep(0.01)
+            wait_for(lambda: is_open_in(process.pid, file), "that it reads", meanwhile=alive(process))
             process.terminate()
             _, said = process.communicate(timeout=PATIENCE_S)
         finally:

@@ -19,7 +19,11 @@ SPARED = 10
 
 @contextmanager
 def process(code: str) -> Iterator[subprocess.Popen[bytes]]:
-    with subprocess.Popen([sys.executable, "-c", code]) as running:
+    """One that runs `code`, and has begun to."""
+    begun = "print(flush=True)\n"
+    with subprocess.Popen([sys.executable, "-c", begun + code], stdout=subprocess.PIPE) as running:
+        assert running.stdout is not None
+        running.stdout.readline()
         try:
             yield running
         finally:
@@ -34,8 +38,9 @@ def ticks_of(silence: Silence, number: int) -> int:
 
 
 def test_a_frozen_process_is_silent_in_every_tick() -> None:
-    with process("import time; time.sleep(60)") as frozen:
+    with process("import time; time.sleep(3600)") as frozen:
         frozen.send_signal(signal.SIGSTOP)
+        os.waitpid(frozen.pid, os.WUNTRACED)  # until it stands
         assert ticks_of(Silence(frozen.pid, spared=SPARED), 10) == 10
 
 
@@ -92,10 +97,9 @@ def test_ticks_in_which_the_process_waited_for_a_processor_do_not_count_for_ever
 def test_a_main_thread_that_hangs_is_silent_though_another_thread_waits_for_a_processor() -> None:
     """Like a driver whose client spins in a thread of its own: that says nothing for the thread that is waited for."""
     spinning = "import threading, time, zlib\ndef spin():\n while True: zlib.crc32(bytes(10**6))\n"
-    hanging = spinning + "threading.Thread(target=spin, daemon=True).start()\ntime.sleep(60)"
+    hanging = spinning + "threading.Thread(target=spin, daemon=True).start()\ntime.sleep(3600)"
     processor = min(os.sched_getaffinity(0))
     with process(hanging) as hung, process("while True: pass") as first, process("while True: pass") as second:
         for each in (hung, first, second):
             os.sched_setaffinity(each.pid, {processor})
-        time.sleep(0.5)  # the interpreter has started
         assert ticks_of(Silence(hung.pid, spared=SPARED, thread=hung.pid), 10) >= 8
