@@ -240,7 +240,7 @@ def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, th
             theirs.close()
             writers.append((process, ours, path))
         for _, pipe, _ in writers:
-            assert pipe.poll(20)  # it writes
+            assert pipe.poll(PATIENCE_S)  # it writes
         begun = time.monotonic()
         killed = {}
         for life, (process, _, path) in sorted(zip(batch_lives, writers, strict=True), key=lambda pair: pair[0]):

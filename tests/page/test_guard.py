@@ -6,7 +6,6 @@ import json
 import os
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,7 +23,7 @@ from rig.page.guard import Door
 from rig.page.page_state import Shown
 from rig.page.serving import Address, serving
 from rig.station.events import Prompt
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"
 
@@ -206,11 +205,16 @@ def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path
         feed.event(Prompt(("The arm will move.",), "start"))
         asked.start()
         wrong = asking("POST", "/answer", json.dumps({"number": 2, "agreed": True}))[0]
-        while (right := asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]) == 409:
-            time.sleep(0.01)
+        answers_right = [409]
+
+        def answered() -> bool:
+            answers_right.append(asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0])
+            return answers_right[-1] != 409
+
+        wait_for(answered, "that the question is there")
         asked.join(PATIENCE_S)
         again = asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]
-    assert (wrong, right, again, answers) == (409, 202, 409, [True])
+    assert (wrong, answers_right[-1], again, answers) == (409, 202, 409, [True])
 
 
 def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from support.waiting import PATIENCE_S
 from support.worlds import WorldHandle
 
 BEGIN = """
@@ -17,7 +18,7 @@ home = [0.0, -1.5707963, 1.5707963, -1.5707963, -1.5707963, 0.0]
 there = [*home[:5], 3.0]
 def say(*words): print("\\n>", *words, flush=True)  # ur_rtde may be in the middle of a line
 def until(condition):
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + patience_s
     while not condition():
         if time.monotonic() > end: say("waited in vain"); os._exit(1)
         time.sleep(0.002)
@@ -29,7 +30,13 @@ class Client:
     """A script around ur_rtde in its own process; what it says comes line by line."""
 
     def __init__(self, host: str, script: str, connect: bool) -> None:
-        code = BEGIN + (CONNECT if connect else "") + textwrap.dedent(script) + "\nos._exit(0)\n"
+        code = (
+            f"patience_s = {PATIENCE_S}\n"
+            + BEGIN
+            + (CONNECT if connect else "")
+            + textwrap.dedent(script)
+            + "\nos._exit(0)\n"
+        )
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, host], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         )

@@ -18,8 +18,7 @@ from support.paths import DEMO
 from support.waiting import PATIENCE_S
 from support.warm import started
 
-START_TIMEOUT_S = 20.0
-REPLY_TIMEOUT_S = 30.0
+END_S = 30.0  # that a world is given to end, before it is made to
 
 # What `world` makes of demo.yaml with this: a calibration beside a reference, and its verification, in few seconds.
 QUICK_EXPERIMENT: dict[str, Any] = {
@@ -73,7 +72,7 @@ class WorldHandle:
         self.board_port: str = ready["board"]
         self.pty: str | None = ready["pty"]
         host, port = str(ready["control"]).rsplit(":", 1)
-        self._socket = socket.create_connection((host, int(port)), REPLY_TIMEOUT_S)
+        self._socket = socket.create_connection((host, int(port)), PATIENCE_S)
         self._replies = self._socket.makefile("rb")
 
     def control(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -93,7 +92,7 @@ class WorldHandle:
         assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.close()
         try:
-            self.process.wait(PATIENCE_S)
+            self.process.wait(END_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -124,7 +123,7 @@ def worlds(folder: Path) -> Iterator[World]:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
-            assert line, f"the world of {config_path} did not start, exit status {process.wait(START_TIMEOUT_S)}"
+            assert line, f"the world of {config_path} did not start, exit status {process.wait(PATIENCE_S)}"
             description = json.loads(line)
             assert description["ready"], description
             handle = WorldHandle(config_path, process, description)

@@ -3,7 +3,6 @@
 import socket
 import struct
 import threading
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 
@@ -112,10 +111,8 @@ def test_a_state_newer_than_the_stop_tells_whether_a_program_runs(states: Sequen
 @pytest.mark.parametrize("states", [b"", state(False), b"Connected: Universal Robots Dashboard Server\n"])
 def test_a_primary_interface_that_does_not_tell_confirms_no_stop(states: bytes) -> None:
     with saying(PRIMARY_PORT, [states]) as (host, _):
-        began_s = time.monotonic()
         order = Order(host, independent_ways((10, 12, 0, 0)), 0.5)
         assert not order.program_ended()
-        assert time.monotonic() - began_s < 5.0
     assert order.words == "the controller was told to stop"
 
 
