@@ -9,12 +9,13 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 from typing import Any, Protocol
 
+from rig.page.arrivals import Arrivals
 from rig.page.page_state import Shown
 from rig.page.rows import Look
-from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent
+from rig.station.events import RunEvent
 
 FRAME_S = 0.1
 SIGN_OF_LIFE_S = 0.8  # without news: a browser that hears nothing for 2 s says so
@@ -34,22 +35,22 @@ class Source(Protocol):
 
 
 class Feed:
-    """What is shown, between two threads; a listener of the run's events."""
+    """What is shown, between two threads; a listener of the run's events. Every frame tells how old it all is."""
 
-    def __init__(self, shown: Shown) -> None:
-        self._shown = shown
+    def __init__(self, shown: Shown, now: Callable[[], float] = time.monotonic) -> None:
+        self._shown, self._now = shown, now
+        self._arrivals = Arrivals()
         self._lock = threading.Lock()
         self._sent = 0  # points that were in a frame
-        self._seen_s: float | None = None  # when the arm was seen last, with the readings
-        self._seen_at = ""  # … by this computer's clock, for people
+        self._seen_at = ""  # when anything came last, by this computer's clock, for people
 
     def event(self, event: RunEvent) -> None:
         """Take an event, as a Listener does: it changes what is shown, waits for nobody."""
         with self._lock:
             before = self._shown.ended
             self._shown.take(event)
-            if isinstance(event, ArmSeen | ArmConnected | HandSeen):
-                self._seen_s, self._seen_at = time.monotonic(), _clock()
+            if self._arrivals.take(event, self._now()):
+                self._seen_at = _clock()
             if self._shown.ended and not before:
                 self._shown.put("ended", {"at": _clock(), "seen_at": self._seen_at})
 
@@ -66,9 +67,8 @@ class Feed:
     def whole(self) -> bytes:
         """Everything, for a browser that has nothing yet."""
         with self._lock:
-            age_s = None if self._seen_s is None else round(time.monotonic() - self._seen_s, 1)
             points = self._shown.history.since(0)
-            return frame_of("all", {**self._shown.sections, "points": points, "age_s": age_s})
+            return frame_of("all", {**self._shown.sections, "points": points, "age_s": self._ages_s()})
 
     def news(self) -> bytes | None:
         """What has changed since the last time, None if nothing has."""
@@ -79,7 +79,10 @@ class Feed:
                 return None
             points = shown.history.since(self._sent)
             self._sent = shown.history.end
-        return frame_of("some", {**changed, "points": points})
+            return frame_of("some", {**changed, "points": points, "age_s": self._ages_s()})
+
+    def _ages_s(self) -> dict[str, float]:
+        return self._arrivals.ages_s(self._now())
 
 
 class Mailbox:

@@ -3,14 +3,20 @@
 import asyncio
 import json
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from rig.motion.state import JointState, Report
 from rig.page.feed import Broadcast, Feed, Mailbox
 from rig.page.history import POINTS, STEP_S
 from rig.page.page_state import Shown
-from rig.station.events import ArmSeen, SamplesTaken, SensorSamples
-from support.told_runs import ABOUT, before_it_moves, judged, look, moving, planned, state
+from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
+from rig.turners.registry import installed
+from support.told_runs import ABOUT, before_it_moves, judged, look, moving, planned, report, state
 
 
 def fed() -> Feed:
@@ -46,6 +52,46 @@ def test_the_arm_is_named_as_it_was_found() -> None:
         feed.event(event)
     arm = read(feed.whole())[1]["arm"]
     assert arm["model"] == "UR10e or UR12e" and arm["serial_number"] == "20225500001"
+
+
+HAND = installed()["hand"]
+AT_HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
+# How a turner is connected, how it is seen then, and what has an age before the first sample.
+TURNERS: dict[str, tuple[Report, Callable[[float], RunEvent], dict[str, float]]] = {
+    "arm": (report((0.0,) * 6), lambda time_s: ArmSeen(state(time_s, (0.0,) * 6, (0.0,) * 6), 0), {"arm": 47.0}),
+    "servo": (
+        replace(report((0.0,)), state=JointState(0.0, 0.0, (0.1,), (0.0,))),
+        lambda time_s: ArmSeen(JointState(time_s, 0.0, (0.1,), (0.0,)), 0),
+        {"arm": 47.0},
+    ),
+    "hand": (HAND.look(HAND.section()), lambda _: AT_HAND, {}),
+}
+
+
+@pytest.mark.parametrize("turner", TURNERS)
+@pytest.mark.parametrize("sensor", ["gyro", "lines"])
+def test_what_arrives_has_the_age_of_its_last_arrival_whatever_turns_and_reads(turner: str, sensor: str) -> None:
+    connected, seen, at_first = TURNERS[turner]
+    now_s = [100.0]
+    feed = Feed(Shown(ABOUT), lambda: now_s[0])
+
+    def comes(number: int) -> None:
+        feed.event(SamplesTaken((SensorSamples(sensor, 10 * number, 0, {"rate": (0.0, 0.0, 0.0)}),)))
+        feed.event(seen(number * STEP_S))
+
+    feed.event(ArmConnected(connected))
+    now_s[0] += 47.0
+    assert read(feed.whole())[1]["age_s"] == at_first
+    comes(1)
+    now_s[0] += 0.5
+    comes(2)
+    now_s[0] += 0.3
+    assert read(feed.news())[1]["age_s"] == dict.fromkeys([*at_first, "readings"], 0.3)
+    now_s[0] += 4.0
+    comes(2)  # it is told again, but nothing has come
+    assert (
+        read(feed.news())[1]["age_s"] == dict.fromkeys([*at_first, "readings"], 4.3) == read(feed.whole())[1]["age_s"]
+    )
 
 
 def test_a_minute_is_kept_and_no_more() -> None:

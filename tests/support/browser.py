@@ -15,6 +15,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
 from support.paths import ROOT
+from support.waiting import PATIENCE_S
 
 PICTURES = ROOT / "build" / "page"
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -71,6 +72,9 @@ def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[C
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = Chrome(options=options, service=Service(DRIVER))
+    driver.command_executor.client_config.timeout = int(PATIENCE_S)
+    driver.set_page_load_timeout(PATIENCE_S)
+    driver.set_script_timeout(PATIENCE_S)
     try:
         set_theme(driver, dark=dark)
         yield driver

@@ -20,7 +20,7 @@ from rig.page.feed import Feed
 from rig.page.page_state import Shown
 from rig.page.rows import Look
 from rig.page.serving import Address, serving
-from rig.station.events import ArmSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
+from rig.station.events import ArmSeen, HandSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
 from support.browser import text
 from support.told_runs import ABOUT, before_it_moves, look, moving, planned
 from support.waiting import wait_for
@@ -32,23 +32,28 @@ GOING_ON = (StepStarted, StepFinished, Progress, SamplesTaken)
 class Telling:
     """Events for a page in a browser, and the words it must show then.
 
-    The last place of an arm that moves is told again and again, as a run does, until it falls `silent`.
+    As of a run that goes on, newer samples and states come again and again after an arm that moves or a hand was seen,
+    until all falls `silent`, or the last ones are only `repeating`, which brings nothing new.
     """
 
     def __init__(self, driver: Chrome, feed: Feed) -> None:
         self._driver, self._feed = driver, feed
         self._telling = threading.Lock()
-        self._last: ArmSeen | None = None
-        self.silent = threading.Event()
+        self._samples: SamplesTaken | None = None
+        self._seen: ArmSeen | HandSeen | None = None
+        self.times = 0  # that newer ones came
+        self.silent, self.repeating = threading.Event(), threading.Event()
 
     def __call__(self, *events: Any) -> None:
         with self._telling:
             for event in events:
                 self._feed.event(event)
-                if isinstance(event, ArmSeen) and isinstance(event.state, ArmState):
-                    self._last = event if event.state.runtime_state == RuntimeState.PLAYING else None
+                if isinstance(event, SamplesTaken):
+                    self._samples = event
+                elif isinstance(event, ArmSeen | HandSeen):
+                    self._seen = event if goes_on(event) else None
                 elif not isinstance(event, GOING_ON):
-                    self._last = None
+                    self._seen = None
 
     def look(self, sweeps: int) -> None:
         self._feed.look(look(planned(), sweeps))
@@ -65,8 +70,37 @@ class Telling:
     def go_on(self) -> None:
         while not self.silent.wait(AGAIN_S):
             with self._telling:
-                if self._last is not None:
-                    self._feed.event(self._last)
+                if self._seen is None:
+                    continue
+                if not self.repeating.is_set():
+                    self._seen, self._samples = later(self._seen), more(self._samples)
+                    self.times += 1
+                for event in filter(None, (self._samples, self._seen)):
+                    self._feed.event(event)
+
+
+def goes_on(seen: ArmSeen | HandSeen) -> bool:
+    """Whether more is to come: the program of an arm plays, a servo is held, a hand always may move."""
+    return not (
+        isinstance(seen, ArmSeen)
+        and isinstance(seen.state, ArmState)
+        and seen.state.runtime_state != RuntimeState.PLAYING
+    )
+
+
+def later(seen: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
+    """The same a moment later."""
+    if isinstance(seen, HandSeen):
+        return replace(seen, time_s=seen.time_s + AGAIN_S)
+    state: Any = seen.state
+    return replace(seen, state=replace(state, time_s=state.time_s + AGAIN_S))
+
+
+def more(samples: SamplesTaken | None) -> SamplesTaken | None:
+    """Of each sensor one more that reads the same."""
+    if samples is None:
+        return None
+    return SamplesTaken(tuple(replace(each, samples=each.samples + 1) for each in samples.sensors))
 
 
 @contextmanager

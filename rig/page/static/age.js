@@ -6,7 +6,7 @@ const TELLING = ["moving", "measuring", "resting"]; // states in which the arm i
 
 const now = () => performance.now();
 let heard = now(); // anything
-let news = null; // the arm and its readings
+const came = { arm: null, readings: null }; // when the newest did
 let up = false;
 
 /** The line is up or down. */
@@ -20,20 +20,19 @@ export function hear() {
   heard = now();
 }
 
-/** A frame came: all of it, with the arm as it was seen `age_s` before (null: never), or what has changed. */
-export function take(name, frame) {
-  if (name !== "all") news = frame.arm?.q_rad ? now() : news;
-  else news = typeof frame.age_s === "number" ? now() - 1000 * frame.age_s : null;
+/** A frame came: it says how old the arm's newest state and the newest readings are, s, if there are any. */
+export function take({ age_s: ages }) {
+  for (const what of Object.keys(came)) came[what] = typeof ages[what] === "number" ? now() - 1000 * ages[what] : null;
 }
 
-/** What to say of it all: `lost` seconds without news that should have come (0: none), the readings' age in words ("": now). */
+/** What to say of it all: `lost` seconds without news that should have come (0: none), in words how old what is shown is ("": of now). */
 export function age(shown) {
   const kind = shown.state?.kind;
   if (ENDED.includes(kind)) return { over: true, lost: 0, words: shown.about?.replayed ? "as recorded last" : ended(shown.ended) };
   const missed = [now() - heard];
-  if (news !== null && TELLING.includes(kind) && !shown.about?.replayed) missed.push(now() - news);
+  if (came.arm !== null && TELLING.includes(kind) && !shown.about?.replayed) missed.push(now() - came.arm);
   const silent = Math.max(...missed);
-  const old = news === null ? 0 : now() - news;
+  const old = Math.max(0, ...Object.values(came).filter((when) => when !== null).map((when) => now() - when));
   return {
     over: false,
     lost: silent > STALE_MS || (!up && shown.state) ? Math.max(1, Math.floor(silent / 1000)) : 0,

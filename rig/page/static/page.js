@@ -175,9 +175,10 @@ function tell() {
 const redraw = () => readings.redraw(shown.sensors, past);
 
 function take(name, news) {
-  aged(name, news);
+  aged(news);
   readings.add(name, news.points);
   delete news.points;
+  delete news.age_s;
   Object.assign(shown, news);
   tell();
   for (const [section, value] of Object.entries(news)) if (value !== undefined) SHOW[section]?.(value);

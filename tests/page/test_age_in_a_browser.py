@@ -1,0 +1,131 @@
+"""The page in a real browser says how old readings are, and of those that arrive nothing, whatever turns and reads."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+
+from rig.config.load import load
+from rig.motion.state import JointState, Report
+from rig.motion.steps import Plan
+from rig.page.about import About
+from rig.page.arm import built
+from rig.station.events import ArmConnected, ArmSeen, HandSeen, PhaseStarted, RunEvent, SamplesTaken, SensorSamples
+from rig.turners.registry import installed, kind_of, sections
+from support.browser import needs_browser, picture
+from support.command_with_a_page import with_a_page
+from support.commands import configuration
+from support.paths import CONFIGS
+from support.servo_runs import configured
+from support.told_page import showing
+from support.told_runs import report, state
+from support.waiting import alive, wait_for
+from support.worlds import fresh_host, merge
+
+pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
+
+HOME = (0.0,) * 6
+HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
+ARM_SEEN, SERVO_SEEN = state(1.0, HOME, HOME), JointState(1.0, 1.0, (0.1,), (0.0,))
+# A configuration whose turner turns, what reads, how the turner is connected, and how it is seen then.
+TURNERS: dict[str, tuple[str, str, Report, RunEvent]] = {
+    "arm": ("demo.yaml", "lsm9ds1", report(HOME), ArmSeen(ARM_SEEN, 0)),
+    "servo": ("servo.yaml", "lsm9ds1", replace(report((0.0,)), state=SERVO_SEEN), ArmSeen(SERVO_SEEN, 0)),
+    "hand": ("by_hand.yaml", "lsm9ds1", installed()["hand"].look(installed()["hand"].section()), HAND),
+    "lines": ("by_hand.yaml", "lines", installed()["hand"].look(installed()["hand"].section()), HAND),
+}
+WATCHED_MS = 4000  # twice what the page takes for old
+# From now on keeps what is said to be older than the last change of the number of samples, which stands beside it.
+WATCH = """
+window.tooOld = [];
+let changed = performance.now();
+new MutationObserver(() => { changed = performance.now(); })
+  .observe(document.getElementById("samples"), { subtree: true, childList: true, characterData: true });
+setInterval(() => {
+  const since = (performance.now() - changed) / 1000;
+  for (const each of document.querySelectorAll(".plot .age")) {
+    const said = Number(each.textContent.match(/(\\d+) s ago/)?.[1] ?? 0);
+    if (said > since + 1.5) window.tooOld.push(`${said} s ago, ${since.toFixed(1)} s after samples came`);
+  }
+}, 100);
+return performance.now();
+"""
+
+
+def ages(driver: Chrome) -> list[str]:
+    """How old the page says that the readings are, and whether they are of now."""
+    shown = driver.find_elements(By.CSS_SELECTOR, ".plot .age")
+    plots = driver.find_elements(By.CSS_SELECTOR, ".plot canvas")
+    labels = [(plot.get_attribute("aria-label") or "").partition("; ")[2] for plot in plots]
+    return [*(each.text for each in shown), *("" if label.startswith("now ") else label for label in labels)]
+
+
+def of_now(driver: Chrome) -> bool:
+    found = ages(driver)
+    return bool(found) and not any(found)
+
+
+@pytest.mark.parametrize("what", TURNERS)
+def test_readings_that_arrive_are_of_now_and_those_told_again_are_not(
+    driver: Chrome, tmp_path: Path, what: str
+) -> None:
+    config, part, connected, seen = TURNERS[what]
+    turner = load(CONFIGS / config, turners=sections()).config.turner
+    arm = built(kind_of(turner).meant(turner).kinematics)
+    about = About("runs/age", "a procedure", parts={"gyro": f"{part} AGE-1"}, arm=arm)
+    samples = SamplesTaken((SensorSamples("gyro", 10, 0, {"rate": (0.1, 0.0, 0.0)}),))
+    with showing(driver, tmp_path, about=about) as tell:
+        tell(ArmConnected(connected), PhaseStarted("a procedure", Plan((), (), ()), {"gyro": "raw"}), samples, seen)
+        wait_for(lambda: tell.times > 15, "three seconds of readings")
+        wait_for(lambda: of_now(driver), "that they are of now")
+        tell.repeating.set()
+        wait_for(lambda: any(re.search(r"\d s ago", each) for each in ages(driver)), "their age")
+        picture(driver, f"age-{what}")
+
+
+def by_hand(folder: Path) -> Path:
+    """configs/by_hand.yaml at an address of its own, without haste."""
+    return written(folder, "by_hand.yaml", {"board": {"port": f"socket://{fresh_host()}:7321"}}, 4)
+
+
+def of_lines(folder: Path) -> Path:
+    """configs/lines.yaml so."""
+    host = fresh_host()
+    port = {"serial": {"port": f"socket://{host}:7341"}}
+    return written(folder, "lines.yaml", {"arm": {"host": host}, "sensors": {"imu": port}}, 2)
+
+
+def written(folder: Path, name: str, changes: dict[str, Any], time_scale: float) -> Path:
+    document = yaml.safe_load(load(CONFIGS / name, turners=sections()).text)
+    path = folder / name
+    path.write_text(yaml.safe_dump(merge(merge(document, changes), {"world": {"time_scale": time_scale}})))
+    return path
+
+
+RUNS: dict[str, Callable[[Path], Path]] = {
+    "hand": by_hand,
+    "lines": of_lines,
+    "servo": configured,
+    "arm": lambda folder: configuration(folder, {"world": {"time_scale": 2}}),
+}
+
+
+@pytest.mark.one_in(4)
+@pytest.mark.parametrize("what", RUNS)
+def test_while_a_run_goes_on_its_readings_are_of_now(driver: Chrome, tmp_path: Path, what: str) -> None:
+    command = ("run", RUNS[what](tmp_path), "--out", tmp_path / "run", "--yes", "--page")
+    with with_a_page(tmp_path / "told.txt", *command, "--page-address", "127.0.0.1:0") as (process, url):
+        driver.get(url)
+        wait_for(lambda: driver.find_elements(By.CSS_SELECTOR, ".plot canvas"), "readings", meanwhile=alive(process))
+        began_ms = driver.execute_script(WATCH)
+        late = "return performance.now() > arguments[0]"
+        wait_for(lambda: driver.execute_script(late, began_ms + WATCHED_MS), "that it is not the first moment")
+        wait_for(lambda: of_now(driver), "that they are of now", meanwhile=alive(process))
+        assert driver.execute_script("return window.tooOld") == []
+        driver.get("about:blank")
