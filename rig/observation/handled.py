@@ -15,10 +15,11 @@ from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled, Move, Rest
 from rig.observation.rests import find_rests
+from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
 
 MARGIN_S = 0.1  # of a rest at either end that belongs to the moves beside it
-GAP = 2.5  # intervals
+GAP = 2  # readings that are missing
 AT_THE_TOP = 3  # readings in a row that are the same, and the largest
 NEAR_RANGE = 0.995
 FIRST_S, STILL_RAD_S = 1.0, 0.03  # a hand that holds it as still as it can
@@ -30,11 +31,11 @@ def handled(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> Handled:
     """The session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` where it is known."""
-    windows = find_rests(time_s, {RATE: rates}, _began_still(time_s, rates)) if len(time_s) > 1 else ()
+    windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
     top = _at_the_top(rates, range_rad_s)
-    steps_s = np.diff(time_s)
-    gaps = np.append(steps_s > GAP * np.median(steps_s), False) if len(steps_s) else np.zeros(len(time_s), np.bool_)
+    lost = find_sampling(time_s).gaps(time_s, GAP) if len(time_s) > 1 else np.zeros(0, np.bool_)
+    gaps = np.append(lost, False)[: len(time_s)]
     moves = []
     for first, second in pairwise(windows):
         start_s, end_s = first.end_s - _margin(first), second.start_s + _margin(second)
@@ -86,7 +87,7 @@ def _held(time_s: Array, rates: Array, rests: tuple[Rest, ...]) -> tuple[tuple[f
     """When the body was in one place and did not lie: it turned too little for a move, and too much for a rest."""
     if not rests:
         return ()
-    width = max(2, int(np.ceil(PAUSE_S / np.median(np.diff(time_s)))))
+    width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s)))
     count = len(time_s) // width
     bias = np.median([rest.mean_rad_s for rest in rests], axis=0)
     blocks = (rates[: count * width] - bias).reshape(count, width, 3)

@@ -8,17 +8,16 @@ import numpy as np
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.sampling import find_sampling
 
 BLOCK_S = 1.0
 BEYOND = 6.0  # standard deviations of the noise of a difference
 NORMAL = 1.4826  # standard deviation over median deviation
-GAP = 1.5  # intervals: one reading is missing
 
 
 def whole_stretches(time_s: Array) -> Iterator[slice]:
     """The rows between the gaps of a log with increasing times (n,)."""
-    steps_s = np.diff(time_s)
-    gaps = 1 + np.flatnonzero(steps_s > GAP * np.median(steps_s))
+    gaps = 1 + np.flatnonzero(find_sampling(time_s).gaps(time_s))
     yield from (slice(start, end) for start, end in pairwise([0, *gaps.tolist(), len(time_s)]))
 
 
