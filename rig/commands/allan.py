@@ -13,7 +13,7 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.analysis.at_rest import SensorAtRest
 
-CSV = ".csv"
+CSV = (".csv", ".csv.gz")
 
 
 def add(parser: ArgumentParser) -> None:
@@ -48,8 +48,12 @@ def run(options: Namespace) -> int:
 def _logs(path: Path) -> list[Path]:
     """A log, or those in a folder that `rig record` wrote; none of a run."""
     if path.is_dir() and not any(path.glob("*.h5")):
-        return sorted(path.glob(f"*{CSV}"))
-    return [path] if path.suffix.lower() == CSV else []
+        return sorted(each for each in path.iterdir() if _is_log(each))
+    return [path] if _is_log(path) else []
+
+
+def _is_log(path: Path) -> bool:
+    return path.name.lower().endswith(CSV)
 
 
 def _of_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.named_history import add_history, named_history
 from rig.errors import Refused, raised_as
+from rig.errors.quoting import shorten
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.station.plain_text import say
 
@@ -31,6 +32,14 @@ def add(solve: ArgumentParser) -> None:
         help="what stands where in the files, where their columns have names and units of their own",
     )
     group.add_argument("--out", type=Path, metavar="DIR", help="a new run folder for result, certificate, pictures")
+    group.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="SENSOR",
+        help="calibrate this sensor alone of those whose readings the file holds: gyroscope, accelerometer, "
+        "magnetometer; may be given more than once",
+    )
     add_history(group)
     group.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
     group.add_argument("--part", metavar="PART", help="which part it is")
@@ -138,6 +147,7 @@ def _recording(options: Namespace) -> "RunData":
         raise Refused(
             "bad_option", "--reference-c is for sweeps that were repeated at several temperatures", "Give --sweeps"
         )
+    only = _only(options)
     sign, axis = options.up
     x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
     said = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
@@ -171,10 +181,27 @@ def _recording(options: Namespace) -> "RunData":
             exact_rates=options.exact_rates,
             window_s=options.window_s,
             estimator=options.estimator,
+            only=only,
         ),
         second_order=options.second_order,
         reference_c=options.reference_c,
     )
+
+
+def _only(options: Namespace) -> tuple[str, ...]:
+    """The sensors to calibrate, all where nothing is said. Raises Refused `bad_option`."""
+    from rig.data.installed_kinds import quantities
+    from rig.data.quantity import RATE
+
+    known = [each.sensor for each in quantities().values()]
+    allowed = known if options.attitudes is not None else [RATE.sensor]
+    if wrong := [each for each in options.only if each not in allowed]:
+        raise Refused(
+            "bad_option",
+            f"--only {shorten(wrong[0])} is none of the sensors that are calibrated here",
+            f"Give one of: {', '.join(allowed)}",
+        )
+    return tuple(dict.fromkeys(options.only))
 
 
 def _columns(path: Path | None) -> "ColumnMap":

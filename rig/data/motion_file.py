@@ -114,13 +114,16 @@ class Item:
 class ReadElsewhere:
     """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes that tell its `motion`, by column.
 
-    Of "turns" by hand the readings tell it: then there is one row, of what somebody said beside.
+    Of "turns" by hand the readings tell it: then there is one row, of what somebody said beside. Times count from
+    `origin_s` of the files' clock. `other_rows` of the readings' file hold readings of other sensors alone.
     """
 
     item: Item
     readings: Columns
     tells: Told
     motion: Columns
+    origin_s: int = 0
+    other_rows: int = 0
 
     @property
     def sensor(self) -> RecordedSensor:
@@ -153,7 +156,9 @@ class ReadElsewhere:
 
 @dataclass(frozen=True, slots=True)
 class ToldElsewhere:
-    """What a run file says of readings from elsewhere beside their tables."""
+    """What a run file says of readings from elsewhere beside their tables, as `ReadElsewhere` does."""
 
     item: Item
     tells: Told
+    origin_s: int = 0
+    other_rows: Annotated[int, Field(ge=0)] = 0

@@ -247,7 +247,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
     assert read is not None, "of readings from elsewhere"
     provenance = json.dumps(run.provenance.document())
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
-    texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells)))
+    texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells, read.origin_s, read.other_rows)))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
     lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
 
@@ -376,7 +376,7 @@ def _elsewhere(contents: Contents) -> ReadElsewhere:
     told = checked(ToldElsewhere, parsed(contents.texts["elsewhere"]), "elsewhere")
     samples_header().check(readings)
     MOTIONS[told.tells].check(motion)
-    return ReadElsewhere(told.item, readings, told.tells, motion)
+    return ReadElsewhere(told.item, readings, told.tells, motion, told.origin_s, told.other_rows)
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:

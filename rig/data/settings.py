@@ -132,6 +132,7 @@ class Elsewhere:
     - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as a rate table's
       are; `window_s`: over which attitudes are averaged for a gyroscope's increments, None for what suits.
     - `estimator`: the one that was asked for, None for the one that suits each quantity.
+    - `only`: the sensors to calibrate, as their quantities call them, all that were recorded where there are none.
     """
 
     any_mounting: bool = False
@@ -139,6 +140,7 @@ class Elsewhere:
     exact_rates: bool = False
     window_s: Positive | None = None
     estimator: str | None = None
+    only: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

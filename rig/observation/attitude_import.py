@@ -15,7 +15,7 @@ Where the table wrote its attitudes by a clock of its own, the samples' is found
 board's is on the arm (`rig.observation.timebase`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -29,10 +29,22 @@ from rig.errors import Fault, Refused, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import MIN_SAMPLES, check_complete, overlapping, scatter_of
+from rig.observation.csv_windows import (
+    MIN_SAMPLES,
+    check_complete,
+    check_overlap,
+    check_scattered,
+    clocks_apart,
+    is_complete,
+    overlapping,
+    scatter_of,
+)
 from rig.observation.fixes import Turning
-from rig.observation.placements import Placements, find_placements
+from rig.observation.omitted import Omitted
+from rig.observation.placement_account import AttitudeRows
+from rig.observation.placements import MOSTLY, Placements, find_placements
 from rig.observation.sample_files import attitudes_in
+from rig.observation.sampling import find_sampling
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window, inside
@@ -65,7 +77,9 @@ class PlacedReadings:
     """What the two files tell of the `quantities` that were recorded.
 
     A gyroscope's `rows`, and in `turning` its own readings and all rows, for what is solved from how far the body
-    turned; for the other sensors `placements`, or why there are none. `clock` where it had to be found.
+    turned; for the other sensors `placements`, or why there are none. `clock` where it had to be found. `omitted` are
+    rows that the recording does not cover, `incomplete` those that tell no mean rate, `unsampled` those that tell no
+    placement, for samples are missing in them.
     """
 
     quantities: tuple[Quantity, ...]
@@ -73,54 +87,74 @@ class PlacedReadings:
     turning: Turning | None
     placements: Placements | Fault | None
     clock: TimeBase | None = None
+    omitted: tuple[Omitted, ...] = ()
+    incomplete: tuple[Omitted, ...] = ()
+    unsampled: tuple[Omitted, ...] = ()
 
 
-def read_attitudes(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
+def read_attitudes(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
     """The columns (N,) of a file of attitudes, in whichever format it is; `mapped` where its columns are others'.
 
+    Times of a table of text count from `origin_s`.
     Raises as `attitudes_in`; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     found = attitudes_in(path)
-    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped) if found is None else dict(found)
+    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped, origin_s) if found is None else dict(found)
 
 
 def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
     """Samples averaged in attitudes, given by the columns of their file.
 
     With `find_clock` each has its own clock; rows that no sample covers are left out. Raises Refused `bad_quaternion`,
-    `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`, and with `find_clock` as
-    `TableMotion` and `estimate_time_base`.
+    `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`, `too_few_observations`, and with
+    `find_clock` as `TableMotion` and `estimate_time_base`.
     """
     time_s, readings = samples.time_s, samples.readings
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
-    said = _Said(_windows(table), _rotations(table), rates, _stated(table))
+    windows = _windows(table)
+    given = said = _Said(windows, _rotations(table), rates, _stated(table), np.arange(1, len(windows) + 1))
     clock = None
     if find_clock:
         _check_has_rates(readings)
         clock = estimate_time_base(time_s, readings[RATE], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates))
         time_s = clock.controller_time_s(time_s)
         said = said.of(np.flatnonzero((said.rows_s[:, 0] >= time_s[0]) & (said.rows_s[:, 1] <= time_s[-1])))
+    if not said.windows:
+        raise clocks_apart(time_s, windows)
+    check_overlap(time_s, said.windows)
+    sampling = find_sampling(time_s)
+    check_scattered(sampling)
+    expected = sampling.expected(time_s, said.rows_s)
     counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
-    whole = said.of(_whole(said.windows, counts.tolist(), float(np.median(np.diff(time_s)))))
+    sampled = said.of(np.flatnonzero((counts > 0) & (counts >= MOSTLY * expected - 1)))
+    whole = said.of(_whole(said, counts, expected))
     rate = readings.get(RATE)
-    place = partial(find_placements, time_s, readings, whole.windows, whole.attitudes, whole.std_rad)
+    rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
+    place = partial(find_placements, time_s, readings, rows)
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
         None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
         None if set(readings) == {RATE} else or_fault(place),  # a gyroscope needs none
         clock,
+        tuple(_omitted(given, said, "the recording does not cover them")),
+        tuple(_omitted(said, whole, "lost_samples: samples are missing in them")),
+        tuple(_omitted(said, sampled, "lost_samples: half of their samples or more are missing")),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given."""
+    """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given.
+
+    `numbers` (N,) are theirs in the file, from 1.
+    """
 
     windows: list[Window]
     attitudes: Array
     rates_rad_s: Array | None
     std_rad: Array | None
+    numbers: NDArray[np.intp]
 
     @property
     def rows_s(self) -> Array:
@@ -128,7 +162,14 @@ class _Said:
 
     def of(self, rows: NDArray[np.intp]) -> "_Said":
         rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
-        return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std)
+        return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+
+
+def _omitted(given: _Said, kept: _Said, reason: str) -> Iterator[Omitted]:
+    """The rows that were given and not kept, if there are any."""
+    if lost := np.setdiff1d(given.numbers, kept.numbers).tolist():
+        window = given.windows[given.numbers.tolist().index(lost[0])]
+        yield Omitted("rows", len(lost), len(given.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")
 
 
 def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
@@ -146,20 +187,19 @@ def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
     )
 
 
-def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) -> NDArray[np.intp]:
-    """The rows whose samples are there. Raises Fault `lost_samples`: a short row among many may fall into a gap."""
-    whole = []
-    for row, (window, count) in enumerate(zip(windows, counts, strict=True)):
-        try:
-            check_complete(count, window, interval_s, f"attitude {row + 1}", least=1)
-        except Fault:
-            if window.end_s - window.start_s >= MIN_SAMPLES * interval_s:
-                raise
-        else:
-            whole.append(row)
-    if not whole:
-        check_complete(counts[0], windows[0], interval_s, "attitude 1", least=1)
-    return np.array(whole)
+def _whole(said: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
+    """The rows whose samples are there.
+
+    Raises Fault `lost_samples` where there is none, or where more of the long ones lack samples than have them all: a
+    short row among many may fall into a gap.
+    """
+    whole = np.array([is_complete(*each, least=1) for each in zip(counts.tolist(), expected.tolist(), strict=True)])
+    long = expected >= MIN_SAMPLES
+    if not whole.any() or 2 * int((long & ~whole).sum()) > int(long.sum()):
+        row = int(np.argmin(whole))
+        where = f"attitude {said.numbers[row]}"
+        check_complete(int(counts[row]), float(expected[row]), said.windows[row], where, least=1)
+    return np.flatnonzero(whole)
 
 
 def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:

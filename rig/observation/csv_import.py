@@ -14,7 +14,7 @@ A row with an angle at both ends of which the body lay still is solved by how fa
 Columns may stand in any order; the first row holds their names.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,8 +28,18 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import Mapped, read_columns
-from rig.observation.csv_windows import average_of, check_complete, check_reads, check_times, overlapping
+from rig.observation.csv_windows import (
+    average_of,
+    check_complete,
+    check_overlap,
+    check_reads,
+    check_scattered,
+    check_times,
+    overlapping,
+)
 from rig.observation.observe import Observation, nearest_axis
+from rig.observation.omitted import Omitted
+from rig.observation.sampling import Sampling, find_sampling
 from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window, inside
 
@@ -45,17 +55,24 @@ class ExternalData:
     """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was.
 
     `at_reference`: taken to one temperature by polynomials, which count what repeats contradict each other by.
+    `by_mean`: the numbers of the rows with an angle whose mean speed is all that counts, for the body did not lie still
+    before or after. `omitted`: the readings that are missing in the rows.
     """
 
     sweeps: tuple[Observation, ...]
     rests: tuple[Average, ...]
     turned: TurnedData | None = None
     at_reference: bool = False
+    by_mean: tuple[int, ...] = ()
+    omitted: tuple[Omitted, ...] = ()
 
 
-def read_sweeps(path: Path, mapped: Mapped | None = None) -> dict[str, Array]:
-    """The columns (k,) of a file of sweeps. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`."""
-    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB, mapped)
+def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
+    """The columns (k,) of a file of sweeps, times from `origin_s` on.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    """
+    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB, mapped, origin_s)
 
 
 def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
@@ -73,15 +90,18 @@ def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
     if "angle_rad" not in sweeps:
         return found
     known = Known(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
-    return replace(found, turned=turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests))
+    by_angle = turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests)
+    solved = () if by_angle is None else by_angle.rows
+    by_mean = tuple(each.sweep for each in found.sweeps if each.sweep not in solved)
+    return replace(found, turned=by_angle, by_mean=by_mean)
 
 
 def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
     """Samples (n, 4) = [time_s, x, y, z] averaged over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
     `temperature_c` (n,) is how warm it was at each sample, None where nothing tells that.
-    Raises Refused `time_not_increasing`, `overlapping_sweeps`; Fault `too_few_observations`, `lost_samples`,
-    `wrong_unit`.
+    Raises Refused `time_not_increasing`, `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`,
+    `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)
@@ -94,12 +114,15 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
             f"sweeps {shared[0]} and {shared[1]} share samples",
             "Give every sweep once, with its own start and end",
         )
-    interval_s = float(np.median(np.diff(time_s)))
+    check_overlap(time_s, windows)
+    sampling = find_sampling(time_s)
+    check_scattered(sampling)
+    expected = sampling.expected(time_s, sweeps[:, :2]).tolist()
     turns, rests = [], []
     for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
         within = inside(time_s, window)
         cut = readings[within]
-        check_complete(len(cut), window, interval_s, f"sweep {row}")
+        check_complete(len(cut), expected[row - 1], window, f"sweep {row}")
         mean = average_of(cut, window)
         if temperature_c is not None:
             mean = replace(mean, temperature_c=float(temperature_c[within].mean()))
@@ -108,7 +131,18 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
         else:
             turns.append(_observation(row, mean, speed, axes[row - 1]))
     _check_unit(turns)
-    return ExternalData(tuple(turns), tuple(rests))
+    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_missing(time_s, sampling, windows)))
+
+
+def _missing(time_s: Array, sampling: Sampling, windows: Sequence[Window]) -> Iterator[Omitted]:
+    """The readings that are missing between those of the rows, if there are any."""
+    cuts = [inside(time_s, window) for window in windows]
+    gaps = [cut.start + np.flatnonzero(sampling.missing[cut.start : max(cut.stop - 1, cut.start)]) for cut in cuts]
+    if lost := int(sum(sampling.missing[each].sum() for each in gaps)):
+        row = next(row for row, each in enumerate(gaps) if len(each))
+        where = f"after {time_s[gaps[row][0]]:.10g} s, in row {row + 1}"
+        total = lost + sum(cut.stop - cut.start for cut in cuts)
+        yield Omitted("readings", lost, total, "lost_samples: they are missing", where)
 
 
 def _speeds(sweeps: Mapping[str, Array]) -> Array:

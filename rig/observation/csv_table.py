@@ -1,28 +1,21 @@
 """Columns of numbers from a CSV file that somebody else wrote: within bounds, or refused by name."""
 
-import codecs
-import csv
-import zlib
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from gzip import GzipFile
-from io import TextIOWrapper
-from itertools import chain, islice
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig.config.regular_file import UnfitFile, open_regular_file
 from rig.data.motion_file import LARGEST_NUMBER, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
+from rig.observation.csv_cells import TIMES, contradicted, is_number, origin_of, since, unit_of
+from rig.observation.csv_text import read_rows
 
-LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
-GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-MARKS = ";\t"
+BLANK = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,37 +29,149 @@ class Mapped:
     skip_lines: int = 0
 
 
-def read_columns(path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None) -> dict[str, Array]:
-    """The columns of a file by name, those of its header; of each group of optional ones all, or none.
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A file's `columns` (n,) by name, not a number where a cell is blank, and the `lines` (n,) they stand in.
+
+    Times count from `origin_s`, whole seconds: 0, but in files whose clock counts from 1970 or so.
+    """
+
+    columns: dict[str, Array]
+    lines: NDArray[np.int64]
+    origin_s: int = 0
+
+
+def read_columns(
+    path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int = 0
+) -> dict[str, Array]:
+    """Return the columns of a file as `read_table`, none of whose cells is blank; times count from `origin_s`.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    """
+    table = read_table(path, header, largest_mb, mapped, origin_s)
+    for name, column in table.columns.items():
+        if len(blank := np.flatnonzero(np.isnan(column))):
+            raise blank_cell(path, name, int(table.lines[blank[0]]))
+    return table.columns
+
+
+def blank_cell(path: Path, name: str, line: int) -> Refused:
+    """The refusal of a blank cell in a column."""
+    what = f"{path}, line {line}: {name} is blank"
+    return Refused("not_a_number", what, "Write a number into every cell, or leave the row out")
+
+
+def read_table(
+    path: Path, header: Header, largest_mb: int, mapped: Mapped | None = None, origin_s: int | None = None
+) -> Table:
+    """Return the columns of a file by name, those of its header; of each group of optional ones all, or none.
 
     The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, or
-    by tabs, all rows do; empty rows are none. Of a `mapped` file the columns that are named so or as here, whatever
-    others it has. A file that gzip has packed is read as what it holds.
+    by tabs, all rows do; empty rows are none, nor are rows of units below the heading. Of a `mapped` file the columns
+    that are named so or as here, whatever others it has. A file that gzip has packed is read as what it holds.
+    Times count from `origin_s`; None chooses it by the first of them.
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     skipped = 0 if mapped is None else mapped.skip_lines
-    rows = _rows(path, largest_mb, skipped)
+    rows = read_rows(path, largest_mb, skipped)
     headings = [name.strip() for name in next(rows, [])]
     _check_headings(path, headings)
     named = dict(enumerate(headings)) if mapped is None else _picked(path, headings, header, mapped)
-    names, places = [*named.values()], [*named]
-    _check_columns(path, names, header.needed, header.one_of, header.optional)
-    values = array("d")
+    _check_columns(path, [*named.values()], header.needed, header.one_of, header.optional)
+    factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
+    wanted = _Wanted(path, len(headings), named, tuple(factors.get(name, 1.0) for name in named.values()))
+    values, lines = array("d"), array("q")
+    numbers: Sequence[float]
     for line, row in enumerate(rows, start=skipped + 2):
-        if not row:
-            continue
-        cells = row if mapped is None else [row[place] for place in places if place < len(row)]
-        numbers = _numbers(cells)
-        if len(numbers) != len(names):
+        numbers = () if origin_s != 0 else wanted.plain_numbers(row)
+        if not numbers:
+            if not any(map(str.strip, row)) or (not lines and wanted.names_units(line, row)):
+                continue
+            cells = wanted.cells(line, row)
+            if origin_s is None:
+                origin_s = wanted.origin_s(cells)
+            numbers = wanted.numbers(line, cells, origin_s)
+        values.extend(numbers)
+        lines.append(line)
+    table = np.array(values, dtype=np.float64).reshape(-1, len(named))
+    columns = {name: table[:, i] for i, name in enumerate(named.values())}
+    return Table(columns, np.array(lines, dtype=np.int64), origin_s or 0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """The columns of a file that are read: their `names` by place, of `width` in all, and their `factors` to SI."""
+
+    path: Path
+    width: int
+    names: Mapping[int, str]
+    factors: tuple[float, ...]
+
+    def plain_numbers(self, row: Sequence[str]) -> Sequence[float]:
+        """Return a row's numbers in SI units, quickly; none of a row about which there is more to say."""
+        if len(row) != self.width:
+            return ()
+        try:
+            numbers = [float(row[place]) * factor for place, factor in zip(self.names, self.factors, strict=True)]
+        except ValueError:
+            return ()
+        return numbers if all(abs(number) < LARGEST_NUMBER for number in numbers) else ()
+
+    def names_units(self, line: int, row: Sequence[str]) -> bool:
+        """Return whether a row below the heading holds units, and no number. Raises Refused `wrong_unit`."""
+        if any(map(is_number, row)):
+            return False
+        cells = [row[place] if place < len(row) else "" for place in self.names]
+        if not any(map(unit_of, cells)):
+            return False
+        if (wrong := contradicted(cells, self.factors)) is not None:
+            name = [*self.names.values()][wrong]
+            raise Refused(
+                "wrong_unit",
+                f"{self.path}, line {line} says that {name} is in {quote(cells[wrong])}, which it is not read as",
+                "Say its unit with --columns, or convert it to the one in the name",
+            )
+        return True
+
+    def cells(self, line: int, row: Sequence[str]) -> list[str]:
+        """Return the cells that are read, blank where the row ends too early. Raises Refused `wrong_columns`."""
+        if any(map(str.strip, row[self.width :])):
+            raise Refused(
+                "wrong_columns",
+                f"{self.path}, line {line} has {len(row)} cells, and the heading names {self.width} columns: "
+                "nobody can say which cell is what",
+                "Write a name for every column into the heading (col.names=NA in R's write.table), or a decimal point "
+                "where a comma divides the columns",
+            )
+        return [row[place] if place < len(row) else "" for place in self.names]
+
+    def origin_s(self, cells: Sequence[str]) -> int:
+        """Return the seconds that times are to count from, by the first row; 0 where it holds no time."""
+        timed = [place for place, name in enumerate(self.names.values()) if name in TIMES and is_number(cells[place])]
+        return origin_of(float(cells[place]) * self.factors[place] for place in timed)
+
+    def numbers(self, line: int, cells: Sequence[str], origin_s: int) -> list[float]:
+        """Return a row's numbers in SI units, not a number where a cell is blank. Raises Refused `not_a_number`."""
+        try:
+            numbers = [
+                since(cell, factor, origin_s)
+                if origin_s and name in TIMES and cell.strip()
+                else float(cell) * factor
+                if cell.strip()
+                else BLANK
+                for cell, factor, name in zip(cells, self.factors, self.names.values(), strict=True)
+            ]
+        except (ValueError, ArithmeticError):
+            numbers = []
+        right = [abs(number) < LARGEST_NUMBER or not cell.strip() for number, cell in zip(numbers, cells, strict=False)]
+        if len(right) < len(cells) or not all(right):
             raise Refused(
                 "not_a_number",
-                f"{path}, line {line}: {quote(','.join(cells))} is not {len(names)} numbers below {LARGEST_NUMBER:g}",
+                f"{self.path}, line {line}: {quote(','.join(cells))} is not {len(cells)} numbers below "
+                f"{LARGEST_NUMBER:g}",
                 "Write plain decimal numbers with a point, no NaN, one for each column",
             )
-        values.extend(numbers)
-    table = np.array(values, dtype=np.float64).reshape(-1, len(names))
-    factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
-    return {name: factors.get(name, 1.0) * table[:, i] for i, name in enumerate(names)}
+        return numbers
 
 
 def _picked(path: Path, headings: Sequence[str], header: Header, mapped: Mapped) -> dict[int, str]:
@@ -86,64 +191,12 @@ def _picked(path: Path, headings: Sequence[str], header: Header, mapped: Mapped)
     return {**as_here, **found}
 
 
-def _rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
-    """The rows of a regular file that is not too large, after so many lines of it."""
-    try:
-        with open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
-            lines = _lines(text, largest_mb * 1_000_000)
-            first = next(islice(lines, skipped, None), "")
-            second = next(lines, "")
-            delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
-            rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
-            yield from islice(rows, 1)
-            for row in rows:
-                yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
-    except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
-        raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
-
-
-def _text(file: BinaryIO) -> TextIOWrapper:
-    """What stands in a file, packed or not, in the encoding its beginning shows. Raises UnfitFile where it is no text.
-
-    Windows' own encoding is that of most loggers' headings that are not in UTF-8: "°/s", "µT".
-    """
-    if _beginning(file).startswith(GZIP):
-        file = GzipFile(fileobj=file)  # type: ignore[assignment]
-    begin = _beginning(file)
-    if begin.startswith(UTF_16):
-        return TextIOWrapper(file, encoding="utf-16", newline="")
-    if b"\0" in begin:
-        raise UnfitFile("it is no text, but a spreadsheet, an archive or another program's own file")
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(begin)
-    except UnicodeDecodeError:
-        return TextIOWrapper(file, encoding="cp1252", errors="replace", newline="")
-    return TextIOWrapper(file, encoding="utf-8-sig", newline="")
-
-
-def _beginning(file: BinaryIO) -> bytes:
-    begin = file.read(LONGEST_LINE)
-    file.seek(0)
-    return begin
-
-
-def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
-    """The lines, none of which is endless, nor all of them: a packed file may hold a thousand times its size."""
-    while line := text.readline(LONGEST_LINE):
-        most -= len(line)
-        if len(line) == LONGEST_LINE:
-            raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
-        if most < 0:
-            raise UnfitFile("what is packed in it is too long")
-        yield line
-
-
 def _check_headings(path: Path, headings: Sequence[str]) -> None:
     """Raises Refused `wrong_columns` for a first row that cannot be one of names."""
     what = None
     if len(headings) == 1 and len(headings[0].split()) > 1:
         what = f"divides its columns neither by commas nor by semicolons nor by tabs: {shorten(headings[0])}"
-    elif headings and _numbers(headings):
+    elif headings and all(map(is_number, headings)):
         what = f"has numbers in its first row and no names of columns: {shorten(', '.join(headings))}"
     if what is not None:
         raise Refused(
@@ -152,15 +205,6 @@ def _check_headings(path: Path, headings: Sequence[str]) -> None:
             "Write the columns' names into the first row, divided as all rows are, by commas, semicolons or tabs; "
             "or say with --columns how many lines stand before it",
         )
-
-
-def _numbers(row: Sequence[str]) -> list[float]:
-    """A row's numbers; empty if any of its cells is none, or is too large to be one."""
-    try:
-        numbers = [float(cell) for cell in row]
-    except ValueError:
-        return []
-    return numbers if all(abs(number) < LARGEST_NUMBER for number in numbers) else []
 
 
 def _check_columns(

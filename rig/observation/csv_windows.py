@@ -10,6 +10,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
 from rig.observation.coloured_noise import left_of, widening
+from rig.observation.sampling import Sampling
 from rig.observation.windows import Window
 
 MIN_SAMPLES = 20
@@ -82,15 +83,48 @@ def average_of(readings: Array, window: Window) -> Average:
     )
 
 
-def check_complete(count: int, window: Window, interval_s: float, where: str, least: int = MIN_SAMPLES) -> None:
-    """Raises Fault `lost_samples` where fewer samples are in a window than belong there."""
-    expected = (window.end_s - window.start_s) / interval_s
-    if count < least or count < (1 - MAX_LOST_FRACTION) * expected - 1:
-        wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
-        if expected < least:
-            wanted = f"{least} are the least; it lasts {window.end_s - window.start_s:.3g} s at {1 / interval_s:.3g} Hz"
+ONE_CLOCK = "Check that both files use one clock in seconds, and that no samples are missing"
+
+
+def check_complete(count: int, expected: float, window: Window, where: str, least: int = MIN_SAMPLES) -> None:
+    """Raises Fault `lost_samples` where fewer samples are in a window than are `expected` there."""
+    if is_complete(count, expected, least):
+        return
+    lasts_s = window.end_s - window.start_s
+    wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
+    if expected < least:
+        wanted = f"{least} are the least; it lasts {lasts_s:.3g} s at {expected / lasts_s:.3g} Hz"
+    raise Fault("lost_samples", f"{where} has {count} samples, but {wanted}", ONE_CLOCK)
+
+
+def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
+    """Return whether a window holds the samples that are expected in it."""
+    return count >= max(least, (1 - MAX_LOST_FRACTION) * expected - 1)
+
+
+def check_scattered(sampling: Sampling) -> None:
+    """Raises Fault `lost_samples` where many readings are missing, and stamps are too bad to say which."""
+    if sampling.scattered > MAX_LOST_FRACTION:
         raise Fault(
             "lost_samples",
-            f"{where} has {count} samples, but {wanted}",
-            "Check that both files use one clock in seconds, and that no samples are missing",
+            f"about {100 * sampling.scattered:.2g} % of the samples are missing all over the recording: their stamps "
+            "advance in steps that no even clock explains, and do not say where",
+            "See that the sensor's link loses nothing; stamp every reading when it is taken",
         )
+
+
+def check_overlap(time_s: Array, windows: Sequence[Window]) -> None:
+    """Raises Fault `clocks_apart` where no window holds any of the samples at times (n,)."""
+    if all(each.end_s < time_s[0] or each.start_s > time_s[-1] for each in windows):
+        raise clocks_apart(time_s, windows)
+
+
+def clocks_apart(time_s: Array, windows: Sequence[Window]) -> Fault:
+    """The error for windows of which none holds a sample."""
+    start_s, end_s = min(each.start_s for each in windows), max(each.end_s for each in windows)
+    return Fault(
+        "clocks_apart",
+        f"the rows reach from {start_s:.10g} to {end_s:.10g} s, the samples from {time_s[0]:.10g} to "
+        f"{time_s[-1]:.10g} s: no row holds a sample",
+        "Write both files by one clock, in seconds; with --attitudes, --find-clock finds what is between two",
+    )

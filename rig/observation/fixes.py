@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array, rotation_vectors
 from rig.estimation.attitude_drift import Fixes
+from rig.observation.sampling import find_sampling
 
 WINDOW_S, SHORTEST_S = (
     1.0,
@@ -23,12 +24,12 @@ WINDOW_S, SHORTEST_S = (
 )  # cameras' errors are coloured over tenths of a second; a short recording needs windows too
 WINDOWS, MOST = 40, 300  # at least, while they are longer than the shortest; at most
 STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3  # a row that may be a rest; how far apart rests may read
-GAP = 2.5  # intervals
+GAP = 2  # readings that are missing: a cubic through the others tells the way over one
 MAX_STEP_RAD = 0.35  # between two readings: a cubic through rates tells the way to microradians up to here
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the very end of what an axis reads, and how much it reads
 ROUGH_S, ROUGH_ROWS, ROUGH_ODD = 0.1, 30, 5.0  # between two rows that tell a rate; rows that tell F; times the median
 EXPLAINED, WORST_START = 0.5, 100.0  # share of the readings' variance that F explains at least; its condition at most
-FEWEST = 6  # increments: 18 numbers for 12 parameters
+FEWEST = 6  # increments in which the body moves: 18 numbers for 12 parameters
 THIN = 0.25  # of the looks that a fix usually has
 
 
@@ -48,11 +49,15 @@ class Turning:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Increments that could not be made: the error's name, how many, and when the first of them began."""
+    """Increments that could not be made: the error's name, how many, and when the first of them began.
+
+    `longest_s`: how long the longest step from one reading to the next is, over which nothing is known.
+    """
 
     name: str
     count: int
     first_s: float
+    longest_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,20 +68,29 @@ class Gathered:
     window_s: float
     left_out: tuple[LeftOut, ...]
 
+    @property
+    def increments(self) -> int:
+        """How many increments there would be, were nothing left out."""
+        return len(self.fixes.joined)
 
-def gather(turning: Turning, window_s: float | None = None) -> Gathered:
+
+def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> Gathered:
     """The fixes of a reference's rows, in windows of a given or a suitable length.
 
-    Raises Fault `too_few_observations`, or `lost_samples`, `saturation`, `turned_too_fast` where that is why.
+    The reference's attitude of the moment t is that of t + `clock_s` of the readings, as far as anybody knows.
+    Raises Fault `too_few_observations`, or `lost_samples`, `saturation`, `turned_too_fast` where that is why: too few
+    increments are left in which the body moves, or more had to be left out.
     """
     turning = _covered(turning)
     if len(turning.rows_s) < 2:
         raise _too_few(f"{len(turning.rows_s)} attitudes lie within the recording")
     length_s = window_s or _suitable_s(float(turning.rows_s[-1, 1] - turning.rows_s[0, 0]))
     fixes = _without_the_thin(_fixes(turning, _still(turning), length_s))
-    joined, left_out = _followed(turning, fixes)
-    if joined.sum() < FEWEST:
-        raise _none_left(int(joined.sum()), left_out)
+    joined, left_out = _followed(turning, fixes, clock_s)
+    moving = fixes.placement[1:] != fixes.placement[:-1]
+    kept = int((joined & moving).sum())
+    if kept < FEWEST or kept < int((~joined & moving).sum()):
+        raise _none_left(kept, int(moving.sum()), left_out)
     return Gathered(replace(fixes, joined=joined), length_s, left_out)
 
 
@@ -174,11 +188,11 @@ def _without_the_thin(fixes: Fixes) -> Fixes:
     )
 
 
-def _followed(turning: Turning, fixes: Fixes) -> tuple[NDArray[np.bool_], tuple[LeftOut, ...]]:
+def _followed(turning: Turning, fixes: Fixes, clock_s: float) -> tuple[NDArray[np.bool_], tuple[LeftOut, ...]]:
     """Whether the gyroscope can be followed between neighbours (N − 1,), and why not where it cannot."""
     count = len(fixes.placement)
-    first_s = fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
-    last_s = fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]
+    first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
+    last_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]
     joined = np.ones(count - 1, dtype=np.bool_)
     left_out = []
     for name, steps in _blind(turning).items():
@@ -187,7 +201,8 @@ def _followed(turning: Turning, fixes: Fixes) -> tuple[NDArray[np.bool_], tuple[
         lost = np.flatnonzero(met & joined)
         joined[lost] = False
         if len(lost):
-            left_out.append(LeftOut(name, len(lost), float(begins[np.searchsorted(ends, first_s[lost[0]], "right")])))
+            first = float(begins[np.searchsorted(ends, first_s[lost[0]], "right")])
+            left_out.append(LeftOut(name, len(lost), first, float((ends - begins).max())))
     return joined, tuple(left_out)
 
 
@@ -198,10 +213,11 @@ def _blind(turning: Turning) -> dict[str, NDArray[np.intp]]:
     turned = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s
     clipped = np.flatnonzero(_clipped(readings))
     beside = np.unique(np.clip(np.concatenate([clipped - 1, clipped]), 0, len(steps_s) - 1))
+    lost = find_sampling(turning.time_s).gaps(turning.time_s, GAP)
     return {
-        "lost_samples": np.flatnonzero(steps_s > GAP * np.median(steps_s)),
+        "lost_samples": np.flatnonzero(lost),
         "saturation": beside,
-        "turned_too_fast": np.flatnonzero((turned > MAX_STEP_RAD) & (steps_s <= GAP * np.median(steps_s))),
+        "turned_too_fast": np.flatnonzero((turned > MAX_STEP_RAD) & ~lost),
     }
 
 
@@ -222,15 +238,16 @@ def _clipped(readings: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _none_left(count: int, left_out: tuple[LeftOut, ...]) -> Fault:
+def _none_left(count: int, total: int, left_out: tuple[LeftOut, ...]) -> Fault:
     if not left_out:
         return _too_few(f"{count} increments between attitudes are left")
     most = max(left_out, key=lambda each: each.count)
     what = (
-        f"{count} increments between attitudes are left; {most.count} had to be left out, the first at "
-        f"{most.first_s:.2f} s"
+        f"{count} of {total} increments in which the body moves are left; {most.count} had to be left out, the first "
+        f"at {most.first_s:.2f} s"
     )
     if most.name == "lost_samples":
+        what = f"{what}, where readings are missing for up to {most.longest_s:.2g} s"
         return Fault(
             "lost_samples", what, "See that the sensor's link loses nothing, and that both files use one clock"
         )

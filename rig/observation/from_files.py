@@ -8,21 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.column_map import ColumnMap, ColumnSection
-from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
+from rig.data.installed_kinds import quantities
+from rig.data.motion_file import TIME, Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
-from rig.data.quantity import RATE, TEMPERATURE
+from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
 from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_import import read_sweeps
-from rig.observation.csv_samples import read_samples
+from rig.observation.csv_samples import read_sample_table, samples_in
 from rig.observation.csv_table import Mapped
 from rig.observation.sample_files import entry_of, whole
 from rig.observation.table_log import read_table_log
 
 AS_NAMED_HERE = ColumnMap()
+USED: Mapping[Told, tuple[str, ...]] = {  # the sensors whose readings are solved, or help to; all where there are none
+    "sweeps": (RATE.sensor,),
+    "turns": (RATE.sensor, ACCELERATION.sensor),
+    "attitudes": (),
+}
 NOTHING_LOST = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
 
 
@@ -51,16 +57,21 @@ def recorded_in_files(
     """
     told = files.columns
     needed = () if files.tells == "attitudes" else [RATE]
-    samples = read_samples(files.readings, needed, _mapped(told.samples, told.samples_skip_lines))
-    columns = {"time_s": samples.time_s} | {
-        name: readings[:, i]
-        for quantity, readings in samples.readings.items()
-        for i, name in enumerate(quantity.columns)
-    }
-    if reference_c is not None and samples.temperature_c is not None:
-        columns |= dict.fromkeys(TEMPERATURE.columns, samples.temperature_c)
+    mapped = _mapped(told.samples, told.samples_skip_lines)
+    table = read_sample_table(files.readings, needed, mapped, asked.only or USED[files.tells])
+    samples = samples_in(table.columns, str(files.readings))  # as they will be solved
+    if missing := [each for each in asked.only if each not in {one.sensor for one in samples.readings}]:
+        raise Refused(
+            "wrong_columns",
+            f"{files.readings} holds no readings of the {missing[0]} that is to be calibrated",
+            "Name its columns, or leave out --only",
+        )
+    told_here = [TIME, *(name for each in quantities().values() for name in each.columns)]
+    told_here += TEMPERATURE.columns if reference_c is not None else ()
+    columns = {name: table.columns[name] for name in told_here if name in table.columns}
     began = files.recorded or datetime.fromtimestamp(whole(files.readings).stat().st_mtime, UTC)
-    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, _motion(files))
+    motion = _motion(files, table.origin_s)
+    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, motion, table.origin_s, table.others)
     return RunData(
         config="",
         settings=RunSettings(
@@ -93,17 +104,20 @@ def recorded_in_files(
     )
 
 
-def _motion(files: Files) -> Columns:
-    """What the motion is, by column. Raises Refused as they do, and `bad_option` for a table's log of sweeps."""
+def _motion(files: Files, origin_s: int) -> Columns:
+    """What the motion is, by column, times from `origin_s` on.
+
+    Raises Refused as its readers do, and `bad_option` for a table's log of sweeps.
+    """
     told = files.columns
     if not isinstance(files.motion, Path):
         return files.motion
     if told.table is not None:
         if files.tells == "sweeps":
             raise Refused("bad_option", "the columns are those of a table's log", "Give that log with --attitudes")
-        return read_table_log(files.motion, told.table, told.motion_skip_lines)
-    read: Callable[[Path, Mapped | None], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
-    return read(files.motion, _mapped(told.motion, told.motion_skip_lines))
+        return read_table_log(files.motion, told.table, told.motion_skip_lines, origin_s)
+    read: Callable[[Path, Mapped | None, int], Columns] = read_sweeps if files.tells == "sweeps" else read_attitudes
+    return read(files.motion, _mapped(told.motion, told.motion_skip_lines), origin_s)
 
 
 def _mapped(columns: Mapping[str, ColumnSection], skip_lines: int) -> Mapped | None:

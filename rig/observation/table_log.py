@@ -12,8 +12,8 @@ from rig.observation.attitude_import import ATTITUDES_MB, RATE_COLUMNS, STD_COLU
 from rig.observation.csv_table import Mapped, read_columns
 
 
-def read_table_log(path: Path, table: TableSection, skip_lines: int = 0) -> dict[str, Array]:
-    """The columns of attitudes (`rig.data.motion_file.MOTIONS`) that the log of a table tells.
+def read_table_log(path: Path, table: TableSection, skip_lines: int = 0, origin_s: int = 0) -> dict[str, Array]:
+    """The columns of attitudes (`rig.data.motion_file.MOTIONS`) that the log of a table tells, from `origin_s` on.
 
     Raises Refused `no_file`, `wrong_columns`, `not_a_number`, `time_not_increasing`.
     """
@@ -22,7 +22,7 @@ def read_table_log(path: Path, table: TableSection, skip_lines: int = 0) -> dict
         columns[f"angle_{place}"] = axis.angle.column, axis.angle.factor
         if axis.rate is not None:
             columns[f"rate_{place}"] = axis.rate.column, axis.rate.factor
-    log = read_columns(path, Header(tuple(columns)), ATTITUDES_MB, Mapped(columns, skip_lines))
+    log = read_columns(path, Header(tuple(columns)), ATTITUDES_MB, Mapped(columns, skip_lines), origin_s)
     if len(log[TIME]) < 2 or not (np.diff(log[TIME]) > 0).all():
         raise Refused(
             "time_not_increasing",

@@ -15,6 +15,7 @@ from rig.observation.average import Average
 from rig.observation.csv_windows import average_of
 from rig.observation.observe import Observation, bias_drift
 from rig.observation.rests import find_rests
+from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window, inside
 
 REACH_S = 0.5  # between a turn's end, as somebody marked it, and the rest that it belongs to
@@ -53,7 +54,7 @@ def turned(
     time_s: Array, readings: Array, known: Known, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
     """The turns from rest to rest among sweeps; None where there are none. `readings` (n, 3) in rad/s at `time_s`."""
-    lying = find_rests(time_s, {RATE: readings})
+    lying = find_rests(time_s, {RATE: readings}, lying=_between_all(time_s, sweeps))
     if not lying:
         return None
     resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
@@ -74,10 +75,19 @@ def turned(
         rows.append(sweep.sweep)
     if not turns:
         return None
-    noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * np.median(np.diff(time_s)))
+    interval_s = find_sampling(time_s).interval_s
+    noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * interval_s)
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(bias_drift(resting)))
     samples = sum(rest.samples - 1 for rest in resting)
     return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1))
+
+
+def _between_all(time_s: Array, sweeps: Sequence[Observation]) -> list[Window]:
+    """The time that no sweep takes: nowhere else is the body said to lie still."""
+    taken = sorted((each.average.start_s, each.average.end_s) for each in sweeps)
+    starts = [float(time_s[0]), *(end_s for _, end_s in taken)]
+    ends = [*(start_s for start_s, _ in taken), float(time_s[-1])]
+    return [Window(start_s, end_s) for start_s, end_s in zip(starts, ends, strict=True) if end_s > start_s]
 
 
 def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:
