@@ -95,7 +95,7 @@ def solve_placed(
         return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
 
     found: dict[Quantity, Result | OfKind | Fault] = {}
-    for quantity in placed.quantities:
+    for quantity in (each for each in placed.quantities if not asked.only or each.sensor in asked.only):
         if quantity == RATE and placed.turning is not None:
             found[quantity] = or_fault(partial(of_rate, placed.turning))
         elif placed.placements is not None:
@@ -136,7 +136,7 @@ def _of_placements(
 ) -> InAttitudes:
     """The calibration from placements; what these do beside counts too, if the method allows for wrong attitudes."""
     elsewhere, moving = placements.elsewhere, placements.left_out
-    solution, laid = _solved(equations, method, moving), None
+    solution, laid = _solved(equations, method, placements), None
     if method == "attitude_weighted":
         laid = laid_down(
             solution.theta,
@@ -170,14 +170,17 @@ def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Held]:
         yield Held(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
 
 
-def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSolution:
+def _solved(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
     """The solution; where the rests are not enough, it is said that rows were left out."""
     try:
         return equations.solve(method)
     except Fault as fault:
-        if not moving or fault.name not in TOO_LITTLE:
+        if not placements.left_out or fault.name not in TOO_LITTLE:
             raise
-        what = f"{fault.what}; {moving} rows in which the body moves are left out, for only rests tell a reference"
+        what = (
+            f"{fault.what}; {placements.left_out} rows in which the body moves are left out, for only rests tell a "
+            f"reference{''.join(f'; {each}' for each in placements.omitted)}"
+        )
         raise Fault(fault.name, what, fault.remedy) from None
 
 

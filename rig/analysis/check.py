@@ -1,12 +1,16 @@
 """One check of the verdict: what was measured beside its limit, and how it is called. Pure."""
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rig.config.limits import Parameter
 from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
+from rig.errors import Fault
 from rig.estimation.coverage import COVERAGE_FACTOR, beyond
+
+ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")  # why a sensor was not to be calibrated
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,17 @@ def fitness(
     means, piece = Meaning("fitness", sensor, quantity, parameter, sweep, what), dwell if sweep is None else sweep
     name = check_name(sensor, quantity, what)
     return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
+
+
+def unsolved_checks(faults: Iterable[tuple[str, str, object]]) -> Iterator[Check]:
+    """Yield the checks that fail: of a sensor, its quantity and the Fault for which this has no solution.
+
+    Of what was only recorded there is none: sweeps do not calibrate a magnetometer, and the size of the field is what
+    asks for that. Neither is there one of what is no Fault.
+    """
+    for sensor, quantity, fault in faults:
+        if isinstance(fault, Fault) and fault.name not in ONLY_RECORDED:
+            yield fitness(sensor, quantity, "unsolved", 1.0, 0.0)
 
 
 def check_name(sensor: str, quantity: str, what: str) -> str:

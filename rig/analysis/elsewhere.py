@@ -9,11 +9,12 @@ import numpy as np
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.by_hand import solved_by_hand
 from rig.analysis.calibration import SensorResult, solve_observations, solve_six_observation, solve_vector
-from rig.analysis.check import Check, fitness
+from rig.analysis.check import Check, fitness, unsolved_checks
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.increments import InIncrements
 from rig.analysis.installed_kinds import KindFound, OfKind
+from rig.analysis.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
 from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
 from rig.analysis.sweeps_agree import check_agree, contradiction, counted
 from rig.data.motion_file import Item, ReadElsewhere
@@ -35,6 +36,7 @@ from rig.observation.attitude_import import placed_by
 from rig.observation.csv_import import ExternalData, averaged
 from rig.observation.csv_samples import Samples, samples_in
 from rig.observation.mean import by_axis
+from rig.observation.omitted import Omitted
 from rig.observation.timebase import TimeBase
 from rig.observation.turns import TurnedData
 
@@ -51,7 +53,8 @@ class OfSensor:
 
     `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
     rest; `of_kinds` is what solvers of installed kinds of sensors found; `polynomials` are there of a calibration over
-    temperature.
+    temperature. `omitted` is what was left out of the recording, by the quantity that it is missing from, None of all;
+    `notes` say how it was read and solved, where that is not as a matter of course.
     """
 
     item: Item
@@ -62,6 +65,8 @@ class OfSensor:
     turned: TurnedData | None = None
     of_kinds: tuple[KindFound, ...] = ()
     polynomials: OverTemperature | None = None
+    omitted: tuple[tuple[Quantity | None, Omitted], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
@@ -71,7 +76,7 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     estimator does, or of several `nothing_solved` with every reason.
     """
     if read.tells == "turns":
-        return _by_hand(read, estimator)
+        return _with_notes(_by_hand(read, estimator), read)
     found = (
         _by_sweeps(read, estimator, settings.reference_c)
         if read.tells == "sweeps"
@@ -79,14 +84,20 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     )
     if found.gyroscope is None and not found.at_rest and not found.of_kinds:
         raise _nothing_solved(found.unsolved)
-    return found
+    return _with_notes(found, read)
+
+
+def _with_notes(found: OfSensor, read: ReadElsewhere) -> OfSensor:
+    return replace(found, notes=(*notes_on_reading(read, _samples(read).sampling), *found.notes))
 
 
 def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
     """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
 
-    No configuration states limits of anything else.
+    And every quantity that was to be solved, and is not. No configuration states limits of anything else.
     """
+    found = (*sensor.unsolved.items(), *((each.quantity, each.found) for each in sensor.of_kinds))
+    yield from unsolved_checks((name, quantity.name, each) for quantity, each in found)
     if (gyroscope := sensor.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if sensor.rates is not None else known_turns.MAX_CONDITION
         yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
@@ -141,7 +152,9 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
         gyroscope, polynomials = with_rate_polynomials(gyroscope, polynomials)
-    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials)
+    notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
+    omitted = tuple((RATE, each) for each in data.omitted)
+    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
@@ -176,6 +189,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
         beyond, left = whole - noise.covariance, float(solution.residuals_rad_s.size - 12)
         return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, left, beyond)))
     known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    known |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)
     lines = solution.budget.contributors
     return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
 
@@ -210,6 +224,7 @@ def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) 
         rates=told,
         at_rest={each: result for each, result in found.items() if each != RATE and isinstance(result, InAttitudes)},
         unsolved={each: result for each, result in found.items() if isinstance(result, Fault)},
+        omitted=tuple(omitted_in_attitudes(placed, found)),
         of_kinds=tuple(
             KindFound(read.item.name, read.item, each, result)
             for each, result in found.items()
@@ -266,6 +281,7 @@ def _as_swept(result: Result) -> TurnedSolution:
         angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
         residuals_rad_s=residuals,
         widened=1.0,
+        widened_freedom=np.inf,
         budget=Budget(lines),
         observations=observations,
         rank=rank,

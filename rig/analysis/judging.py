@@ -1,6 +1,6 @@
 """What recordings amount to: they are solved, verified and judged here for `rig.analysis.analyses`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -11,14 +11,14 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.bias_drift import bias_drifts
 from rig.analysis.calibration import SensorResult, solve_observed
-from rig.analysis.check import Check
+from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
 from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
-from rig.analysis.installed_kinds import kinds_on_arm
-from rig.analysis.magnetic_field import calibrate_magnetometers
+from rig.analysis.installed_kinds import KindFound, kinds_on_arm
+from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.outcome import Origin, Outcome
@@ -41,7 +41,7 @@ from rig.analysis.verdict import (
 from rig.analysis.verification import Verification, verify
 from rig.config.judged_by import DecisionRule
 from rig.data.motion_file import ReadElsewhere
-from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Fault
@@ -89,6 +89,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
             *(check for each in of_kinds for check in each.checks),
+            *_unsolved(magnetometers, of_kinds),
         ),
         of_kinds=of_kinds,
         mounts=mounts,
@@ -100,6 +101,14 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         told_from_in_reference=among_dwells.told_from,
         polynomials=found,
     )
+
+
+def _unsolved(
+    magnetometers: Mapping[str, MagnetometerResult | Fault], of_kinds: Sequence[KindFound]
+) -> Iterator[Check]:
+    """The checks of what was to be calibrated and is not."""
+    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.items())
+    yield from unsolved_checks((each.name, each.quantity.name, each.found) for each in of_kinds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

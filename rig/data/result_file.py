@@ -28,6 +28,7 @@ from rig.data.result_types import (
     Freedom3,
     Matrix3,
     Matrix6,
+    OmittedEntry,
     Positive,
     PositiveVector3,
     Role,
@@ -441,6 +442,7 @@ class ResultDocument(Entry):
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
     `over_temperature` holds calibrations over temperature in the same way: then all else is at their reference.
     `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
+    `omitted` is what of these readings was left out, `notes` how they were read where that is no matter of course.
     `others` are results of kinds that packages add, by the kind's key: what stands there only the package knows.
     `mounts` are there of a run of several stages, for each but the first.
     A sensor's name becomes that of files: what a configuration does not take for one is none here either.
@@ -458,6 +460,8 @@ class ResultDocument(Entry):
     bias_drift: dict[SensorName, dict[QuantityName, DriftEntry]] = Field(default_factory=dict)
     over_temperature: dict[SensorName, dict[QuantityName, OverTemperatureEntry]] = Field(default_factory=dict)
     unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
+    omitted: dict[SensorName, tuple[OmittedEntry, ...]] = Field(default_factory=dict)
+    notes: dict[SensorName, tuple[str, ...]] = Field(default_factory=dict)
     others: dict[str, dict[SensorName, JsonValue]] = Field(default_factory=dict)
     mounts: tuple[MountEntry, ...] = ()
 

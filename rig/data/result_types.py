@@ -93,6 +93,21 @@ class ToldFromEntry(Entry):
     off_by_expanded: float | None
 
 
+class OmittedEntry(Entry):
+    """What was left out of a recording: `count` of `total` `what` (rows, increments, readings), where the `first` is.
+
+    The `reason` begins with the name of an error, where there is one. `quantity` is the one that it is missing from;
+    null where it is missing from all.
+    """
+
+    quantity: str | None
+    what: str
+    count: int
+    total: int
+    reason: str
+    first: str
+
+
 class ErrorEntry(Entry):
     """Why an estimator that stands beside the chosen one has no solution."""
 

@@ -41,6 +41,7 @@ ODD, ODD_RAD = 4.0, 1e-3  # an increment off by so many times the ninth decile, 
 SOME_ODD, MOST_ODD, SETTINGS_ASIDE = 4, 0.1, 3  # so many may be, or such a share; passes
 UNTRUSTWORTHY_RAD = 0.1  # increments that are further off are those of another body
 STATED_SPREAD = 1.0  # of the logarithm of a stated standard deviation
+MOST_CLOCK = 3.0  # standard deviations of what the clocks may be apart: beyond, they are not one
 UNTOLD = 0.1  # standard deviation of an element of F that nothing has told
 LARGEST_STEP = 10.0  # of F: beyond, nothing converges
 MAX_CONDITION = 1e4
@@ -72,7 +73,7 @@ class KnownIncrements:
     - `clock_s`: the reference's attitude of the moment t was that of t + τ; `clock_std_s`.
     - `fix_std_rad`: error of a fix about each axis; `random_walk_rad_sqrt_s` of the gyroscope's angle.
     - `matrix_scatter`, `bias_scatter_rad_s`: how differently stretches of the recording read, each element.
-    - `residuals_rad` (n, 3) of the increments, of which `set_aside` more contradicted all others.
+    - `residuals_rad` (n, 3) of the increments; `aside_s` (k,) when each of those began that contradicted all others.
     """
 
     matrix: Array
@@ -87,15 +88,21 @@ class KnownIncrements:
     matrix_scatter: float
     bias_scatter_rad_s: float
     residuals_rad: Array
-    set_aside: int
+    aside_s: Array
     condition: float
     iterations: int
+
+    @property
+    def set_aside(self) -> int:
+        """How many increments were left out, for they contradicted all others."""
+        return len(self.aside_s)
 
 
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: Array) -> KnownIncrements:
     """Solve readings (n, 3) in rad/s at times (n,), beginning at F = `start` (3, 3) and b = 0.
 
-    Raises Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `wrong_unit`, `mirrored_axis`.
+    Raises Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`,
+    `mirrored_axis`.
     """
     recorded = Recorded(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
     settled = _settle(recorded, State(start, np.zeros(3), 0.0))
@@ -108,7 +115,7 @@ def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: 
         recorded = replace(recorded, fixes=replace(recorded.fixes, joined=joined))
         settled = _settle(recorded, settled.state)
     _check(fixes, recorded.fixes, settled)
-    return _found(settled, int(fixes.joined.sum() - recorded.fixes.joined.sum()))
+    return _found(settled, _times_s(fixes, fixes.joined & ~recorded.fixes.joined))
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,11 +195,19 @@ def _conditioning(mixed: Mixed) -> refusals.Conditioning:
 
 
 def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
-    """Raises Fault `attitude_untrustworthy`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`."""
+    """Raises Fault `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`."""
     off = float(np.sqrt(np.mean(settled.solved.residuals**2)))
     if off > UNTRUSTWORTHY_RAD:
         raise refusals.untrustworthy(f"the increments of attitudes and gyroscope differ by {off:.2g} rad")
     odd = np.concatenate([np.flatnonzero(given.joined & ~left.joined), np.flatnonzero(left.joined)[_odd(settled)]])
+    if abs(settled.state.clock_s) > MOST_CLOCK * CLOCK_STD_S:
+        std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
+        raise Fault(
+            "clocks_apart",
+            f"the attitudes' clock comes out {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} ms off the "
+            f"readings', and {1e3 * MOST_CLOCK * CLOCK_STD_S:.0f} ms is the most that is allowed for",
+            "Write both files by one clock, or let --find-clock find what is between them",
+        )
     if len(odd) > _may_be_odd(given):
         where_s = float(given.at_s[np.searchsorted(given.fix, odd.min())])
         raise refusals.untrustworthy(
@@ -205,14 +220,21 @@ def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
     refusals.check_handedness(settled.state.matrix)
 
 
-def _found(settled: _Settled, set_aside: int) -> KnownIncrements:
+def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
+    """(k,) when some of the increments (N − 1,) begin."""
+    first = np.searchsorted(fixes.fix, np.flatnonzero(increments))
+    return np.asarray(fixes.at_s[first], dtype=np.float64)
+
+
+def _found(settled: _Settled, aside_s: Array) -> KnownIncrements:
     solved, sizes, state = settled.solved, settled.sizes, settled.state
     # The matrix is what any recording would show, the bias its mean over this one.
     stretches = (len(solved.theta) - COMMON) // 12
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
     for each in range(stretches):
         wanted[12:, COMMON + 12 * each :][:, BIAS] = np.eye(3) / stretches
-    freedom = settled.model.freedom(sizes, wanted)
+    residual_freedom = solved.residuals.size - BIAS.stop - 1  # less F, b and the clock
+    freedom = np.minimum(settled.model.freedom(sizes, wanted), residual_freedom)
     causes = {name: widened(wanted @ each @ wanted.T, freedom) for name, each in _causes(settled).items()}
     return KnownIncrements(
         matrix=state.matrix,
@@ -227,7 +249,7 @@ def _found(settled: _Settled, set_aside: int) -> KnownIncrements:
         matrix_scatter=sizes.groups[0] if sizes.groups else 0.0,
         bias_scatter_rad_s=sizes.groups[1] if sizes.groups else 0.0,
         residuals_rad=solved.residuals,
-        set_aside=set_aside,
+        aside_s=aside_s,
         condition=_conditioning(settled.model.mixed).condition,
         iterations=settled.iterations,
     )

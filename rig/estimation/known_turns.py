@@ -75,8 +75,8 @@ class TurnedSolution:
     """A solution as `rig.estimation.vector_model.VectorSolution` has it; `budget` is what the covariance is made of.
 
     `residuals_rad_s` (N, 3) are those of the means, then of the turns as mean rates; `widened` says how much more the
-    turns contradict each other than was said of them, 1 at least. `estimator` is another's name where readings in
-    attitudes are told as turns are.
+    turns contradict each other than was said of them, 1 at least, and is known with `widened_freedom`. `estimator` is
+    another's name where readings in attitudes are told as turns are.
     """
 
     scale: Array
@@ -89,6 +89,7 @@ class TurnedSolution:
     angles_covariance_rad2: Array
     residuals_rad_s: Array
     widened: float
+    widened_freedom: float
     budget: Budget
     observations: int
     rank: int
@@ -148,7 +149,7 @@ def solve_turned(
         state, iterations = state.moved(step), iterations + 1
         settled = bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
     equations = _equations(gyroscope, turns, means, state)
-    widened = _widened(equations[len(means) :], covariance)
+    widened, freedom = _widened(equations[len(means) :], covariance)
     _check_closed(turns, equations[len(means) :], widened)
     equations = [each.widened(widened) for each in equations]
     step, covariance = _solve(equations)
@@ -169,6 +170,7 @@ def solve_turned(
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.array([(each.observed - each.design @ step)[:3] for each in equations]),
         widened=widened,
+        widened_freedom=freedom,
         budget=_budget(equations, to_parameters @ covariance),
         observations=len(equations),
         rank=told.rank,
@@ -254,14 +256,19 @@ def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
     return told
 
 
-def _widened(turns: Sequence[_Equations], covariance: Array) -> float:
-    """How much more the turns miss than was said of them, as far as there are more of them than parameters."""
+def _widened(turns: Sequence[_Equations], covariance: Array) -> tuple[float, float]:
+    """How much more the turns miss than was said of them, as far as there are more of them than parameters.
+
+    And with how many degrees of freedom that is known: no end of them where what was said holds.
+    """
     chi_square, freedom = 0.0, 0.0
     for each in turns:
         weight = np.linalg.inv(each.covariance)
         chi_square += float(each.observed @ weight @ each.observed)
         freedom += len(each.observed) - float(np.trace(weight @ each.design @ covariance @ each.design.T))
-    return max(1.0, float(np.sqrt(chi_square / freedom))) if freedom > 1 else 1.0
+    if freedom <= 1 or chi_square <= freedom:
+        return 1.0, np.inf
+    return float(np.sqrt(chi_square / freedom)), freedom
 
 
 def _check_closed(turns: Sequence[Turn], equations: Sequence[_Equations], widened: float) -> None:

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors
 
 SPREAD = 4.0  # of ln size before the data are seen: a factor of 50 either way
 STEP = 0.25  # of ln size, for differences
 TRIALS = 300
-FEWEST_FREEDOM = 3.0  # below, twice a standard uncertainty means nothing
+FEWEST_FREEDOM = 3.0  # below, Student's t hardly has a variance
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,8 +174,13 @@ class MixedModel:
 
 
 def widened(covariance: Array, freedom: Array) -> Array:
-    """A covariance (q, q) as wide as Student's t of so much freedom (q,): twice its root is then t's 95 %."""
-    wider = np.sqrt(np.maximum(freedom, FEWEST_FREEDOM) / (np.maximum(freedom, FEWEST_FREEDOM) - 2))
+    """A covariance (q, q) as wide as Student's t of so much freedom (q,): twice its root is then t's 95 %.
+
+    The variance of t is ν/(ν − 2), and none below ν = 2: then it is t's coverage factor that counts (JCGM 100, G.3).
+    """
+    several = np.maximum(freedom, FEWEST_FREEDOM)
+    by_coverage = coverage_factors(np.clip(freedom, 1.0, FEWEST_FREEDOM)) / COVERAGE_FACTOR
+    wider = np.where(freedom >= FEWEST_FREEDOM, np.sqrt(several / (several - 2)), by_coverage)
     found: Array = covariance * wider[:, None] * wider
     return found
 

@@ -12,6 +12,7 @@ from rig.report.elsewhere_entries import unsolved
 from rig.report.entry import entry
 from rig.report.kinds.kind import Without
 from rig.report.kinds.registry import kinds
+from rig.report.omitted import notes, omitted
 
 ALWAYS = ("sensors", "verification")  # there of every run, if only to say that there are none
 
@@ -31,6 +32,8 @@ def document_of(outcome: Outcome) -> ResultDocument:
             **clock,
             **found,
             **({"unsolved": faults} if (faults := unsolved(outcome)) else {}),
+            **({"omitted": left_out} if (left_out := omitted(outcome)) else {}),
+            **({"notes": said} if (said := notes(outcome)) else {}),
             **({"others": others} if others else {}),
             **({"mounts": tuple(map(_mount, outcome.mounts))} if outcome.mounts else {}),
         }

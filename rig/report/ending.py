@@ -11,6 +11,7 @@ from rig.report.check_words import what_failed, words_of
 from rig.report.kinds.kind import Shown, Three
 from rig.report.kinds.registry import kinds, outlets
 from rig.report.mounts import farthest_off
+from rig.report.omitted import omitted_lines
 from rig.report.rounding import in_print, plus_minus
 from rig.station.plain_text import INDENT, wrapped
 
@@ -46,7 +47,8 @@ def ending(
     """
     items = [*_items(result)]
     summary = "; ".join([*_what_the_values_are(items), _passed(result)])
-    needed = [line for kind in kinds() for line in kind.unsolved(result)], [*since]
+    unsolved = (line for kind in kinds() for line in kind.unsolved(result))
+    needed = [*unsolved, *omitted_lines(result)], [*since]
     in_short = [line for kind in kinds() for found in kind.found(result) for line in kind.in_short(found)]
     files = [] if certificate is None else [f"certificate: {certificate}"]
     files.append(f"everything: {everything}")

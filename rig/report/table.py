@@ -16,6 +16,7 @@ from rig.report.kinds.characteristic import Term, terms
 from rig.report.kinds.kind import said
 from rig.report.kinds.registry import kinds
 from rig.report.mounts import mount_lines
+from rig.report.omitted import omitted_lines
 from rig.report.rounding import plus_minus
 from rig.station.plain_text import plain, say
 
@@ -80,7 +81,7 @@ def print_values(result: ResultDocument, console: Console, sensor: str | None = 
                 console.print(plain(each) if isinstance(each, str) else each)
         for line in kind.unsolved(result):
             console.print(plain(line))
-    for line in mount_lines(result):
+    for line in (*mount_lines(result), *omitted_lines(result, sensor)):
         console.print(plain(line))
 
 

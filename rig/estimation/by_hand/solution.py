@@ -102,6 +102,8 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
     """
     if len(session.rests) < 2:
         raise too_few(session, None)
+    if 2 * sum(move.lost or move.clipped for move in session.moves) > len(session.moves):
+        raise too_few(session, None)
     if len(session.rests) > MOST_RESTS:
         what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
         raise Fault("too_many_moves", what, "Give the recording in pieces")

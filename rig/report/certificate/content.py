@@ -22,6 +22,7 @@ from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard, Without
 from rig.report.kinds.registry import kinds, outlets, shown
 from rig.report.mounts import mount_lines
+from rig.report.omitted import omitted_lines
 from rig.turners.kind import Words
 from rig.turners.registry import words_of
 
@@ -357,6 +358,7 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
             yield f"{FIELD.of(name)}, was recorded and not calibrated: {magnetometer.error}"
     for name, faults in result.unsolved.items():
         yield from (f"{name}, {what}, was recorded and not calibrated: {each.error}" for what, each in faults.items())
+    yield from (f"{line[:1].upper()}{line[1:]}." for line in omitted_lines(result))
     if not provenance.model_dump().get("script_installed", True):
         yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
 

@@ -207,10 +207,6 @@ def _in_attitudes(attitudes: InAttitudesRatesEntry | None, clocks: Iterable[Time
         )
         late_ms, known_ms = 1e3 * way.clock_s, 2e3 * way.clock_std_s
         yield f"the attitudes' clock is {late_ms:+.2f} ± {known_ms:.2g} ms off the samples', which is allowed for"
-        for each in way.left_out:
-            yield f"left out: {each.error}: {each.count} increments, the first at {each.first_s:.2f} s"
-        if way.set_aside:
-            yield f"left out: attitude_untrustworthy: {way.set_aside} increments that contradict all others"
     for method, other in attitudes.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"

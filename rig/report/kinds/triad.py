@@ -103,8 +103,6 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
         yield f"a placement found to change each reading by {told} beside its attitude{beside}"
         if laid.placement_uncertainty > laid.placement_std / 2:
             yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
-    if laid.rows_left_out:
-        yield f"left out: not_at_rest: {laid.rows_left_out} rows in which the body moves"
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
