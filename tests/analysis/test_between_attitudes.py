@@ -173,7 +173,7 @@ def test_a_gap_in_the_samples_costs_its_windows_alone(tmp_path: Path, capsys: py
     (left_out,) = rate["in_attitudes"]["followed"]["left_out"]
     assert left_out["error"] == "lost_samples" and left_out["count"] <= 3
     assert main(command(files, "--all")) == 0
-    assert "left out: lost_samples:" in " ".join(capsys.readouterr().out.split())
+    assert "increments, lost_samples, for up to 0.5" in " ".join(capsys.readouterr().out.split())
 
 
 def test_rows_that_last_while_the_body_turns_are_no_rests() -> None:
