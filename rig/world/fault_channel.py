@@ -6,10 +6,16 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
     pace time_scale                             how many times as fast as real it may go from now on
     protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
-    pause · play · stop_program · speed_slider fraction · remote_control on
+    pause · play · stop_program · speed_slider fraction · remote_control on · robot_mode name
+    safety_limit fraction                       a limit that slows the arm
+    payload mass_kg · payload_stays on          one that somebody else sets; none is taken that a program sets
+    at_program_start then after_s               another request, carried out so long after the start of every program,
+                                                as by a fieldbus adapter that is set to stop; null: none
+    step_clock seconds · encoder joint error_rad   the controller's clock is set; a joint's reported angle is off by it
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
+    registers_in_use first last                 all its integers and doubles from one number to another
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
-    close_dashboard                             this one of them alone: what serves the pendant's screen is gone
+    close_dashboard · close_primary             this one of them alone
     sensor_fault sensor fault   absent, other_part (its identity), damaged (a bit now and then), silent (no data-ready),
                                 stuck (it feels what it felt) or saturated (far more than its range); null: it is well
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
@@ -25,7 +31,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     fit part                                    the board of another part of a series, by its serial number
     instruct say face turns again               what the operator reads, where a hand turns the sensors
     servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
-    servo_fault held_fast dumb voltage_v temperature_c lose spoil   what is given holds; `lose`, `spoil`: replies
+    servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   what is given holds; `lose`, `spoil`: replies
     servo_line silent listen                    a line that carries nothing; its port, that closes
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
@@ -36,6 +42,7 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
+from rig.world.arm_orders import arm_orders, robot_state
 from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
@@ -44,6 +51,7 @@ from rig.world.laboratory import Laboratory
 from rig.world.servo.bench import ServoBench
 from rig.world.servo.drive import Faults
 from rig.world.servo.wire_format import WRITE, Packet
+from rig.world.ur10e.faults import AtProgramStart
 from rig.world.ur10e.on_arm import OnArm
 
 Reply = dict[str, Any]
@@ -58,7 +66,6 @@ SHOWN = (
 FAULTS = tuple(each.name for each in fields(Faults))
 KINDS = ("kvh", "autopilot", "printer")  # of instruments
 OF_LINE = {"bit_error_rate", "silent", "host_baud"}
-FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
 
 
 class World(Protocol):
@@ -72,8 +79,9 @@ class World(Protocol):
     def instrument_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
-    def close_dashboard(self) -> None: ...
+    def close_arm_port(self, port: int) -> None: ...
     def silence_arm(self, duration_s: float) -> None: ...
+    def set_remote_control(self, on: bool) -> None: ...
     def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None: ...
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
@@ -109,7 +117,12 @@ class ControlSession:
     def _of_what_turns(self) -> dict[str, Callable[..., Reply | None]]:
         match self._world.laboratory.turning:
             case OnArm():
-                return {**self._of_the_clock(), **self._of_the_arm()}
+                return {
+                    **self._of_the_clock(),
+                    "state": self._state_of_the_arm,
+                    "at_program_start": self._at_program_start,
+                    **arm_orders(self._world),
+                }
             case ServoBench() as bench:  # its driver measures time by the clock on the wall, which nobody holds
                 return self._of_servo(self._world, bench)
             case _:
@@ -121,29 +134,6 @@ class ControlSession:
             "run": self._run,
             "advance": self._advance,
             "pace": lambda time_scale: self._world.clock.pace(float(time_scale)),
-        }
-
-    def _of_the_arm(self) -> dict[str, Callable[..., Reply | None]]:
-        robot = self._world.laboratory.robot
-        return {
-            "state": self._state,
-            "protective_stop": robot.protective_stop,
-            "emergency_stop": robot.emergency_stop,
-            "safeguard_stop": robot.safeguard_stop,
-            "release": robot.release,
-            "power_off": robot.power_off,
-            "power_on": robot.power_on,
-            "brake_release": robot.brake_release,
-            "pause": lambda: {"done": robot.pause()},
-            "play": lambda: {"done": robot.resume()},
-            "stop_program": lambda: robot.stop_program("stopped on the pendant"),
-            "speed_slider": robot.set_speed_slider,
-            "remote_control": self._remote_control,
-            "register_in_use": self._register_in_use,
-            "register_free": self._register_free,
-            "close_arm": self._close_arm,
-            "close_dashboard": self._world.close_dashboard,
-            "silence_arm": self._silence_arm,
         }
 
     def _of_servo(self, world: World, bench: ServoBench) -> dict[str, Callable[..., Reply | None]]:
@@ -187,7 +177,7 @@ class ControlSession:
             return _line({"ok": False, "error": f"unknown request {name!r}", "known": sorted(self._orders)})
         try:
             reply = order(**request)
-        except (TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        except (TypeError, ValueError, AttributeError, ArithmeticError, LookupError) as error:
             return _line({"ok": False, "error": f"{name}: {error}"})
         if self._reply_at is not None:
             return b""
@@ -212,45 +202,22 @@ class ControlSession:
     def _advance(self, duration_s: float) -> None:
         self._reply_at = self._world.clock.advance(duration_s)
 
-    # -- arm ---------------------------------------------------------------------------------------------------
-    def _state(self) -> Reply:
-        robot = self._world.laboratory.robot
+    def _at_program_start(self, then: Mapping[str, Any] | None, after_s: float = 0.1) -> None:
+        faults = self._world.laboratory.robot.faults
+        if then is None:
+            faults.at_program_start = None
+            return
+        request = dict(then)
+        act = partial(self._orders[request.pop("do")], **request)
+        faults.at_program_start = AtProgramStart(act, float(after_s))
+
+    def _state_of_the_arm(self) -> Reply:
         return {
-            "q_rad": robot.motion.q_rad,
-            "qd_rad_s": robot.motion.qd_rad_s,
-            "moving": robot.motion.moving,
-            "still_since_s": robot.still_since_s,
-            "program_running": robot.robot_status_bits >> 1 & 1 == 1,
-            "program": robot.program_name,
-            "runtime_state": robot.runtime_state.name,
-            "robot_mode": robot.robot_mode.name,
-            "safety_mode": robot.safety_mode.name,
-            "speed_slider": robot.speed_slider,
-            "speed_scaling": robot.motion.fraction,
-            "remote_control": robot.remote_control,
-            "payload_kg": robot.payload_kg,
-            "payload_centre_m": robot.payload_centre_m,
-            "claims": sorted(robot.claims),
-            "messages": [message.text for message in robot.messages.after(0)],
+            **robot_state(self._world.laboratory.robot),
             "held": self._world.clock.held,
             "board_powered": self._world.laboratory.board is not None,
             "board_baud": self._world.line.baud,
         }
-
-    def _remote_control(self, on: bool) -> None:
-        self._world.laboratory.robot.remote_control = bool(on)
-
-    def _register_in_use(self, name: str = "input_int_register_0") -> None:
-        self._world.laboratory.robot.claims[name] = FIELDBUS
-
-    def _register_free(self, name: str = "input_int_register_0") -> None:
-        self._world.laboratory.robot.claims.pop(name, None)
-
-    def _close_arm(self, listen: bool = True) -> None:
-        self._world.close_arm(listen=bool(listen))
-
-    def _silence_arm(self, duration_s: float) -> None:
-        self._world.silence_arm(float(duration_s))
 
     # -- heat ----------------------------------------------------------------------------------------------------
     def _body(self) -> HeatedBody:

@@ -14,6 +14,7 @@ from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
 UNPACED = inf  # the lag of a client that nobody waits for
+ALONE_S = 0.3  # wall time after which a client's next question follows from no answer before it
 GATHER_S = 0.002  # wall time for which a gathering wire keeps bytes together while the world has more to do
 
 
@@ -45,6 +46,7 @@ class Connection:
         self._delivered_s = 0.0  # wall time
         self._ticks = 0
         self._wire = Wire(network.sockets.unread(peer), listener.lag_s, time.monotonic)
+        self._asked_s = time.monotonic()  # or accepted
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -81,7 +83,8 @@ class Connection:
         if not data:
             self.close()
             return False
-        if self.session.dialogue:
+        asked_s, self._asked_s = self._asked_s, time.monotonic()
+        if self.session.dialogue and self._asked_s - asked_s < ALONE_S:
             self._network.on_dialogue()
         self.send(self.session.receive(data))
         if self.session.closing:  # which `send` does not see when there is nothing to say

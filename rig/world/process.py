@@ -49,6 +49,8 @@ ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], float]] = {
     rtde.PORT: (rtde.RtdeSession, ARM_LAG_S),
 }
 
+SCRIPT_PORTS = (script_socket.PRIMARY_PORT, script_socket.SECONDARY_PORT, script_socket.REALTIME_PORT)
+
 
 class World:
     """Laboratory, clock and sockets."""
@@ -144,11 +146,20 @@ class World:
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
 
-    def close_dashboard(self) -> None:
-        """The dashboard alone closes its connections and takes no new ones."""
+    def close_arm_port(self, port: int) -> None:
+        """One of the controller's ports alone closes its connections and takes no new ones."""
         for listener in self.arm_listeners:
-            if listener.port == dashboard_server.PORT:
+            if listener.port == port:
                 listener.close()
+
+    def set_remote_control(self, on: bool) -> None:
+        """The pendant is switched to remote or to local control, which closes the connections that took scripts in."""
+        robot = self.laboratory.robot
+        before, robot.remote_control = robot.local_control, on
+        if robot.local_control and not before:
+            for listener in self.arm_listeners:
+                if listener.port in SCRIPT_PORTS:
+                    listener.hang_up()
 
     def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None:
         """The servo's line carries nothing, or its port is gone."""

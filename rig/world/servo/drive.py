@@ -25,12 +25,13 @@ BY_VOLTAGE, BY_HEAT, BY_LOAD = 0x01, 0x04, 0x20  # bits of Hardware Error Status
 
 @dataclass(slots=True)
 class Faults:
-    """What a test can make wrong: the supply, the heat, a shaft held fast, and a servo that answers nothing more."""
+    """What a test can make wrong: supply, heat, a shaft held fast, a servo that says nothing, or no to every write."""
 
     voltage_v: float
     temperature_c: float
     held_fast: bool = False
     dumb: bool = False
+    denies: bool = False
 
 
 class Drive:

@@ -129,6 +129,8 @@ class Servo:
             REBOOT: self._reboot,
             CLEAR: self._clear,
         }
+        if self.faults.denies and packet.instruction == WRITE:
+            return RESULT_FAIL, b""
         if packet.instruction not in answers or (packet.instruction == CLEAR and self.truth.firmware < 42):
             return INSTRUCTION_ERROR, b""
         return answers[packet.instruction](packet.parameters, time_s)

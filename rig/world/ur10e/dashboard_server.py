@@ -1,21 +1,23 @@
 """The dashboard server, port 29999: one line in, one line out.
 
-Dashboard Server manual of the maker, e-Series. In local control it answers questions and stops; it starts nothing. One
-of the CB3 series does not know local control, nor questions about it.
+Dashboard Server manual of the maker, e-Series. In local control it answers questions and refuses every order, `stop`
+among them, and so does a connection that was opened in local control until it is opened anew (Universal Robots ROS
+Driver, issues 125 and 262). One of the CB3 series does not know local control, nor questions about it.
 """
 
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
-from rig.world.ur10e.robot import Robot
+from rig.world.ur10e.robot import E_SERIES, Robot
 
 PORT = 29999
 LINE_BYTES = 1 << 16  # no command is so long
 UNLOCK_AFTER_S = 5.0
-E_SERIES = 5  # the first version of its software
 PROGRAMS = ("wait_program.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
+SAFETY = "Command is not allowed due to safety reasons"
+NOT_ALLOWED = f"{SAFETY}, please switch robot to Remote Control mode and reconnect to port {PORT}"
 TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
@@ -40,6 +42,7 @@ class DashboardSession:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._opened_in_local_control = robot.local_control
         self.closing = False
         self._buffer = bytearray()
         self._role = "none"
@@ -59,8 +62,6 @@ class DashboardSession:
             "is in remote control": lambda: str(robot.remote_control).lower(),
             "get operational mode": lambda: self._mode or "NONE",  # as where no password for modes is set
             "getuserrole": self._get_role,
-            "stop": self._stop,
-            "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
             "popup": lambda: "showing popup",
             "close popup": lambda: "closing popup",
             "close safety popup": lambda: "closing safety popup",
@@ -69,19 +70,23 @@ class DashboardSession:
             "generate support file": lambda: "Completed successfully: ur_support.zip",
             "savelog": lambda: "Log saved to disk",
             "clear operational mode": self._clear_mode,
-            "shutdown": self._shutdown,
-            "power off": self._power_off,
         }
         self._orders: dict[str, Callable[[], str]] = {
             "play": self._play,
+            "stop": self._stop,
+            "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
+            "power off": self._power_off,
+            "shutdown": self._shutdown,
             "power on": self._power_on,
             "brake release": self._brake_release,
             "unlock protective stop": self._unlock,
             "restart safety": self._restart_safety,
         }
-        self._worded: dict[str, Callable[[str], str]] = {
+        self._worded_orders: dict[str, Callable[[str], str]] = {
             "load installation": lambda name: f"Loading installation: {name}" if name else "File not found: ",
             "load": self._load,
+        }
+        self._worded: dict[str, Callable[[str], str]] = {
             "popup": lambda text: "showing popup",
             "addtolog": lambda text: "Added log message",
             "set operational mode": self._set_mode,
@@ -116,16 +121,20 @@ class DashboardSession:
         if key == "quit":
             self.closing = True
             return "Disconnected"
-        if key in self._questions and not (
-            key == "is in remote control" and self._robot.identity.polyscope[0] < E_SERIES
-        ):
+        if key in self._questions and not (key == "is in remote control" and self._robot.identity.polyscope < E_SERIES):
             return self._questions[key]()
         if key in self._orders:
-            return self._orders[key]() if self._robot.remote_control else f"Failed to execute: {key}"
-        for words, handler in self._worded.items():
+            return self._orders[key]() if self._may_order else NOT_ALLOWED
+        for words, handler in {**self._worded_orders, **self._worded}.items():
             if key == words or key.startswith(words + " "):
-                return handler(line[len(words) :].strip())
+                allowed = self._may_order or words not in self._worded_orders
+                return handler(line[len(words) :].strip()) if allowed else NOT_ALLOWED
         return f"could not understand: '{line}'"
+
+    @property
+    def _may_order(self) -> bool:
+        """Whether it takes more than questions."""
+        return not (self._opened_in_local_control or self._robot.local_control)
 
     # -- questions ---------------------------------------------------------------------------------------------
     @property

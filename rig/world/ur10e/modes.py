@@ -4,10 +4,16 @@ from enum import IntEnum
 
 
 class RobotMode(IntEnum):
+    NO_CONTROLLER = -1
+    DISCONNECTED = 0
+    CONFIRM_SAFETY = 1
+    BOOTING = 2
     POWER_OFF = 3
     POWER_ON = 4
     IDLE = 5
+    BACKDRIVE = 6
     RUNNING = 7
+    UPDATING_FIRMWARE = 8
 
 
 class SafetyMode(IntEnum):

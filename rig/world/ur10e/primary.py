@@ -64,7 +64,7 @@ class PrimarySession:
 
 
 def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
-    return package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.time_s * 1e6), -1, kind) + payload)
+    return package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.reported_time_s * 1e6), -1, kind) + payload)
 
 
 def _content(message: Message) -> bytes:
@@ -94,7 +94,7 @@ def _robot_mode(robot: Robot) -> bytes:
     playing = robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING, RuntimeState.STOPPING)
     return struct.pack(
         ">Q7?BB3dB",
-        int(robot.time_s * 1e6),
+        int(robot.reported_time_s * 1e6),
         True,
         True,
         robot.robot_mode != RobotMode.POWER_OFF,

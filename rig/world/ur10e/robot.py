@@ -17,6 +17,7 @@ from rig.world.ur10e.controller_messages import (
     ProgramError,
     ReportLevel,
 )
+from rig.world.ur10e.faults import ArmFaults
 from rig.world.ur10e.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, Links
@@ -30,7 +31,7 @@ PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
-POLYSCOPE_X = (10,)  # its first version
+E_SERIES, POLYSCOPE_X = (5,), (10,)  # their first versions
 
 
 class Program(Protocol):
@@ -85,6 +86,7 @@ class Robot:
         # The tool's frame in the flange's (m, rotation vector rad): it stands in the same place, and may be turned.
         self.tcp_offset = (0.0, 0.0, 0.0, *tool_turn_rad)
         self.motion = motion
+        self.faults = ArmFaults()
         self.remote_control = remote_control
         self.tick = 0
         self._robot_mode = RobotMode.RUNNING
@@ -103,12 +105,13 @@ class Robot:
         self._last_input_tick = 0
         self._program: Program | None = None
         self._start: tuple[int, Program] | None = None
+        self._started_tick = 0
         self._mode_changes: list[tuple[int, RobotMode]] = []
         self._stopped_tick = 0
         self._still_since_tick = 0
         self._moved_tick = 0
         self.speed_slider = speed_slider
-        self.motion.fraction_wanted = speed_slider
+        self.motion.fraction_wanted = self._fraction
 
     @property
     def robot_mode(self) -> RobotMode:
@@ -136,6 +139,11 @@ class Robot:
     def time_s(self) -> float:
         return self.tick / TICKS_PER_SECOND
 
+    @property
+    def reported_time_s(self) -> float:
+        """The time that it stamps its states and messages with."""
+        return self.time_s + self.faults.clock_step_s
+
     def step(self) -> None:
         """Make one tick: modes due, the program's turn, the joints."""
         self.tick += 1
@@ -144,9 +152,12 @@ class Robot:
         if self._start is not None and self._start[0] <= self.tick:
             self._program, self._start = self._start[1], None
             self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
-            self.runtime_state = RuntimeState.PLAYING
+            self.runtime_state, self._started_tick = RuntimeState.PLAYING, self.tick
         if self.runtime_state == RuntimeState.PLAYING:
             self._play()
+        at_start = self.faults.at_program_start
+        if at_start is not None and self._started_tick and at_start.due(self.tick - self._started_tick):
+            at_start.act()
         self.motion.step(self.time_s)
         if not self.motion.standing:
             self._still_since_tick = self.tick
@@ -195,6 +206,11 @@ class Robot:
         """Whether its software has a Robot API, or nothing, in place of a dashboard."""
         return self.identity.polyscope >= POLYSCOPE_X
 
+    @property
+    def local_control(self) -> bool:
+        """Whether the pendant alone may order something; the CB3 series does not know the difference."""
+        return not self.remote_control and self.identity.polyscope >= E_SERIES
+
     # -- programs ------------------------------------------------------------------------------------------------
     @property
     def program_name(self) -> str:
@@ -234,7 +250,7 @@ class Robot:
         self.watchdog_s = 0.0
         if self.runtime_state != RuntimeState.STOPPED:
             self.motion.stop(PROGRAM_STOP_RAD_S2)
-            self.motion.fraction_wanted = self.speed_slider
+            self.motion.fraction_wanted = self._fraction
             self.runtime_state = RuntimeState.STOPPED if self.motion.standing else RuntimeState.STOPPING
 
     def pause(self) -> bool:
@@ -249,7 +265,7 @@ class Robot:
         """Go on after a pause."""
         if not self.ready or self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
             return False
-        self.motion.fraction_wanted = self.speed_slider
+        self.motion.fraction_wanted = self._fraction
         self.runtime_state = RuntimeState.RESUMING
         return True
 
@@ -312,8 +328,28 @@ class Robot:
         if not isfinite(fraction):
             return
         self.speed_slider = min(max(fraction, 0.0), 1.0)
+        self._scale_anew()
+
+    def set_safety_limit(self, fraction: float) -> None:
+        """A limit of the safety settings leaves this fraction of the programmed speed; 1 for none."""
+        self.faults.safety_limit = min(max(fraction, 0.0), 1.0)
+        self._scale_anew()
+
+    @property
+    def _fraction(self) -> float:
+        """How fast a program may be played: by the slider, and by the safety settings."""
+        return self.speed_slider * self.faults.safety_limit
+
+    def _scale_anew(self) -> None:
         if self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
-            self.motion.fraction_wanted = self.speed_slider
+            self.motion.fraction_wanted = self._fraction
+
+    def lose_operation(self, mode: RobotMode) -> None:
+        """The arm leaves its operation for another mode, as where its firmware is updated: no program goes on."""
+        self.stop_program(f"robot mode {mode.name}")
+        self.motion.stop(BRAKE_RAD_S2)
+        self._mode_changes = []
+        self.robot_mode = mode
 
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
         most_kg = self.model.payload_kg
@@ -322,7 +358,8 @@ class Robot:
         centre = tuple(float(each) for each in centre_m)
         if len(centre) != 3 or not all(map(isfinite, centre)):
             raise ProgramError(f"a payload's centre is three lengths, not {centre_m}")
-        self.payload_kg, self.payload_centre_m = mass_kg, centre
+        if not self.faults.payload_stays:
+            self.payload_kg, self.payload_centre_m = mass_kg, centre
 
     def set_tcp(self, offset: Sequence[float]) -> None:
         if tuple(offset) != self.tcp_offset:

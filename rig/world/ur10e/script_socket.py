@@ -2,7 +2,8 @@
 
 URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
 itself. The text of `rtde_control` is not interpreted but acted out (`ur_rtde_program`); other programs may use the
-statements listed in `urscript`.
+statements listed in `urscript`. In local control they take nothing in: a connection that was opened in it stays
+read-only, and those that are open when it begins are closed (Universal Robots ROS Driver, issue 459).
 """
 
 import re
@@ -99,6 +100,7 @@ class ScriptSession:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self._read_only = robot.local_control  # and so for as long as it is open
         self.closing = False
         self._reader = ScriptReader()
 
@@ -108,10 +110,10 @@ class ScriptSession:
     def receive(self, data: bytes) -> bytes:
         try:
             for lines in self._reader.feed(data):
-                if self._robot.remote_control:
-                    self._obey(lines)
-                else:
+                if self._read_only or self._robot.local_control:
                     self._robot.messages.report(READ_ONLY)
+                else:
+                    self._obey(lines)
         except ProgramError as error:
             self._robot.messages.complain(error)
             self._reader = ScriptReader()

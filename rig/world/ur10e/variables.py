@@ -72,11 +72,11 @@ def _borne(of: Callable[[Robot], Load]) -> Get:
 ZERO6 = (0.0,) * 6
 
 OUTPUTS: dict[str, tuple[str, Get]] = {
-    "timestamp": ("DOUBLE", lambda r: r.time_s),
+    "timestamp": ("DOUBLE", lambda r: r.reported_time_s),
     "target_q": ("VECTOR6D", lambda r: r.motion.now.target_q_rad),
     "target_qd": ("VECTOR6D", lambda r: r.motion.now.target_qd_rad_s),
     "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
-    "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
+    "actual_q": ("VECTOR6D", lambda r: r.faults.reported(r.motion.actual_q_rad)),
     "actual_qd": ("VECTOR6D", lambda r: r.motion.actual_qd_rad_s),
     "actual_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.actual_q_rad)),
     "actual_TCP_speed": ("VECTOR6D", lambda r: r.tcp_motion.speed),
