@@ -40,7 +40,7 @@ class ArmMotion:
     and of those `names`. All that stands in the flange's frame is given in the item's, to which `mount` (3, 3) takes
     it: they are one where the item is not mounted anew. Where one reading of an angle scatters (`reading_std_rad`),
     angles and rates are those of a window, and a turn is known by the same reading one turn later.
-    Raises Fault `no_motion`, `not_finite`, `impossible_times`.
+    Raises Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
 
     def __init__(
@@ -56,6 +56,7 @@ class ArmMotion:
         self.kinematics, self._names, self._scatters = kinematics, names, reading_std_rad > 0
         self.mount: Array = np.eye(3) if mount is None else mount
         states = well_timed(states) if self._scatters else states
+        _check_order(states["time_s"])
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self._states = states[first]
         if len(self.time_s) < 4 or not names:
@@ -131,8 +132,8 @@ class ArmMotion:
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
         """The whole turn, or the arc, of a sweep that was made in a window.
 
-        Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
-        `other_joint_moved`.
+        Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_limited`,
+        `speed_not_constant`, `other_joint_moved`.
         """
         begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])
         find = find_even_turn if self._scatters else find_revolution
@@ -166,12 +167,25 @@ class ArmMotion:
 def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:
     """What turned in a recording, as it moves the item; `turned` (3, 3) is by how that sits off its nominal mount.
 
-    Raises as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`.
+    Raises as `turner_of`; Fault `no_motion`, `not_finite`, `impossible_times`, `arm_clock_stepped`.
     """
     turner = turner_of(run)
     mount = np.array(run.settings.mount)
     mount = mount if turned is None else turned @ mount
     return ArmMotion(run.states, turner.geometry, turner.joints, mount, turner.reading_std_rad)
+
+
+def _check_order(time_s: Array) -> None:
+    """States stand in the order in which they came: one that is older than the one before it was stamped anew."""
+    back = np.flatnonzero(np.diff(time_s) < 0)
+    if len(back):
+        before_s, after_s = time_s[back[0] : back[0] + 2]
+        raise Fault(
+            "arm_clock_stepped",
+            f"the time of the arm's states goes back from {before_s:.3f} s to {after_s:.3f} s: the controller's clock "
+            "was set",
+            "Record again; of this recording nothing can be put on one clock",
+        )
 
 
 def turner_of(run: RunData) -> RecordedTurner:

@@ -85,7 +85,8 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
     """The revolution of one sweep, of which `states` (n,) of the turner tell, in the order of their times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
-    `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`, `other_joint_moved`.
+    `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_limited`, `speed_not_constant`,
+    `other_joint_moved`.
     """
     where, (low, high) = describe(sweep), sweep.revolution_rad
     time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
@@ -158,15 +159,22 @@ def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: floa
 
 
 def _check_slider(turning: NDArray[Any], where: str) -> None:
-    """An arm tells of its speed slider; other turners have none."""
+    """An arm tells of its speed slider, and of how much slower its controller goes; other turners have none."""
     if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
         return
-    slowest = float(min(turning["target_speed_fraction"].min(), turning["speed_scaling"].min()))
-    if slowest < MIN_SPEED_FRACTION:
+    slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
+    if slider < MIN_SPEED_FRACTION:
         raise Fault(
             "slider_below_100",
-            f"in {where} the controller ran at {100 * slowest:.0f} % of the programmed speed",
+            f"in {where} the speed slider was at {100 * slider:.0f} %",
             "Set the speed slider on the pendant to 100 %, then repeat the sweep",
+        )
+    if scaling < MIN_SPEED_FRACTION:
+        raise Fault(
+            "speed_limited",
+            f"in {where} the controller ran at {100 * scaling:.0f} % of the programmed speed with the slider at 100 %, "
+            "as where a limit of the safety settings slows it down",
+            "Widen that limit in the arm's safety settings, or lower procedure.speed_deg_s, then repeat the sweep",
         )
 
 

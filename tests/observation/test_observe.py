@@ -367,6 +367,22 @@ def slow_slider(run: RunData) -> RunData:
     return with_arm(run, change)
 
 
+def slowed_by_a_limit(run: RunData) -> RunData:
+    def change(arm: NDArray[Any]) -> NDArray[Any]:
+        arm["speed_scaling"][2000:2200] = 0.6
+        return arm
+
+    return with_arm(run, change)
+
+
+def clock_set_back(run: RunData) -> RunData:
+    def change(arm: NDArray[Any]) -> NDArray[Any]:
+        arm["time_s"][2000:] -= 0.5
+        return arm
+
+    return with_arm(run, change)
+
+
 def another_joint(run: RunData) -> RunData:
     def change(arm: NDArray[Any]) -> NDArray[Any]:
         arm["q_rad"][:, 1] += 0.02 * np.sin(arm["time_s"])
@@ -437,6 +453,8 @@ def gap_in_states(run: RunData) -> RunData:
         (lambda run: with_samples(run, lambda samples: samples[:50]), "time_base_not_found"),
         (halt, "speed_not_constant: in sweep 0"),
         (slow_slider, "slider_below_100: .* 80 %"),
+        (slowed_by_a_limit, "speed_limited: .* 60 % of the programmed speed with the slider at 100 %"),
+        (clock_set_back, "arm_clock_stepped: .* goes back"),
         (another_joint, "other_joint_moved"),
         (short, "incomplete_revolution: in sweep 0"),
         (still, "no_motion"),

@@ -81,6 +81,15 @@ def test_a_sweep_with_a_spike_is_repeated() -> None:
 
 
 @pytest.mark.slow
+def test_nothing_counts_of_a_recording_whose_clock_was_set() -> None:
+    """None of its sweeps could be put on one clock with the board's readings."""
+    run = known_to_the_board(readings_of(SETUP).recording())
+    states = run.states.copy()
+    states["time_s"][len(states) // 2 :] -= 0.5
+    assert resumption([replace(run, states=states)], run.settings, SCRIPT).done == frozenset()
+
+
+@pytest.mark.slow
 def test_what_was_repeated_counts_in_its_place() -> None:
     damaged = known_to_the_board(offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP)).recording())
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())
