@@ -7,9 +7,12 @@ from rig.motion.doubts import doubts
 from rig.motion.preflight import way_to_home
 from rig.motion.state import Report
 from rig.motion.steps import Plan, turn_words
+from rig.motion.winding import cable_words
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 from rig.turners.kind import Words
+
+NOBODY = "Nobody and nothing may be within its reach."
 
 
 def mounting(plan: Plan, number: int, words: Words) -> Prompt:
@@ -25,7 +28,8 @@ def mounting(plan: Plan, number: int, words: Words) -> Prompt:
         "Then small turns try the mounting, before "
         f"{len(stage.indices)} sweeps turn {words.turned} by more than {far} each.",
         *filter(None, [words.beware]),
-        "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
+        NOBODY,
+        *cable_words(plan, plan.home_q_rad, _joint_names(plan)),
     )
     ticked = f"The item is mounted so, and nobody and nothing is within the {words.short}'s reach"
     return Prompt(lines, to_tick=ticked, for_a_person=True, mounts=number)
@@ -64,10 +68,14 @@ def announcement(
             f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
         )
     lines += [*doubts(plan), *filter(None, [words.beware])]
-    lines.append(
-        "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
-    )
+    lines += [NOBODY, *cable_words(plan, report.state.q_rad, report.joints)]
     return Prompt(tuple(lines), to_tick=f"I have looked: nobody and nothing is within the {words.short}'s reach")
+
+
+def _joint_names(plan: Plan) -> list[str]:
+    """The names of the joints that sweeps turn, each in its place; of the others, which turn little, their numbers."""
+    names = {sweep.joint: sweep.joint_name for sweep in plan.sweeps}
+    return [names.get(joint, f"joint {joint + 1}") for joint in range(len(plan.home_q_rad))]
 
 
 def _farthest(plan: Plan) -> str:
