@@ -46,6 +46,11 @@ class TurnerSection(Section):
         return ""
 
     @property
+    def address_key(self) -> str:
+        """The key of this section that says the address; empty where nothing is connected to."""
+        return ""
+
+    @property
     def extension_m(self) -> Vector3:
         """Where the extension ends on which the sensors sit, x y z in the frame of what it turns, m."""
         return (0.0, 0.0, 0.0)
@@ -120,6 +125,11 @@ class ArmSection(TurnerSection):
     def address(self) -> str:
         """The controller's name or address."""
         return self.host
+
+    @property
+    def address_key(self) -> str:
+        """The key of that."""
+        return "host"
 
     @property
     def simulated_at(self) -> str | None:

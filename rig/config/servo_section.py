@@ -63,6 +63,11 @@ class ServoSection(TurnerSection):
         return self.port
 
     @property
+    def address_key(self) -> str:
+        """The key of that."""
+        return "port"
+
+    @property
     def simulated_at(self) -> str | None:
         """The host of its port; None of a serial port, at which none can be simulated."""
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None

@@ -54,6 +54,26 @@ def test_a_run_of_somebody_else_connects_to_what_the_user_names(
 
 
 @pytest.mark.slow
+def test_a_run_is_gone_on_with_where_its_devices_answer_now_and_nothing_else_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("RIG_HISTORY")
+    with socket.create_server(("127.0.0.1", 0)) as board, socket.create_server(("127.0.0.1", 0)) as history:
+        folder, (arm, begun, kept) = interrupted_run(tmp_path, [board, history])
+        config, now = (folder / "config.yaml").read_text(encoding="utf-8"), f"socket://{fresh_host()}:7321"
+        moved = rig_here("resume", folder, "--yes", "--set", f"board.port={now}")
+        assert now in moved.stderr and begun not in moved.stderr, moved.stderr
+        assert (folder / "config.yaml").read_text(encoding="utf-8") == config
+        other = rig_here("resume", folder, "--yes", "--set", "procedure.speed_deg_s=90")
+        assert other.returncode == 2 and "no_address: " in other.stderr
+        assert "arm.host, board.port" in other.stderr
+        monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "of another user"))
+        asked = rig_here("resume", folder, "--yes", "--set", f"board.port={now}")
+        assert "foreign_folder" in asked.stderr and f"--connect {now}" not in asked.stderr, "it was named just now"
+        assert all(f"--connect {each}" in asked.stderr for each in (arm, kept))
+
+
+@pytest.mark.slow
 def test_a_configuration_that_was_changed_since_is_not_one_s_own(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as board, socket.create_server(("127.0.0.1", 0)) as history:
         folder, (host, *_) = interrupted_run(tmp_path, [board, history])

@@ -1,0 +1,30 @@
+"""What may change of a run that is gone on with: where its devices answer, and nothing else."""
+
+from collections.abc import Sequence
+
+from rig.config.load import Loaded
+from rig.errors import Refused
+from rig.errors.quoting import quote
+
+
+def address_keys(loaded: Loaded) -> list[str]:
+    """The keys of a configuration that say an address: of what turns, of the board, of sensors with their own port."""
+    import yaml
+
+    turner = "turner" if "turner" in yaml.safe_load(loaded.text) else "arm"
+    key = loaded.config.turner.address_key
+    return [*([f"{turner}.{key}"] if key else []), *loaded.config.ports]
+
+
+def refuse_other_changes(loaded: Loaded, overrides: Sequence[str]) -> list[str]:
+    """The addresses that `overrides` of a configuration name. Raises Refused `no_address` where one names more."""
+    keys = address_keys(loaded)
+    for override in overrides:
+        key = override.partition("=")[0]
+        if key not in keys:
+            raise Refused(
+                "no_address",
+                f"--set {quote(key)} is no address of the run, and nothing else of it may change",
+                f"Give a new address to {', '.join(keys) or 'nothing: it has none'}, or start a new run with `rig run`",
+            )
+    return [override.partition("=")[2] for override in overrides]
