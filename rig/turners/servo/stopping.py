@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.turners.servo.bus import Bus, BusError
+from rig.turners.servo.bus import Bus, BusError, Denied
 from rig.turners.servo.clock import Clock
 from rig.turners.servo.instructions import brake
 from rig.turners.servo.link import Link
@@ -48,13 +48,18 @@ class Stop:
         clock = self._clock
         since_s, ends_s = clock.reference_s(), clock.now_s() + STOP_S
         told = threading.Event()
+        answer, refused = "the servo did not acknowledge the stop", False
 
         def tell(bus: Bus) -> None:
+            nonlocal answer, refused
             try:
                 if not _stopped_itself(bus):
                     brake(bus)
+                answer = "the servo has taken the stop"
                 told.set()
-            except BusError:
+            except BusError as error:
+                if isinstance(error, Denied):
+                    answer, refused = f"the servo refused the stop ({error})", True
                 with suppress(BusError):
                     bus.write_unheard(WATCHDOG, 1)
                 self._link.keep_quiet(2 * self._watchdog_s)
@@ -63,14 +68,15 @@ class Stop:
         if not clock.wait(told, TOLD_S):
             self._link.keep_quiet(2 * self._watchdog_s)
         seen = self._seen_at_rest(since_s, ends_s - clock.now_s())
+        refusal = f" ({answer})" if refused else ""
         if seen and self._lets_go():
-            return StopOutcome(True, "the shaft stands, but its motor is off", "Hold the board: nothing else may")
+            remedy = "Hold the board: nothing else may"
+            return StopOutcome(True, f"the shaft stands, but its motor is off{refusal}", remedy)
         if seen:
-            return StopOutcome(True, "the shaft stands, and the servo holds it")
-        delivered = "the servo has taken the stop" if told.is_set() else "the servo did not acknowledge the stop"
+            return StopOutcome(True, f"the shaft stands, and the servo holds it{refusal}")
         return StopOutcome(
             False,
-            f"{delivered}, and no state shows that the shaft stands",
+            f"{answer}, and no state shows that the shaft stands",
             f"Look at the shaft: its watchdog stops it {self._watchdog_s:.1f} s after the last instruction, but {SURE}",
         )
 

@@ -61,6 +61,20 @@ def test_a_fault_is_named_and_the_shaft_stands_within_a_second_of_it(what: str) 
         assert abs(rate_rad_s) < STANDS_RAD_S
 
 
+def test_a_stop_that_the_servo_refuses_is_told_with_its_error() -> None:
+    """Its watchdog stops the shaft then, as nobody speaks to it any more."""
+    with servo_on_a_wire() as wire:
+        with pytest.raises(Fault) as fault, held(wire, WATCHDOG_S) as servo:
+
+            def deny_and_stop() -> None:
+                wire.do("fault", "denies", True)
+                raise Fault("board_link_lost", "the board is gone", "plug it in")
+
+            servo.move(turn(servo.latest.q_rad[0], 340.0), at_speed(wire, deny_and_stop))
+        notes = " ".join(getattr(fault.value, "__notes__", ()))
+        assert "the servo refused the stop (error 1 at " in f"{fault.value} {notes}", (fault.value, notes)
+
+
 def test_a_few_lost_replies_are_borne() -> None:
     with servo_on_a_wire() as wire, held(wire) as servo:
         servo.move(turn(servo.latest.q_rad[0], 60.0), at_speed(wire, lambda: wire.do("of_bus", "lose", 3)))
