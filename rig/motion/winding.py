@@ -6,7 +6,7 @@ from math import degrees, pi
 from rig.motion.state import Joints
 from rig.motion.steps import Plan
 
-TOLD_RAD = pi / 2  # a cable that can be turned by less needs no word
+SLACK_RAD = pi / 2  # a cable that can be turned by less needs no word
 AWAY_RAD = pi  # from home: farther, a joint stands at another turn than the one that its cable was laid at
 
 
@@ -19,10 +19,10 @@ def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
 
 def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
     """What the cable at the flange must allow from how it hangs now, in sentences; `names` are those of the joints."""
-    told = [
+    turning = [
         f"{name} by {-degrees(low):.0f}° one way (-) and {degrees(high):.0f}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)
-        if max(-low, high) > TOLD_RAD
+        if max(-low, high) > SLACK_RAD
     ]
     away = [
         f"{name} stands {degrees(now - home):+.0f}° from home: its cable may be wound by as much already, and is "
@@ -30,6 +30,6 @@ def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
         for name, now, home in zip(names, q_rad, plan.home_q_rad, strict=True)
         if abs(now - home) > AWAY_RAD
     ]
-    if not told:
+    if not turning:
         return away
-    return [f"The sensor's cable needs slack, from how it hangs now, to turn {', '.join(told)}.", *away]
+    return [f"The sensor's cable needs slack, from how it hangs now, to turn {', '.join(turning)}.", *away]

@@ -77,6 +77,24 @@ def test_too_slow_an_acceleration_takes_the_wrist_beyond_its_joint_limit() -> No
     assert "wrist_1" in problems[0].what
 
 
+FAR = (*HOME[:5], HOME[5] + math.radians(300))
+BEYOND = (*HOME[:5], HOME[5] + math.radians(370))
+
+
+@pytest.mark.parametrize(
+    ("made", "remedy"),
+    [
+        (plan(speed_deg_s=150, acceleration_deg_s2=80), "shorten the run-up"),
+        (plan(arc_deg=720), "Lower procedure.arc_deg"),
+        (replace(plan(), steps=(Transfer("there", FAR, BEYOND, 1.0, 1.0, 2.0),)), "leave out the attitudes"),
+        (replace(plan(), steps=(Transfer("back", BEYOND, HOME, 1.0, 1.0, 7.0),)), "from the pendant"),
+    ],
+    ids=["run-up", "two turns", "an attitude", "where it stands"],
+)
+def test_a_joint_beyond_its_range_gets_the_remedy_that_fits(made: Plan, remedy: str) -> None:
+    assert any(remedy in problem.remedy for problem in plan_problems(made, LIGHT) if problem.name == "joint_limit")
+
+
 @pytest.mark.parametrize("driven", [plan(speed_deg_s=180, acceleration_deg_s2=800), plan(SWEPT_INTO)])
 def test_the_plan_that_is_driven_is_judged_as_the_one_announced(driven: Plan) -> None:
     arm, report = ARM.model_copy(update={"kinematics": "nominal"}), replace(REPORT, called="UR10")

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from rig.data.run_file import read_run
+from support.arm_relay import relay
 from support.commands import rig as command
 from support.fault_matrix.setups import SETUPS
 from support.waiting import PATIENCE_S, alive, wait_for
@@ -241,6 +242,12 @@ def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
         pytest.param({"do": "stop_program"}, "program_stopped", marks=THOROUGH),
         pytest.param({"do": "speed_slider", "fraction": 0.5}, "speed_slider", marks=THOROUGH),
         ({"do": "close_arm"}, "arm_link_lost"),
+        ({"do": "remote_control", "on": False}, "switched_to_local_control"),
+        pytest.param({"do": "payload", "mass_kg": 1.5}, "payload_changed", marks=THOROUGH),
+        pytest.param({"do": "step_clock", "seconds": 1.0}, "arm_clock_stepped", marks=THOROUGH),
+        pytest.param({"do": "safety_limit", "fraction": 0.6}, "speed_limited", marks=THOROUGH),
+        pytest.param({"do": "encoder", "joint": 2, "error_rad": 6.283}, "arm_state_impossible", marks=THOROUGH),
+        pytest.param({"do": "robot_mode", "name": "UPDATING_FIRMWARE"}, "arm_not_running", marks=THOROUGH),
         ({"do": "unplug_board"}, "board_link_lost"),
         pytest.param({"do": "silence_board", "on": True}, "board_link_lost", marks=THOROUGH),
         ({"do": "reset_board"}, "board_error"),
@@ -304,6 +311,37 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.parametrize("seconds", [1.0, -0.5])
+def test_resume_goes_on_after_a_clock_that_was_set(start: Start, seconds: float) -> None:
+    """What was recorded before it counts; nothing that came after it is in the file."""
+    fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+    rig = start({"world": {"time_scale": 8}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
+    rig.until(lambda state: state["qd_rad_s"][4] < -0.5)  # wrist 2, after both sweeps of wrist 3
+    rig.world.control({"do": "step_clock", "seconds": seconds})
+    status, errors = rig.end()
+    assert status == 3 and "rig: arm_clock_stepped: " in errors, errors
+    assert np.all(np.diff(read_run(rig.out / "run.h5").states["time_s"]) < 0.1)
+    resumed = command("resume", rig.out, "--yes")
+    assert resumed.returncode == 0, resumed.stderr
+    assert "resuming: 2 of 6" in resumed.stderr or "resuming: 3 of 6" in resumed.stderr, resumed.stderr
+
+
+@pytest.mark.proof
+@pytest.mark.thorough
+def test_resume_goes_on_with_an_arm_that_answers_elsewhere(start: Start) -> None:
+    fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+    rig = start({"world": {"time_scale": 8}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
+    rig.until_sweeping()
+    rig.send(signal.SIGINT)
+    rig.end()
+    with relay(rig.world.host) as wire:
+        resumed = command("resume", rig.out, "--yes", "--set", f"arm.host={wire.host}")
+    assert resumed.returncode == 0, resumed.stderr
+    assert f"at {wire.host}" in resumed.stderr
+
+
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("fault", "name"),
@@ -311,7 +349,6 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
         ({"do": "speed_slider", "fraction": 0.5}, "speed_slider"),
         pytest.param({"do": "remote_control", "on": False}, "not_in_remote_control", marks=THOROUGH),
         ({"do": "power_off"}, "arm_not_running"),
-        pytest.param({"do": "register_in_use"}, "registers_in_use", marks=THOROUGH),
         ({"do": "unplug_board"}, "no_"),
         ({"do": "silence_board", "on": True}, "no_board"),
         ({"do": "host_baud", "baud": 115200}, "wrong_baud_rate"),
@@ -369,11 +406,15 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
 
     handle.control({"do": "speed_slider", "fraction": 0.3})
     handle.control({"do": "unplug_board"})
+    taken = ("input_int_register_7", "input_double_register_41")
+    for name in taken:
+        handle.control({"do": "register_in_use", "name": name})
     missing = command("check", config)
-    assert missing.returncode == 2 and "not ready: 2 to mend" in missing.stdout
+    assert missing.returncode == 2 and "not ready: 3 to mend" in missing.stdout
     assert "missing: speed_slider: the speed slider is at 30 %" in missing.stderr
+    assert "missing: registers_in_use: " in missing.stderr and "URCaps" in missing.stderr
     state = handle.state()
-    assert not state["program_running"] and not state["moving"] and state["claims"] == []
+    assert not state["program_running"] and not state["moving"] and state["claims"] == sorted(taken)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 
 from support.worlds import fresh_host
 
-PORTS = (29999, 30001, 30003, 30004)
+PORTS = (29999, 30001, 30003, 30004, 8077)  # the last: a Robot API, where the tests have one
 
 
 class ArmRelay:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from random import Random
 
-from rig.turners.ur import dashboard, primary, state_stream
+from rig.turners.ur import dashboard, primary, rtde_packages, state_stream
 from rig.world.laboratory import Laboratory
 from rig.world.network import Session
 from rig.world.section import world_section
@@ -142,7 +142,7 @@ def _primary_states() -> Sequence[bytes]:
 def readers() -> dict[str, Reader]:
     """By the protocol's name."""
     return {
-        "RTDE": Reader(state_stream.PORT, RTDE_ANSWERS, _read_states),
+        "RTDE": Reader(rtde_packages.PORT, RTDE_ANSWERS, _read_states),
         "dashboard": Reader(dashboard.DASHBOARD_PORT, DASHBOARD_ANSWERS, _ask_dashboard),
         "primary": Reader(primary.PORT, _primary_states(), _read_account),
     }

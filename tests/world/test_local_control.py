@@ -3,6 +3,7 @@
 import json
 import socket
 from contextlib import closing
+from functools import partial
 
 import pytest
 
@@ -19,10 +20,15 @@ from rig.world.ur10e.rtde import RtdeSession, package
 from support.ideal import ideal
 from support.paths import DEMO
 from support.waiting import wait_for
-from support.worlds import World
+from support.worlds import World, WorldHandle
 
 PROGRAM = b"def wait():\n  sleep(60)\nend\n"
 X, CB3 = ("world.arm.polyscope=10.14.0.0",), ("arm.model=ur10_cb3",)
+
+
+def plays(robot: Robot) -> bool:
+    """Whether a program runs on it."""
+    return robot.runtime_state == RuntimeState.PLAYING
 
 
 def playing(overrides: tuple[str, ...] = ()) -> Robot:
@@ -32,7 +38,7 @@ def playing(overrides: tuple[str, ...] = ()) -> Robot:
     PrimarySession(robot).receive(PROGRAM)
     for _ in range(TICKS_PER_SECOND // 10):
         robot.step()
-    assert robot.runtime_state == RuntimeState.PLAYING
+    assert plays(robot)
     return robot
 
 
@@ -48,7 +54,7 @@ def test_the_dashboard_refuses_every_order_and_answers_questions(order: str) -> 
     dashboard = DashboardSession(robot)
     robot.remote_control = False
     assert dashboard.answer(order) == NOT_ALLOWED
-    assert robot.runtime_state == RuntimeState.PLAYING
+    assert plays(robot)
     assert dashboard.answer("is in remote control") == "false"
     assert dashboard.answer("running") == "Program running: true"
 
@@ -60,7 +66,7 @@ def test_a_connection_that_was_opened_in_local_control_stays_so() -> None:
     robot.remote_control = True
     assert dashboard.answer("stop") == NOT_ALLOWED
     primary.receive(b"stop program\n")
-    assert robot.messages.after(0)[-1].error == READ_ONLY and robot.runtime_state == RuntimeState.PLAYING
+    assert robot.messages.after(0)[-1].error == READ_ONLY and plays(robot)
     assert DashboardSession(robot).answer("stop") == "Stopped"
 
 
@@ -87,11 +93,11 @@ def test_the_robot_api_forbids_orders_about_programs() -> None:
     robot.remote_control = False
     assert asked(robot, "PUT", state, '{"action": "stop"}')[0] == 403
     assert asked(robot, "GET", "/system/v1/controlmode") == (200, {"mode": "LOCAL"})
-    assert robot.runtime_state == RuntimeState.PLAYING
+    assert plays(robot)
     robot.remote_control = True
     assert asked(robot, "PUT", state, "{}")[0] == 400
     assert asked(robot, "PUT", state, '{"action": "stop"}')[0] == 200
-    assert robot.runtime_state == RuntimeState.STOPPED
+    assert not plays(robot)
 
 
 def test_registers_are_taken_in_local_control_too() -> None:
@@ -118,12 +124,19 @@ def test_connections_that_take_scripts_are_closed_when_it_begins(world: World) -
     assert running.state()["program_running"], "the program goes on"
 
 
+def said_since(running: WorldHandle, before: int) -> bool:
+    """Whether the controller has told its program's name twice since then."""
+    messages: list[str] = running.state()["messages"]
+    return messages.count("wait") == before + 2
+
+
 @pytest.mark.slow
 def test_a_stop_can_be_tied_to_the_start_of_every_program(world: World) -> None:
     running = world()
     running.control({"do": "at_program_start", "then": {"do": "stop_program"}, "after_s": 0.1})
     with closing(socket.create_connection((running.host, 30001))) as primary:
-        for said in (2, 4):  # its name, at every start and every end
+        for _ in range(2):
+            before = running.state()["messages"].count("wait")
             primary.sendall(PROGRAM)
-            wait_for(lambda said=said: running.state()["messages"].count("wait") == said, "its end")
+            wait_for(partial(said_since, running, before), "its start and its end, each with its name")
     assert not running.state()["program_running"]

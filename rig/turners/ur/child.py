@@ -19,11 +19,19 @@ from rig.config.written_file import opened_to_append
 from rig.data.silence import Silence
 from rig.errors import Problem
 from rig.motion.state import ArmState
-from rig.turners.ur.controller_answers import no_states
-from rig.turners.ur.identity import series_problem, version_text
+from rig.turners.ur.client_problems import (
+    connection_failure,
+    control_failure,
+    link_lost,
+    move_failure,
+    payload_changed,
+    payload_failure,
+)
 from rig.turners.ur.messages import (
+    Braked,
     Connected,
     ControlTaken,
+    Disturbed,
     Failed,
     Heartbeat,
     Message,
@@ -31,11 +39,14 @@ from rig.turners.ur.messages import (
     MoveFinished,
     MoveStarted,
     Request,
+    ScriptStarted,
     Stop,
     TakeControl,
 )
-from rig.turners.ur.state_stream import NotSpoken, Packet, StateStream
-from rig.turners.ur.stopping import BRAKE_RAD_S2, STOP_S, Order, independent_ways
+from rig.turners.ur.registers import UPPER, free_half, registers_in_use
+from rig.turners.ur.state_stream import Packet, StateStream
+from rig.turners.ur.stop_paths import stop_paths
+from rig.turners.ur.stopping import BRAKE_RAD_S2, STOP_S, Order
 
 HEARTBEAT_S = 0.01
 MOVE_POLL_S = 0.003
@@ -45,14 +56,18 @@ PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
 ABANDON_S = 5.0  # the last stop, over the controller's own ports or else over the client, has so long
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
-PAYLOAD_TOLERANCE_KG = 0.01
+PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M = 0.01, 0.001
+REGISTERS_S = 2.0  # the controller has so long to say which registers are free
+SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client
 
 
-def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
+def main(
+    pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, robot_api_port: int, log: str | None
+) -> None:
     """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
     _outlive_the_parent()
     _send_output_to(log)
-    child = _Child(pipe, host, state_rate_hz)
+    child = _Child(pipe, host, state_rate_hz, robot_api_port)
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
     requests = threading.Thread(target=child.serve, name="requests", daemon=True)
     requests.start()
@@ -62,7 +77,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
         try:
             child.connect()
         except OSError as error:
-            child.send(Failed(_connection_failure(host, error)))
+            child.send(Failed(connection_failure(host, error)))
             requests.join()  # the parent reads this and ends the process
         child.stream()
     except BaseException:
@@ -71,14 +86,19 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
 
 
 class _Child:
-    def __init__(self, pipe: "Connection[Message, Request]", host: str, state_rate_hz: float) -> None:
+    def __init__(
+        self, pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, robot_api_port: int
+    ) -> None:
         self._pipe = pipe
         self._host = host
+        self._robot_api_port = robot_api_port
         self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
         self._states: StateStream  # these two once it is connected
         self._latest: Packet
         self._control: Any = None
+        self._carried: Packet | None = None  # as the controller reckons with the payload, once that is set
+        self._beats = 0  # heartbeats sent
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
@@ -99,17 +119,35 @@ class _Child:
         """Send every state to the parent, in order, until the parent is gone."""
         batch: list[ArmState] = []
         beat_s = time.monotonic()
+        reported = False
         while True:
+            problem: Problem | None = None
             for packet in self._states.read(HEARTBEAT_S):
                 self._latest = packet
                 batch.append(packet.state)
-            if time.monotonic() - beat_s >= HEARTBEAT_S:
+                problem = problem or self._payload_changed(packet)
+            problem = None if reported else problem or self._states.problem
+            if time.monotonic() - beat_s >= HEARTBEAT_S or problem is not None:
                 beat_s = time.monotonic()
                 try:
                     self.send(Heartbeat(tuple(batch), self._states.silent_s))
+                    if problem is not None:
+                        reported = True
+                        self.send(Disturbed(problem))
                 except OSError:
                     self.abandon()
+                self._beats += 1
                 batch.clear()
+
+    def _payload_changed(self, packet: Packet) -> Problem | None:
+        """Whether somebody else has set another payload than ours."""
+        ours = self._carried
+        if ours is None:
+            return None
+        off_m = max(abs(a - b) for a, b in zip(packet.payload_centre_m, ours.payload_centre_m, strict=True))
+        if abs(packet.payload_kg - ours.payload_kg) <= PAYLOAD_TOLERANCE_KG and off_m <= CENTRE_TOLERANCE_M:
+            return None
+        return payload_changed(ours, packet)
 
     def serve(self) -> None:
         """Serve the parent's requests one after the other."""
@@ -162,43 +200,71 @@ class _Child:
                 self._move(request)
             case Stop():
                 self._operations_before = None
-                self._brake(request.deceleration_rad_s2)
+                self.send(Braked(self._brake(request.deceleration_rad_s2)))
 
     def _take_control(self, request: TakeControl) -> Message:
         from rtde_control import RTDEControlInterface
 
+        flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT.value | RTDEControlInterface.FLAG_NO_EXT_FT.value
+        try:
+            half = free_half(self._host, self._states.version, REGISTERS_S)
+        except OSError as error:
+            return Failed(link_lost(f"the arm at {self._host} no longer answers ({error})"))
+        if half is None:
+            return Failed(registers_in_use(self._host, self._states.version))
+        if half == UPPER:
+            flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS.value
         self._holds_arm = True
         try:
-            self._control = RTDEControlInterface(self._host, self._state_rate_hz)
+            self._control = RTDEControlInterface(self._host, self._state_rate_hz, flags)
         except RuntimeError as error:
-            self._holds_arm = False
-            return Failed(_control_failure(self._host, str(error)))
+            self._let_parent_see()
+            silent = self._states.silent_s > SILENCE_S
+            return Failed(
+                self._link_problem(silent=silent) or control_failure(self._host, self._states.version, str(error))
+            )
+        self.send(ScriptStarted())
         self._control.setPayload(request.carried.payload_kg, list(request.carried.centre_m))
         return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
-        """Wait until the states show the payload."""
+        """Wait until the states show the payload. What else they show is the parent's affair."""
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
+            if (lost := self._link_problem()) is not None:
+                return Failed(lost)
             if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
-                self._control.stopScript()
-                return Failed(_payload_failure(latest.payload_kg, wanted_kg))
+                self._let_parent_see()
+                return Failed(payload_failure(latest.payload_kg, wanted_kg))
             time.sleep(HEARTBEAT_S)
+        self._carried = latest
         return ControlTaken()
+
+    def _link_problem(self, *, silent: bool = False) -> Problem | None:
+        """A link that is lost, if it is: what follows from it is no fault of the arm's."""
+        if self._states.problem is not None or not (self._states.closed or silent):
+            return self._states.problem
+        return link_lost(f"no new state comes from the arm at {self._host}")
+
+    def _let_parent_see(self) -> None:
+        """Wait until the parent has been sent all states that have come so far."""
+        beats, began_s = self._beats, time.monotonic()
+        while self._beats < beats + 2 and time.monotonic() - began_s < ABANDON_S:
+            time.sleep(HEARTBEAT_S)
 
     def _move(self, move: Move) -> None:
         before = self._control.getAsyncOperationProgressEx().changeCount()
         try:
             started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
         except (RuntimeError, ValueError) as error:
-            self.send(Failed(_move_failure(f"the client refused the move ({error})")))
+            self.send(Failed(move_failure(f"the client refused the move ({error})")))
             return
         if started:
             self.send(MoveStarted())
             self._operations_before = before
         else:
             self._await_state()
-            self.send(Failed(_move_failure("the controller did not start the move")))
+            self.send(Failed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
         """Wait for another state: a link that is lost, and not the controller, may be why a move was not begun.
@@ -209,10 +275,17 @@ class _Child:
         while self._latest is latest and time.monotonic() - began_s < ABANDON_S:
             time.sleep(HEARTBEAT_S)
 
-    def _brake(self, deceleration_rad_s2: float) -> None:
-        if self._control is not None:
-            self._control.stopJ(deceleration_rad_s2)
+    def _brake(self, deceleration_rad_s2: float) -> bool:
+        """Stop the joints and the script; whether the client says that they were."""
+        if self._control is None:
+            return False
+        try:
+            taken = bool(self._control.stopJ(deceleration_rad_s2))
             self._control.stopScript()
+        except RuntimeError as error:
+            print(f"the client could not brake: {error}", file=sys.stderr)
+            return False
+        return taken
 
     def abandon(self) -> NoReturn:
         """Stop the arm that nobody supervises any more, and leave.
@@ -222,7 +295,9 @@ class _Child:
         if self._holds_arm:
             # The client's own stop may wait for ever for a controller that is gone; the system's alarm ends that.
             signal.setitimer(signal.ITIMER_REAL, ABANDON_S)
-            if not Order(self._host, independent_ways(self._states.version), STOP_S).program_ended():
+            order = Order(stop_paths(self._host, self._states.version, self._robot_api_port), STOP_S)
+            if not order.program_ended():
+                print(f"{order.words}; the client brakes", file=sys.stderr)
                 self._brake(BRAKE_RAD_S2)
         _leave(1)
 
@@ -247,45 +322,3 @@ def _send_output_to(log: str | None) -> None:
         stream.flush()
         os.dup2(sink, stream.fileno())
     os.close(sink)
-
-
-def _move_failure(what: str) -> Problem:
-    return Problem("move_refused", what, "Read the pendant's log and check the configured speed and acceleration")
-
-
-def _payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
-    return Problem(
-        "payload_not_set",
-        f"the controller uses a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
-        "Read the pendant's log, and correct the payload in the arm's installation",
-    )
-
-
-def _connection_failure(host: str, error: OSError) -> Problem:
-    if isinstance(error, NotSpoken):
-        return series_problem(host, error.version) or Problem(
-            "controller_too_old",
-            f"the controller at {host} does not know {error.what}; its software is {version_text(error.version)}",
-            "Update it: the rig was tested with PolyScope 5.14",
-        )
-    return no_states(host, error)
-
-
-def _control_failure(host: str, reason: str) -> Problem:
-    if "remote control" in reason:
-        return Problem(
-            "not_in_remote_control",
-            f"the arm at {host} is not in remote control",
-            "Switch the pendant to remote control (top right corner)",
-        )
-    if "already in use" in reason:
-        return Problem(
-            "registers_in_use",
-            f"another client or a fieldbus holds the input registers of the arm at {host}",
-            "Close the other client, or disable EtherNet/IP, PROFINET and MODBUS in the installation",
-        )
-    return Problem(
-        "control_not_taken",
-        f"the arm at {host} did not start the control script ({reason})",
-        "Clear any stop on the pendant, switch it to remote control, close other programs, then start again",
-    )

@@ -4,20 +4,19 @@ import multiprocessing
 import os
 import select
 import signal
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from ipaddress import IPv4Address
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rig.data.silence import Silence
 from rig.errors import Problem
 from rig.turners.ur import child
-from rig.turners.ur.listener import listener
+from rig.turners.ur.client_problems import LINK_REMEDY
+from rig.turners.ur.listener import address, listener
 from rig.turners.ur.messages import Alive, Heartbeat, Message, Request
-from rig.turners.ur.state_stream import PORT
+from rig.turners.ur.rtde_packages import PORT
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
@@ -36,9 +35,11 @@ class ChildLink:
         self,
         host: str,
         state_rate_hz: float,
-        log: Path | None,
         on_message: Callable[[Message], None],
         on_lost: Callable[[Problem], None],
+        *,
+        robot_api_port: int,
+        log: Path | None,
     ) -> None:
         self._host = host
         self._on_message = on_message
@@ -56,7 +57,7 @@ class ChildLink:
         self._pipe, self._child_pipe = context.Pipe()
         self._process = context.Process(
             target=child.main,
-            args=(self._child_pipe, host, state_rate_hz, str(log) if log else None),
+            args=(self._child_pipe, host, state_rate_hz, robot_api_port, str(log) if log else None),
             name="arm",
             daemon=True,
         )
@@ -67,9 +68,9 @@ class ChildLink:
 
     def start(self) -> None:
         """Start the child; `on_message` gets `Connected` or `Failed`."""
-        address = _address(self._host)
-        self._elsewhere = address is None or not address.is_loopback
-        if address is not None and not self._elsewhere and (controller := listener(address, PORT)) is not None:
+        found = address(self._host)
+        self._elsewhere = found is None or not found.is_loopback
+        if found is not None and not self._elsewhere and (controller := listener(found, PORT)) is not None:
             self._frozen = Silence(controller, spared=SPARED, thread=controller)
         with _interrupts_held():
             self._process.start()
@@ -176,14 +177,7 @@ class ChildLink:
         self._lose(name, what)
 
     def _lose(self, name: str, what: str) -> None:
-        self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
-
-
-def _address(host: str) -> IPv4Address | None:
-    try:
-        return IPv4Address(socket.gethostbyname(host))
-    except OSError:
-        return None
+        self._on_lost(Problem(name, what, LINK_REMEDY))
 
 
 def _readable(pipe: "Connection[Request, Message]") -> bool:

@@ -1,13 +1,32 @@
 """What stands in the arm's way, read from one state: pure, shared by pre-flight and by the watch over a move."""
 
 from rig.errors import Problem
+from rig.motion.carried import Carried
 from rig.motion.state import ArmState, RobotMode, RuntimeState, SafetyMode
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999
+MAKERS_SIMULATOR = ("127.0.0.1", "localhost")  # where the client does not ask for remote control
 
+LIMITED_REMEDY = (
+    "Widen that limit in the arm's safety settings (speed of tool, elbow or joint, momentum, power, a safety plane), "
+    "or lower procedure.speed_deg_s and arm.transfer_speed_deg_s"
+)
 
 _UNLOCK = "Find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"
+_SWITCH_ON = "Switch the arm on and release its brakes on the pendant"
+_WAIT = (
+    "Wait until the pendant shows the arm ready, which takes some minutes where firmware is updated; then switch it on"
+)
+# What a mode asks for beside switching the arm on.
+_MODE_REMEDIES: dict[int, str] = {
+    RobotMode.NO_CONTROLLER: "Look at the pendant: the controller's own software does not run. Restart the control box",
+    RobotMode.DISCONNECTED: "Look at the cable between control box and arm, then restart the control box",
+    RobotMode.CONFIRM_SAFETY: "Confirm the safety settings on the pendant, then switch the arm on",
+    RobotMode.BOOTING: _WAIT,
+    RobotMode.UPDATING_FIRMWARE: _WAIT,
+    RobotMode.BACKDRIVE: "End the backdrive (freedrive without motors) on the pendant, then switch the arm on",
+}
 _RELEASE = "Make the cell safe, release the emergency stop, switch the arm on again, then start again"
 
 # Bits of `safety_status_bits` that mean the same as a safety mode; the bits may come one packet before the mode.
@@ -55,7 +74,7 @@ def readiness(state: ArmState) -> Problem | None:
         return Problem(
             "arm_not_running",
             f"the arm's mode is {_mode_name(state.robot_mode)}, not RUNNING",
-            "Switch the arm on and release its brakes on the pendant",
+            _MODE_REMEDIES.get(state.robot_mode, _SWITCH_ON),
         )
     if state.target_speed_fraction < FULL_SPEED_FRACTION:
         return Problem(
@@ -66,12 +85,41 @@ def readiness(state: ArmState) -> Problem | None:
     return None
 
 
+def switched_to_local_control(host: str, how: str) -> Problem:
+    """The pendant has taken control back while the arm was under the rig's."""
+    return Problem(
+        "switched_to_local_control",
+        f"of the arm at {host} {how}, in which it takes no stop but the client's",
+        "Leave the pendant in remote control while a run goes on, or lock its mode by a password (Settings, Password, "
+        "Mode); look at the arm, switch it back to remote control, then start again",
+    )
+
+
 def local_control(host: str) -> Problem:
     """The pendant has not handed control over."""
     return Problem(
         "not_in_remote_control",
         f"the arm at {host} is in local control",
         "Switch the pendant to remote control (top right corner)",
+    )
+
+
+def speed_limited(state: ArmState) -> Problem:
+    """A limit of the safety settings slows the arm down, with the slider at 100 %."""
+    return Problem(
+        "speed_limited",
+        f"the controller runs its program at {100 * state.speed_scaling:.0f} % of the programmed speed, with the speed "
+        "slider at 100 %: a limit of the safety settings slows it down",
+        LIMITED_REMEDY,
+    )
+
+
+def payload_refused(carried: Carried) -> Problem:
+    """The controller has ended the program over the payload that it was given."""
+    return Problem(
+        "payload_not_set",
+        f"the controller does not take a payload of {carried.payload_kg:g} kg",
+        "Correct arm.payload_kg and arm.payload_centre_mm, or the payload limits in the arm's installation",
     )
 
 

@@ -9,14 +9,15 @@ from dataclasses import replace
 
 from rig.errors import Problem, Refused
 from rig.motion.state import ArmState, RuntimeState
+from rig.turners.ur.condition import MAKERS_SIMULATOR
 from rig.turners.ur.dashboard import Dashboard
 from rig.turners.ur.identity import is_polyscope_x, model_found, series_problem
 from rig.turners.ur.messages import Connected
 from rig.turners.ur.primary import Account, read_account
 from rig.turners.ur.primary_stop import PrimaryStop
+from rig.turners.ur.registers import free_half
 from rig.turners.ur.report import ArmReport
 from rig.turners.ur.robot_api import RobotApi
-from rig.turners.ur.stopping import independent_ways
 
 LOOK_S = 1.0  # for a port that may be closed
 ANSWER_S = 5.0  # one that is open has so long to answer while nothing moves
@@ -25,7 +26,7 @@ NOT_TOLD = "not told"
 
 def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
     """Why the rig could not stop an arm there without its client; None where it can."""
-    way = independent_ways(version)[0]
+    way = PrimaryStop if is_polyscope_x(version) else Dashboard
     try:
         way(host, LOOK_S).close()
     except OSError as error:
@@ -52,6 +53,17 @@ def no_states(host: str, error: OSError) -> Problem:
     )
 
 
+def in_local_control(host: str, version: tuple[int, ...]) -> bool:
+    """Whether a controller with a dashboard says so; another one tells it in the trial of its stop, or not."""
+    if is_polyscope_x(version) or host in MAKERS_SIMULATOR:
+        return False
+    try:
+        with Dashboard(host, ANSWER_S) as dashboard:
+            return dashboard.in_remote_control() is False
+    except OSError:
+        return False
+
+
 def reported(host: str, connected: Connected, state: ArmState, robot_api_port: int) -> ArmReport:
     """What the controller says of itself and of its arm, which stands in that state. Raises `Refused` by name."""
     account = _account(host)
@@ -66,6 +78,7 @@ def reported(host: str, connected: Connected, state: ArmState, robot_api_port: i
         kinematics=account.kinematics,
         tcp_offset=account.tcp_offset,
         setup=account.setup,
+        registers_free=_registers_free(host, connected.version),
     )
     if is_polyscope_x(connected.version):
         complete = _completed_by_robot_api(report, RobotApi(host, robot_api_port, LOOK_S))
@@ -99,6 +112,14 @@ def _account(host: str) -> Account:
         return read_account(host, ANSWER_S)
     except OSError:
         return Account()
+
+
+def _registers_free(host: str, version: tuple[int, ...]) -> bool | None:
+    """Whether the client would find a half of the registers free; None where the controller does not tell."""
+    try:
+        return free_half(host, version, LOOK_S) is not None
+    except OSError:
+        return None
 
 
 def _closed(way: type[Dashboard] | type[PrimaryStop], host: str, error: OSError) -> Problem:

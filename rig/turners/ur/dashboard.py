@@ -9,6 +9,8 @@ from rig.errors.quoting import printable
 
 DASHBOARD_PORT = 29999
 GREETING = "Connected:"
+STOPPED, FAILED = "Stopped", "Failed to execute"  # the answers to `stop`, beside that it is not allowed
+ANSWER = 160  # characters of an answer that are repeated
 LINE_BYTES = 4096  # the longest answer has some dozens
 
 
@@ -19,8 +21,11 @@ class Dashboard:
     """
 
     name = "dashboard"
+    tells_of_programs = True
 
     def __init__(self, host: str, timeout_s: float) -> None:
+        self.refusal: str | None = None
+        self.acknowledged = False
         self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
         self._heard = bytearray()
         self._timeout_s = timeout_s
@@ -36,9 +41,16 @@ class Dashboard:
             continue
         return line
 
-    def stop_program(self) -> str:
-        """Stop the running program, and with it the arm."""
-        return self.ask("stop")
+    def stop_program(self) -> None:
+        """Stop the running program, and with it the arm.
+
+        In local control it refuses in a sentence. Where no program runs it may fail to execute the command, which is
+        no refusal.
+        """
+        answer = self.ask("stop")
+        self.acknowledged = answer == STOPPED
+        if not self.acknowledged and not (answer.startswith(FAILED) and not self.program_running()):
+            self.refusal = f'"{answer[:ANSWER]}"'
 
     def program_running(self) -> bool:
         """Whether any program runs on the controller."""

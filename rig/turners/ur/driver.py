@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,15 +13,31 @@ from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 from rig.turners.ur.child_link import ChildLink
-from rig.turners.ur.condition import program_interruption, readiness
-from rig.turners.ur.controller_answers import ANSWER_S, reported, stop_problem
+from rig.turners.ur.client_problems import link_lost
+from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, payload_refused, readiness
+from rig.turners.ur.control_watch import ControlWatch
+from rig.turners.ur.controller_answers import ANSWER_S, in_local_control, reported, stop_problem
 from rig.turners.ur.identity import is_polyscope_x
-from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
+from rig.turners.ur.messages import (
+    Braked,
+    Connected,
+    ControlTaken,
+    Disturbed,
+    Failed,
+    Heartbeat,
+    Message,
+    Move,
+    MoveFinished,
+    ScriptStarted,
+    TakeControl,
+)
 from rig.turners.ur.report import ArmReport
 from rig.turners.ur.robot_api import PORT as ROBOT_API_PORT
 from rig.turners.ur.robot_api import RobotApi
+from rig.turners.ur.stop_paths import StopPath, stop_paths
 from rig.turners.ur.stop_trial import stop_trial
-from rig.turners.ur.stopping import Order, Stop, Ways, independent_ways
+from rig.turners.ur.stopping import Order, Stop
+from rig.turners.ur.supervision import Stage, Supervision, stopped_at_start
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
@@ -30,9 +46,10 @@ LAST_STOP_S = 0.8  # the controller is told to stop for so long once more when n
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
-INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
 SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client, whatever it does afterwards
-REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
+REASON_S = 0.2  # what fails waits so long (wall time) for what explains it
+OUR_PROGRAM = "rtde_control"  # as the client calls it
+NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # why the client has started no program
 NOT_HELD = StopOutcome(True, "the arm was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
@@ -63,18 +80,24 @@ class Arm:
         self._robot_api_port = robot_api_port
         self._on_state = on_state
         self._period_s = 1 / state_rate_hz
-        self._link = ChildLink(host, state_rate_hz, client_log, self._take, self._fail)
-        self._way_to_stop = Stop(host, self._ways, self._link.send, self._seen_at_rest)
-        self._stopper = StopOnce("arm stop", self._way_to_stop.carry_out, NOT_ENDED)
+        self._link = ChildLink(
+            host, state_rate_hz, self._take, self._fail, robot_api_port=robot_api_port, log=client_log
+        )
+        self._arm_stop = Stop(self._paths, self._link.send, lambda: self._braked, self._seen_at_rest)
+        self._stopper = StopOnce("arm stop", self._arm_stop.carry_out, NOT_ENDED)
         self._changed = threading.Condition()  # notified when anything below changes
         self._latest: ArmState | None = None
         self._connected: Connected | None = None
         self._answer: Message | None = None
+        self._braked: Braked | None = None
+        self._carried = Carried(0.0)
+        self._sets_payload = False  # our program runs, and is told what the arm carries
         self._problem: Problem | None = None
         self._doing = "the preparation"
         self._holds_arm = False  # a program of ours may run, so a stop is ours to make
-        self._supervising = False
-        self._interruption: tuple[Problem, float] | None = None  # and the time stamp of the state that showed it first
+        self._passes_on = True  # states to whoever connected; not what came after one that cannot be true
+        self._supervision = Supervision()
+        self._watch: ControlWatch | None = None
         self._silent_s = 0.0  # the longest silence of the controller since the last move ended
         self.missed_states = 0  # gaps in the stream, counted in states
 
@@ -110,8 +133,11 @@ class Arm:
         if not self._holds_arm:
             raise Refused.of(problem)
         outcome = self.stop()
+        problem = self._explained(problem)
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
-        raise Fault.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
+        # Before it is taken nothing has moved.
+        kind = Fault if self._supervision.stage is Stage.TAKEN else Refused
+        raise kind.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -------------------------------------------------------------------------------------------------------
 
@@ -124,20 +150,23 @@ class Arm:
         problem = readiness(self.latest)
         if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
+        if problem is None and in_local_control(self._host, self._controller.version):
+            problem = local_control(self._host)
         if problem is not None:
             raise Refused.of(problem)
-        self._way_to_stop.descriptors.keep()
-        with stopping_on_error(self.stop), self._link.patience():
+        self._arm_stop.descriptors.keep()
+        with stopping_on_error(self.stop):
             self._holds_arm = True
-            if is_polyscope_x(self._controller.version):
-                self._prove_the_stop()
-            self._request(TakeControl(carried))
-            self._wait(lambda: self._answer is not None)
-            if isinstance(self._answer, Failed):
-                self._holds_arm = False
-                raise Refused.of(self._answer.problem)
+            with self._link.patience():
+                if is_polyscope_x(self._controller.version):
+                    self._prove_the_stop()
+                self._watch_control()
+                self._supervision.stage, self._carried = Stage.PREPARING, carried
+                self._request(TakeControl(carried))
+                self._await(ScriptStarted)
+            self._await(ControlTaken)
             self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
-            self._supervising = True
+            self._supervision.stage = Stage.TAKEN
         self._silent_s = 0.0  # there was no client yet to lose
 
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
@@ -148,6 +177,7 @@ class Arm:
         with stopping_on_error(self.stop):
             watch()
             self._doing = motion.name
+            self._supervision.moving = True
             self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
             asked_s = time.monotonic()
             self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
@@ -174,6 +204,7 @@ class Arm:
                     )
                 )
             self.check()
+            self._supervision.moving = False
             self._silent_s = 0.0
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
@@ -195,14 +226,24 @@ class Arm:
 
     def close(self) -> None:
         """Stop the arm if it was under control, and end the child process."""
+        self._close()
+
+    def _close(self) -> str | None:
+        """Stop and end as `close` does; return why a program may still run that a client left there, if one may."""
         try:
             outcome = self.stop()
         finally:
+            if self._watch is not None:
+                self._watch.close()
             self._link.close()
-            self._way_to_stop.descriptors.release()
-        if self._holds_arm and (self._problem is not None or not outcome.at_rest):
-            # A client that had lost the arm and found it again may have started its program anew, behind that stop.
-            Order(self._host, self._ways(), LAST_STOP_S).program_ended()
+            self._arm_stop.descriptors.release()
+        if not self._holds_arm or (self._problem is None and outcome.at_rest):
+            return None
+        # A client that had lost the arm and found it again may have started its program anew, behind that stop.
+        order = Order(self._paths(), LAST_STOP_S)
+        if order.program_ended():
+            return None
+        return f"the last stop is not confirmed either: {order.words}. Look at the arm: its program may still run"
 
     def __enter__(self) -> Self:
         try:
@@ -218,7 +259,9 @@ class Arm:
         told = self._problem is not None and isinstance(error, RigError)  # the arm's own problems tell of the stop
         if error is not None and not told:
             tell_of_stop(error, self.stop)
-        self.close()
+        left = self._close()
+        if error is not None and left is not None:
+            error.add_note(left)
 
     # Inside -------------------------------------------------------------------------------------------------------
 
@@ -228,20 +271,53 @@ class Arm:
             raise RuntimeError("start() comes first")
         return self._connected
 
-    def _ways(self) -> Ways:
-        return independent_ways(self._controller.version)
+    def _paths(self) -> Sequence[StopPath]:
+        return stop_paths(self._host, self._controller.version, self._robot_api_port)
+
+    def _watch_control(self) -> None:
+        if self._host not in MAKERS_SIMULATOR:
+            version, newest_s = self._controller.version, lambda: self.latest.host_time_s
+            self._watch = ControlWatch(self._host, version, self._robot_api_port, newest_s, self._fail_meanwhile)
+            self._watch.start()
 
     def _prove_the_stop(self) -> None:
         """Raises `Refused` where the arm could not be stopped without the client."""
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
-            raise Refused.of(problem)
+            raise Refused.of(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
         """Whether the arm's states show its program so within that time."""
         with self._changed:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
+
+    def _await(self, kind: type[ScriptStarted] | type[ControlTaken]) -> None:
+        """Wait for the next step of the preparation, or name what has kept it from being made."""
+        self._wait(lambda: isinstance(self._answer, kind | Failed | ControlTaken))
+        if not isinstance(self._answer, Failed):
+            return
+        problem = self._answer.problem
+        if problem.name in NOT_BEGUN:
+            self._holds_arm = False
+            raise Refused.of(problem)
+        if problem.name == "control_not_taken" and self._watch and OUR_PROGRAM in self._watch.stopped_programs:
+            problem = stopped_at_start(problem)  # so soon that no state showed it run
+        self._fail(self._supervision.interruption or problem)
+        self.check()
+
+    def _explained(self, problem: Problem) -> Problem:
+        """A program that ended, with what the controller says of it: it refuses a payload so, too."""
+        watch = self._watch
+        if watch is None or problem.name != "program_stopped":
+            return problem
+        with self._changed:
+            self._changed.wait_for(lambda: watch.exception is not None, REASON_S)
+        if watch.exception is None:
+            return problem
+        if self._sets_payload and self._supervision.stage is Stage.PREPARING:
+            problem = payload_refused(self._carried)
+        return problem._replace(what=f'{problem.what}; the controller says: "{watch.exception}"')
 
     def _request(self, request: TakeControl | Move) -> None:
         self.check()
@@ -267,7 +343,7 @@ class Arm:
         if self._silent_s <= SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
-        return Problem("arm_link_lost", what, "Look at the arm and its network cable, then start again")
+        return link_lost(what)
 
     def _has_ended(self, motion: Motion) -> bool:
         if isinstance(self._answer, Failed):
@@ -288,36 +364,34 @@ class Arm:
                     self._take_state(state)
             case Connected():
                 self._connected = message
+            case Braked():
+                self._braked = message
+            case Disturbed():
+                self._fail_meanwhile(message.problem)
+                self._passes_on = False
             case _:
+                self._sets_payload = self._sets_payload or isinstance(message, ScriptStarted)
                 self._answer = message
         with self._changed:
             self._changed.notify_all()
 
     def _take_state(self, state: ArmState) -> None:
-        if self._latest is not None:
-            self.missed_states += max(0, round((state.time_s - self._latest.time_s) / self._period_s) - 1)
-        self._latest = state
+        before, self._latest = self._latest, state
+        if not self._passes_on:
+            return
+        if before is not None:
+            self.missed_states += max(0, round((state.time_s - before.time_s) / self._period_s) - 1)
         try:
             self._on_state(state)
         except RigError as error:
             self._fail(error.problem)
         except Exception as error:
             self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "See the log"))
-        if self._supervising and (problem := self._judge(state)):
-            self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
+        if problem := self._supervision.judge(state):
+            self._fail_meanwhile(problem)
 
-    def _judge(self, state: ArmState) -> Problem | None:
-        """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it.
-
-        What interrupts our program ends it: one that runs again a moment later is somebody else's.
-        """
-        if self._interruption is None and (interruption := program_interruption(state)) is not None:
-            self._interruption = interruption, state.time_s
-        if problem := readiness(state):
-            return problem
-        if self._interruption is not None and state.time_s - self._interruption[1] >= INTERRUPTION_S:
-            return self._interruption[0]
-        return None
+    def _fail_meanwhile(self, problem: Problem) -> None:
+        self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
 
     def _fail(self, problem: Problem) -> None:
         """Keep the first problem and stop the arm; nothing is a problem after a stop on request."""

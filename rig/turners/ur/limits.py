@@ -8,7 +8,7 @@ import numpy as np
 from rig.errors import Problem
 from rig.estimation.arrays import Array
 from rig.motion.state import JOINT_NAMES, JointLimits, Joints
-from rig.motion.steps import Motion, travel
+from rig.motion.steps import Motion, Sweep, travel
 
 OURS, THEIRS = "the limit", "the controller's limit"
 WIDER = ", or widen that limit in the arm's safety settings"
@@ -39,11 +39,28 @@ def _position_problems(motion: Motion, ours: JointLimits, told: JointLimits | No
                     "joint_limit",
                     f"{motion.name} takes {name} from {math.degrees(low):.1f}° to {math.degrees(high):.1f}°, beyond "
                     f"{beyond if narrow else f'±{math.degrees(most):g}°'}",
-                    "Raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0"
-                    f"{WIDER if narrow else ''}",
+                    f"{_nearer(motion, joint, (-least, greatest))}{WIDER if narrow else ''}",
                 )
             )
     return problems
+
+
+def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
+    """What brings a movement back inside the range of a joint: where it begins, and where it leads, decide."""
+    name, (low, high) = JOINT_NAMES[joint], within_rad
+    if not low <= motion.start_q_rad[joint] <= high and not isinstance(motion, Sweep):
+        return f"Bring {name} back inside its range from the pendant, or correct arm.home_deg"
+    if isinstance(motion, Sweep) and motion.joint == joint:
+        if motion.angle_rad >= high - low:
+            return f"Lower procedure.arc_deg: {name} has less room than a sweep turns through"
+        return (
+            f"Bring {name} in arm.home_deg nearer to the middle of its range, or shorten the run-up: raise "
+            "procedure.acceleration_deg_s2 or lower procedure.speed_deg_s"
+        )
+    return (
+        f"Bring {name} in arm.home_deg nearer to the middle of its range, leave out the attitudes that need it there, "
+        "or shorten the sweeps' run-up"
+    )
 
 
 def _speed_problems(motion: Motion, ours_rad_s: Joints, told_rad_s: Joints | None) -> list[Problem]:

@@ -1,5 +1,6 @@
 """Which process of this machine listens at an address: a simulated controller has to share the machine's processors."""
 
+import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from ipaddress import IPv4Address
@@ -7,6 +8,20 @@ from pathlib import Path
 
 LISTENS = "0A"  # the state of a socket in the system's table
 PROC = Path("/proc")
+
+
+def address(host: str) -> IPv4Address | None:
+    """The address of a host by its name; None where nobody knows one."""
+    try:
+        return IPv4Address(socket.gethostbyname(host))
+    except OSError:
+        return None
+
+
+def is_here(host: str) -> bool:
+    """Whether a host is this machine by a loopback address."""
+    found = address(host)
+    return found is not None and found.is_loopback
 
 
 def listener(host: IPv4Address, port: int) -> int | None:

@@ -11,7 +11,7 @@ from rig.motion.state import ArmState, Joints
 
 @dataclass(frozen=True, slots=True)
 class TakeControl:
-    """Upload the control script and set the payload. Answered by `ControlTaken` or `Failed`."""
+    """Upload the control script and set the payload. Answered by `ScriptStarted` and `ControlTaken`, or by `Failed`."""
 
     carried: Carried
 
@@ -27,7 +27,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Brake at once and end the control script; served while a movement runs. Not answered: the states show it."""
+    """Brake at once and end the control script; served while a movement runs. Answered by `Braked`."""
 
     deceleration_rad_s2: float
 
@@ -61,6 +61,11 @@ class Heartbeat:
 
 
 @dataclass(frozen=True, slots=True)
+class ScriptStarted:
+    """The control script runs, and the payload is being set."""
+
+
+@dataclass(frozen=True, slots=True)
 class ControlTaken:
     """The control script runs and the payload is set."""
 
@@ -82,4 +87,19 @@ class Failed:
     problem: Problem
 
 
-Message = Connected | Heartbeat | ControlTaken | MoveStarted | MoveFinished | Failed
+@dataclass(frozen=True, slots=True)
+class Braked:
+    """The client was told to brake; `taken` says whether its script did so."""
+
+    taken: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbed:
+    """What the states showed, unasked: nothing can go on after it."""
+
+    problem: Problem
+
+
+Answer = ScriptStarted | ControlTaken | MoveStarted | MoveFinished | Failed
+Message = Connected | Heartbeat | Answer | Braked | Disturbed

@@ -13,9 +13,10 @@ from rig.motion.model import home_of, model_of
 from rig.motion.preflight import way_to_home
 from rig.motion.state import JOINT_NAMES, Made
 from rig.motion.steps import Plan
-from rig.turners.ur.condition import local_control, readiness
+from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
 from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.plan_problems import plan_problems
+from rig.turners.ur.registers import registers_in_use
 from rig.turners.ur.report import MAKER, ArmReport
 
 # How far the first motion may swing the large joints through the room, and the wrists.
@@ -55,12 +56,14 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
     if unready := readiness(report.state):
         problems.append(unready)
     # On the loopback address of the robot's own simulator the client skips this check, and so does the pendant.
-    if report.remote_control is False and report.host not in ("127.0.0.1", "localhost"):
+    if report.remote_control is False and report.host not in MAKERS_SIMULATOR:
         problems.append(local_control(report.host))
     if report.program_running:
         problems.append(
             Problem("program_running", f"a program runs on the arm at {report.host}", "Stop it on the pendant")
         )
+    if report.registers_free is False:
+        problems.append(registers_in_use(report.host, report.version))
     if not report.state.at_rest:
         problems.append(Problem("arm_moves", "the arm is moving", "Wait until it stands still"))
     too_far = [

@@ -1,8 +1,9 @@
 """The script line that ends a program, by the primary interface over plain TCP: a stop that no PolyScope is without.
 
 The controller itself reads it, not the program on its screen that serves the dashboard. It takes lines in remote
-control only, and acknowledges none; what it sends ten times a second tells whether a program runs. (The maker's client
-library, `PrimaryClient::commandStop`; client interface description: robot mode data, sub-package 0 of a robot state.)
+control only, and acknowledges none; in local control it answers each by an error, C210. What it sends ten times a
+second tells whether a program runs. (The maker's client library, `PrimaryClient::commandStop`; client interface
+description: robot mode data, sub-package 0 of a robot state.)
 """
 
 import socket
@@ -10,7 +11,8 @@ import struct
 import time
 from collections.abc import Iterator
 
-from rig.turners.ur.primary import PORT, ROBOT_STATE, packages
+from rig.turners.ur.controller_words import READ_ONLY, ErrorCode, ProgramStopped, words_in
+from rig.turners.ur.primary import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
 
 ROBOT_MODE_DATA = 0
 # Time stamp; real robot connected, enabled, power on, emergency stop, protective stop, program runs, program is paused.
@@ -24,8 +26,12 @@ class PrimaryStop:
     """
 
     name = "primary interface"
+    tells_of_programs = True
+    acknowledged = False  # it never does
 
     def __init__(self, host: str, timeout_s: float) -> None:
+        self.refusal: str | None = None
+        self.stopped_programs: set[str] = set()  # of which it has said that they ended, by their names
         self._socket = socket.create_connection((host, PORT), timeout_s)
         self._timeout_s = timeout_s
         self._buffer = bytearray()
@@ -66,7 +72,13 @@ class PrimaryStop:
     def _told(self) -> Iterator[bool]:
         """What the states that have come say, oldest first."""
         for kind, payload in packages(self._buffer):
-            if kind == ROBOT_STATE:
+            if kind == ROBOT_MESSAGE:
+                match words_in(payload):
+                    case ErrorCode(code=code) as error if code == READ_ONLY:
+                        self.refusal = f"{error.words}: it is read-only in local control"
+                    case ProgramStopped(program):
+                        self.stopped_programs.add(program)
+            elif kind == ROBOT_STATE:
                 for part, content in packages(bytearray(payload)):
                     if part == ROBOT_MODE_DATA and len(content) >= MODE_DATA.size:
                         *_, runs, paused = MODE_DATA.unpack_from(content)

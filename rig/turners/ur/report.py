@@ -24,7 +24,8 @@ class ArmReport:
     `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `kinematics` is
     its arm's geometry as the factory has measured it, `tcp_offset` where its tool centre point stands in the flange's
     frame, `setup` the arm it is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all
-    of that means, in the maker's names. It is a `Report`.
+    of that means, in the maker's names. `registers_free` says whether the client finds room among the registers by
+    which it speaks with its script. It is a `Report`.
     """
 
     host: str
@@ -39,6 +40,7 @@ class ArmReport:
     setup: ArmSetup | None = None
     called: str | None = None
     model: str | None = None
+    registers_free: bool | None = None
 
     @property
     def software(self) -> str:

@@ -2,29 +2,31 @@
 
 The receive interface of `ur_rtde` keeps only the newest packet and does not say when one comes: who is held up for a
 moment, by another thread or by a busy machine, loses states. Here they wait in the socket until they are read. Only
-reading is done here; what drives the arm is `ur_rtde`. (Real-Time Data Exchange guide of the maker: packages of a
-big-endian size, u16, a type, one letter, and a payload.)
+reading is done here; what drives the arm is `ur_rtde`. (Real-Time Data Exchange guide of the maker.)
 """
 
+import math
 import select
 import socket
 import struct
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain, zip_longest
-from math import isfinite
+from itertools import zip_longest
 from types import TracebackType
 from typing import Self
 
+from rig.errors import Problem
 from rig.motion.state import ArmState
+from rig.turners.ur.listener import is_here
+from rig.turners.ur.rtde_packages import PORT, VERSION, package, packages
+from rig.turners.ur.state_checks import clock_step, impossible_payload, impossible_state, impossible_way
 
-PORT = 30004
-VERSION = 2
-HEADER = struct.Struct(">HB")
 # Ten seconds at the fastest rate, if the system gives it. What does not fit waits at the controller, and nobody says
 # how long that keeps it.
 ROOM_BYTES = 1 << 20
+CLOCKS_DIFFER = 1.05  # a controller's clock against this computer's: far more than either is off
+SILENT_S = 0.3  # a controller here that was silent for so long may have sent something to nobody
+RECENT_S = 2.0  # states that a network held back come, or are missing, so soon after the gap that it made
 # What is asked for, with the type it must have. Asking for nothing else keeps the packets small.
 VARIABLES = {
     "timestamp": "DOUBLE",
@@ -42,11 +44,6 @@ VARIABLES = {
 }
 CONTROLLER_VERSION = struct.Struct(">4I")  # major, minor, bugfix, build
 PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
-
-# No arm turns so far or so fast, or has other modes: a UR3e's wrist 3 turns without end, and counts its turns.
-ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
-# A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is none.
-ENCODER_RAD, FASTEST_RAD_S = 0.03, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,20 +63,33 @@ class NotSpoken(ConnectionError):
         self.what, self.version = what, version
 
 
+class Disbelieved(ConnectionError):
+    """A state that cannot be true, with the `problem` that it is."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem.what)
+        self.problem = problem
+
+
 class StateStream:
     """A connection over which the controller at `host` sends its state at `rate_hz` of its own time."""
 
     def __init__(self, host: str, rate_hz: float, timeout_s: float) -> None:
         """Connects and waits for the first packet.
 
-        Raises `OSError` when none comes within `timeout_s`, `NotSpoken` when none can come.
+        Raises `OSError` when none comes within `timeout_s`, of it `NotSpoken` when none can come, and `Disbelieved`
+        when no arm is in the state that the first one tells.
         """
         self._deadline_s = time.monotonic() + timeout_s
         self._buffer = bytearray()
-        self.closed = False  # by the controller
+        self._period_s = 1 / rate_hz
+        self.closed = False  # by the controller, or nothing that follows can be believed
+        self.problem: Problem | None = None  # what it has told that cannot be true
         self.version: tuple[int, ...] = ()  # of the controller's software: major, minor, bugfix, build
         self.silent_s = 0.0  # nothing has come for so long at least, however late it was looked for
         self._heard_s = time.monotonic()
+        self._gap_s, self._gap_ended_s = 0.0, self._heard_s  # the longest silence of late, and its end
+        self._elsewhere = not is_here(host)
         self._socket = socket.create_connection((host, PORT), timeout_s)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -87,6 +97,8 @@ class StateStream:
             self._socket.setblocking(False)
             self._set_up(rate_hz)
             self._first = self._await_packet()
+            if (problem := impossible_state(self._first.state)) is not None:
+                raise Disbelieved(problem)
             self._last = self._first.state
         except BaseException:
             self._socket.close()
@@ -106,26 +118,64 @@ class StateStream:
         return self._first
 
     def read(self, timeout_s: float) -> list[Packet]:
-        """The packets that have come, oldest first; waits for one for at most `timeout_s`. Empty once `closed`."""
+        """The packets that have come, oldest first; waits for one for at most `timeout_s`. Empty once `closed`.
+
+        What cannot be true is left out, and is the stream's `problem` from then on. A state that no arm is in closes it
+        too; after a clock that was set states go on, which still tell whether the arm stands.
+        """
         looked_s = time.monotonic()
         if self.closed:
             time.sleep(timeout_s)
             self.silent_s = looked_s - self._heard_s
             return []
-        if select.select([self._socket], [], [], timeout_s)[0]:
-            self._receive()
-            self.silent_s, self._heard_s = 0.0, time.monotonic()
-        else:  # what had come while nobody looked would be there
+        if not select.select([self._socket], [], [], timeout_s)[0]:  # what had come while nobody looked would be there
             self.silent_s = looked_s - self._heard_s
-        try:
-            packets = [_packet(payload) for kind, payload in self._packages() if kind == "U"]
-            for packet in packets:
-                _check_way(self._last, packet.state)
-                self._last = packet.state
-            return packets
-        except ConnectionError:  # what is not readable is a link that is lost
-            self.closed = True
             return []
+        self._receive()
+        now_s = time.monotonic()
+        if self.silent_s >= self._gap_s or now_s - self._gap_ended_s > RECENT_S:
+            self._gap_s, self._gap_ended_s = self.silent_s, now_s
+        self.silent_s, self._heard_s = 0.0, now_s
+        packets: list[Packet] = []
+        try:
+            for kind, payload in packages(self._buffer):
+                if kind != "U":
+                    continue
+                packet = _packet(payload)
+                step = self._checked(packet)
+                self._last = packet.state
+                if step is not None:
+                    self.problem = self.problem or step
+                    break  # those after it come with the next reading, when the problem is known
+                packets.append(packet)
+        except ConnectionError as error:  # what is not readable is a link that is lost
+            self.closed = True
+            if isinstance(error, Disbelieved):
+                self.problem = self.problem or error.problem
+        return packets
+
+    def _checked(self, packet: Packet) -> Problem | None:
+        """Whether the clock was set since the last state. Raises `Disbelieved` for a state that no arm is in."""
+        before, after = self._last, packet.state
+        impossible = impossible_state(after) or impossible_payload(packet.payload_kg, packet.payload_centre_m)
+        step = None
+        if impossible is None:
+            step = clock_step(before.time_s, after.time_s, self._period_s, self._missed_s)
+        if impossible is None and step is None:
+            impossible = impossible_way(before, after)
+        if impossible is not None:
+            raise Disbelieved(impossible)
+        return step
+
+    @property
+    def _missed_s(self) -> float:
+        """Seconds of the controller's clock, at most, of which states may have been lost in the silences of late.
+
+        One here has a pace of its own, and between its states and this process lies nothing that could lose some.
+        """
+        if self._elsewhere:
+            return CLOCKS_DIFFER * self._gap_s
+        return 0.0 if self._gap_s < SILENT_S else math.inf
 
     def _set_up(self, rate_hz: float) -> None:
         spoken = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
@@ -145,16 +195,16 @@ class StateStream:
 
     def _ask(self, kind: str, payload: bytes) -> bytes:
         """One question and its answer; messages in between are passed over."""
-        self._socket.sendall(HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload)
+        self._socket.sendall(package(kind, payload))
         while True:
             self._await_bytes()
-            for answered, answer in self._packages():
+            for answered, answer in packages(self._buffer):
                 if answered == kind:
                     return answer
 
     def _await_packet(self) -> Packet:
         while True:
-            for kind, payload in self._packages():
+            for kind, payload in packages(self._buffer):
                 if kind == "U":
                     return _packet(payload)
             self._await_bytes()
@@ -177,28 +227,9 @@ class StateStream:
         self.closed = not data
         self._buffer += data
 
-    def _packages(self) -> Iterator[tuple[str, bytes]]:
-        """The whole packages among the bytes that have come."""
-        while len(self._buffer) >= HEADER.size:
-            size, kind = HEADER.unpack_from(self._buffer)
-            if size < HEADER.size:
-                raise ConnectionError("this is no RTDE")  # nothing that follows can be trusted
-            if len(self._buffer) < size:
-                return
-            payload = bytes(self._buffer[HEADER.size : size])
-            del self._buffer[:size]
-            yield chr(kind), payload
-
-
-def _check_way(before: ArmState, after: ArmState) -> None:
-    """Raises `ConnectionError` where a joint would have gone farther than any arm's joint can in that time."""
-    allowed_rad = ENCODER_RAD + FASTEST_RAD_S * abs(after.time_s - before.time_s)
-    if any(abs(q2 - q1) > allowed_rad for q1, q2 in zip(before.q_rad, after.q_rad, strict=True)):
-        raise ConnectionError("no arm goes that far in that time")
-
 
 def _packet(payload: bytes) -> Packet:
-    """Raises `ConnectionError` for what no arm says: the bytes have come to harm on the way."""
+    """Raises `ConnectionError` for another number of bytes: some have got lost on the way."""
     if len(payload) != PACKET.size:
         raise ConnectionError(f"a state of {len(payload)} bytes where {PACKET.size} belong")
     values = PACKET.unpack(payload)
@@ -216,13 +247,4 @@ def _packet(payload: bytes) -> Packet:
         robot_status_bits=robot_bits,
         safety_status_bits=safety_bits,
     )
-    damaged = (
-        not all(map(isfinite, chain(values[1:16], values[21:25])))
-        or max(map(abs, state.q_rad)) > ANGLE_RAD
-        or max(map(abs, state.qd_rad_s)) > SPEED_RAD_S
-        or not 0.0 <= fraction <= 1.0
-        or not all(mode in MODES for mode in (robot_mode, safety_mode, runtime_state))
-    )
-    if damaged:
-        raise ConnectionError("no arm is in such a state")
     return Packet(state, payload_kg, values[22:25])

@@ -5,15 +5,17 @@ none. So it is given a program that moves nothing, and told to end it by the lin
 """
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 
 from rig.errors import Problem
 from rig.motion.state import RuntimeState
 from rig.turners.ur.condition import local_control
 from rig.turners.ur.primary_stop import PrimaryStop
 from rig.turners.ur.robot_api import RobotApi
+from rig.turners.ur.supervision import stopped_at_start
 
-PROGRAM = "def rig_stop_trial():\n  while True:\n    sync()\n  end\nend\n"
+NAME = "rig_stop_trial"
+PROGRAM = f"def {NAME}():\n  while True:\n    sync()\n  end\nend\n"
 BEGIN_S = 5.0  # as long as the client's own program may take to begin
 END_S = 2.0
 
@@ -29,13 +31,21 @@ def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], 
         with closing(PrimaryStop(host, BEGIN_S)) as primary:
             primary.send(PROGRAM)
             if not shows(RuntimeState.PLAYING, BEGIN_S):
-                return _not_proved(host, "began no program that was sent to it there")
+                begun_none = _not_proved(host, "began no program that was sent to it there")
+                return stopped_at_start(begun_none) if _ended_at_once(primary) else begun_none
             primary.stop_program()
             if not shows(RuntimeState.STOPPED, END_S):
                 return _not_proved(host, "did not end a program that moves nothing, which may still run")
     except OSError as error:
         return _not_proved(host, f"does not answer ({error})")
     return None
+
+
+def _ended_at_once(primary: PrimaryStop) -> bool:
+    """Whether the controller says that the program ended, which no state showed running."""
+    with suppress(OSError):
+        primary.program_running()
+    return NAME in primary.stopped_programs
 
 
 def _not_proved(host: str, what: str) -> Problem:

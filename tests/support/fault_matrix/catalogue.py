@@ -23,6 +23,7 @@ STOPPED, INTERRUPTED, KILLED = 3, 130, -signal.SIGKILL
 LINK = frozenset({"arm_link_lost", "arm_driver_died", "arm_driver_hung"})
 BOARD = frozenset({"board_link_lost", "board_error", "lost_samples", "no_samples"})
 RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again starts its program anew
+CONTROL_S = 1.5  # the control mode is asked twice a second
 LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silence that tells, docs/architecture.md
 HELLO_S, CLOSED_S = 0.5, 0.3  # a board that has restarted says so, docs/protocol.md; a port that closes is read
 
@@ -210,7 +211,7 @@ CATALOGUE: tuple[Fault, ...] = (
     _controller("slider to 50 %", "speed_slider", "speed_slider", _order("speed_slider", fraction=1), fraction=0.5),
     _controller("slider to 0", "speed_slider", "speed_slider", _order("speed_slider", fraction=1), fraction=0),
     Fault("controller", "local control", _order("remote_control", on=False), _order("remote_control", on=True),
-          frozenset({"not_in_remote_control"}), may_pass=True),
+          frozenset({"not_in_remote_control", "switched_to_local_control"}), known_s=CONTROL_S, late_may_pass=True),
     Fault("controller", "registers claimed by a fieldbus", _order("register_in_use"), _order("register_free"),
           frozenset({"registers_in_use"}), may_pass=True),
     Fault("controller", "somebody else's program", _nudge, names=frozenset({"program_stopped"})),

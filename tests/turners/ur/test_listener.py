@@ -8,7 +8,7 @@ from ipaddress import IPv4Address
 import pytest
 
 from rig.turners.ur.listener import listener
-from rig.turners.ur.state_stream import PORT
+from rig.turners.ur.rtde_packages import PORT
 from support.worlds import World, fresh_host
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")

@@ -12,7 +12,8 @@ from rig.turners.ur.identity import series_problem
 from rig.turners.ur.primary import PORT as PRIMARY_PORT
 from rig.turners.ur.primary_stop import MODE_DATA, PrimaryStop
 from rig.turners.ur.robot_api import RobotApi
-from rig.turners.ur.stopping import Order, independent_ways
+from rig.turners.ur.stop_paths import stop_paths
+from rig.turners.ur.stopping import Order
 from support.waiting import PATIENCE_S, wait_for
 from support.worlds import fresh_host
 
@@ -108,25 +109,72 @@ def test_a_state_newer_than_the_stop_tells_whether_a_program_runs(states: Sequen
     assert heard == [b"stop program\n"]
 
 
+def order_to(host: str, version: tuple[int, ...], timeout_s: float) -> Order:
+    return Order(stop_paths(host, version, API_PORT), timeout_s)
+
+
+X_WITHOUT_API, X, SERIES_5 = (10, 10, 0, 0), (10, 12, 0, 0), (5, 14, 0, 0)
+
+
 @pytest.mark.parametrize("states", [b"", state(False), b"Connected: Universal Robots Dashboard Server\n"])
 def test_a_primary_interface_that_does_not_tell_confirms_no_stop(states: bytes) -> None:
     with saying(PRIMARY_PORT, [states]) as (host, _):
-        order = Order(host, independent_ways((10, 12, 0, 0)), 0.5)
+        order = order_to(host, X_WITHOUT_API, 0.5)
         assert not order.program_ended()
-    assert order.words == "the controller was told to stop"
+    assert order.words == "the primary interface was sent the stop and did not acknowledge it"
 
 
 def test_an_order_is_given_however_late_its_thread_begins() -> None:
     with saying(PRIMARY_PORT, [state(False)]) as (host, heard):
-        Order(host, independent_ways((10, 12, 0, 0)), 0.0)
+        order_to(host, X_WITHOUT_API, 0.0)
         wait_for(lambda: heard, "the order")
     assert heard == [b"stop program\n"]
 
 
-def test_an_order_that_nobody_takes_names_every_way() -> None:
-    order = Order(fresh_host(), independent_ways((5, 14, 0, 0)), 5.0)
+@pytest.mark.parametrize(
+    ("version", "ways"),
+    [(SERIES_5, ["dashboard", "primary interface"]), (X, ["primary interface", "Robot API"])],
+)
+def test_an_order_that_nobody_takes_names_every_way(version: tuple[int, ...], ways: list[str]) -> None:
+    order = order_to(fresh_host(), version, 5.0)
     assert not order.program_ended()
-    assert "dashboard: [Errno " in order.words and "primary interface: [Errno " in order.words
+    for way in ways:
+        assert f"the {way} did not take the stop ([Errno " in order.words
+
+
+READ_ONLY = package(20, struct.pack(">QbBiiiII", 0, -1, 6, 210, 0, 2, 0, 0) + b"read-only")
+NOT_ALLOWED = "Command is not allowed due to safety reasons, please switch robot to Remote Control mode"
+RUNS = b"Program running: %s\n"
+
+
+def dashboard(answer: str, running: bytes = b"true") -> list[bytes]:
+    """What it says to one client, that goes on to ask whether the program runs."""
+    return [b"Connected: Universal Robots Dashboard Server\n" + answer.encode() + b"\n" + RUNS % running]
+
+
+@pytest.mark.parametrize(
+    ("version", "port", "answers", "refusal"),
+    [
+        (SERIES_5, 29999, dashboard(NOT_ALLOWED), f'the dashboard refused the stop ("{NOT_ALLOWED}")'),
+        (SERIES_5, 29999, dashboard("Failed to execute: stop"), "refused the stop (\"Failed to execute: stop\")"),
+        (SERIES_5, 29999, dashboard("Failed to execute: stop", b"false"), None),
+        (SERIES_5, 29999, dashboard("Stopped"), None),
+        (X_WITHOUT_API, PRIMARY_PORT, [READ_ONLY + state(True) * 2], "refused the stop (C210A0 read-only: it is "),
+        (X, API_PORT, [b"HTTP/1.1 403 Forbidden\r\nContent-Length: 20\r\n\r\n{\"message\": \"local\"}"],
+         "the Robot API refused the stop (HTTP status 403 local)"),
+        (X, API_PORT, [said(b"{}")], None),
+    ],
+    ids=["not allowed", "failed", "nothing runs", "stopped", "read-only", "forbidden", "ok"],
+)  # fmt: skip
+def test_who_refuses_a_stop_is_told_with_his_words(
+    version: tuple[int, ...], port: int, answers: list[bytes], refusal: str | None
+) -> None:
+    with saying(port, answers) as (host, _):
+        order = order_to(host, version, 0.5)
+        assert order.given()
+        order.program_ended()
+    assert (refusal or "") in order.words
+    assert bool(order.refusals) == bool(refusal)
 
 
 @pytest.mark.parametrize(

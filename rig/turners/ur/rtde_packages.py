@@ -1,0 +1,26 @@
+"""The packages of RTDE, port 30004: a big-endian size, u16, a type, one letter, and a payload (the maker's guide)."""
+
+import struct
+from collections.abc import Iterator
+
+PORT = 30004
+VERSION = 2
+HEADER = struct.Struct(">HB")
+
+
+def package(kind: str, payload: bytes) -> bytes:
+    """The bytes of one package."""
+    return HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload
+
+
+def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
+    """The whole packages at the beginning of the bytes, taken from them. Raises `ConnectionError` for other bytes."""
+    while len(buffer) >= HEADER.size:
+        size, kind = HEADER.unpack_from(buffer)
+        if size < HEADER.size:
+            raise ConnectionError("this is no RTDE")  # nothing that follows can be trusted
+        if len(buffer) < size:
+            return
+        payload = bytes(buffer[HEADER.size : size])
+        del buffer[:size]
+        yield chr(kind), payload
