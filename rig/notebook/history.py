@@ -15,7 +15,7 @@ from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.results import Result, solve
 from rig.notebook.runs import Run
-from rig.report.kinds.followed import Followed
+from rig.report.kinds.followed import Followed, Parameter
 from rig.report.kinds.registry import followed
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def changes(before: Run | Result, now: Run | Result) -> Changes:
     first, second = ({_same(each): each for each in _followed(of)} for of in (before, now))
     found = {}
     both = [subject for subject in second if subject in first]
-    pairs = [tuple({one.name: one for one in each[subject].parameters} for each in (first, second)) for subject in both]
+    pairs = [(_by_name(first[subject]), _by_name(second[subject])) for subject in both]
     for subject, changed in zip(both, changes_in(pairs), strict=True):
         new = second[subject]
         name = new.sensor if new.quantity == "rate" else f"{new.sensor}, {new.quantity}"
@@ -173,6 +173,10 @@ def _same(of: Followed) -> Subject:
 
 def _followed(of: Run | Result) -> tuple[Followed, ...]:
     return followed((solve(of) if isinstance(of, Run) else of).document)
+
+
+def _by_name(sensor: Followed) -> dict[str, Parameter]:
+    return {parameter.name: parameter for parameter in sensor.parameters}
 
 
 def _named(sensors: Mapping[Subject, Followed]) -> str:

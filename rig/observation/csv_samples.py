@@ -87,7 +87,8 @@ def _read(path: Path, table: Table, quantity: Quantity) -> NDArray[np.bool_]:
         row = int(partly[0])
         axis = int(np.argmax(blank[:, row]))
         raise blank_cell(path, quantity.columns[axis], int(table.lines[row]))
-    return ~blank[0]
+    read: NDArray[np.bool_] = ~blank[0]
+    return read
 
 
 def _without_blanks(

@@ -82,7 +82,7 @@ def _unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     widened = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)
     off = np.abs(widened - np.median(blocks, axis=1, keepdims=True))
-    knocked = (off > KNOCK * noise).any(axis=2)
+    knocked: NDArray[np.bool_] = np.any(off > KNOCK * noise, axis=2)
     few = (knocked.sum(axis=1) <= blocks.shape[1] // 4) & ~knocked[:, 0] & ~knocked[:, -1]
     left = np.where((knocked[:, 1:-1] & few[:, None])[..., None], np.nan, blocks)
     return np.nanmean(left, axis=1), np.nanstd(left, axis=1)

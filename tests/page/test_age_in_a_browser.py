@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
 from rig.config.load import load
-from rig.motion.state import JointState, Report
+from rig.motion.state import Report
 from rig.motion.steps import Plan
 from rig.page.about import About
 from rig.page.arm import built
@@ -24,7 +23,7 @@ from support.commands import configuration
 from support.paths import CONFIGS
 from support.servo_runs import configured
 from support.told_page import showing
-from support.told_runs import report, state
+from support.told_runs import report, servo_report, servo_state, state
 from support.waiting import alive, wait_for
 from support.worlds import fresh_host, merge
 
@@ -32,11 +31,11 @@ pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_
 
 HOME = (0.0,) * 6
 HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
-ARM_SEEN, SERVO_SEEN = state(1.0, HOME, HOME), JointState(1.0, 1.0, (0.1,), (0.0,))
+ARM_SEEN, SERVO_SEEN = state(1.0, HOME, HOME), servo_state(1.0, 0.1)
 # A configuration whose turner turns, what reads, how the turner is connected, and how it is seen then.
 TURNERS: dict[str, tuple[str, str, Report, RunEvent]] = {
     "arm": ("demo.yaml", "lsm9ds1", report(HOME), ArmSeen(ARM_SEEN, 0)),
-    "servo": ("servo.yaml", "lsm9ds1", replace(report((0.0,)), state=SERVO_SEEN), ArmSeen(SERVO_SEEN, 0)),
+    "servo": ("servo.yaml", "lsm9ds1", servo_report(SERVO_SEEN), ArmSeen(SERVO_SEEN, 0)),
     "hand": ("by_hand.yaml", "lsm9ds1", installed()["hand"].look(installed()["hand"].section()), HAND),
     "lines": ("by_hand.yaml", "lines", installed()["hand"].look(installed()["hand"].section()), HAND),
 }

@@ -4,19 +4,29 @@ import asyncio
 import json
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rig.motion.state import JointState, Report
+from rig.motion.state import Report
 from rig.page.feed import Broadcast, Feed, Mailbox
 from rig.page.history import POINTS, STEP_S
 from rig.page.page_state import Shown
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.registry import installed
-from support.told_runs import ABOUT, before_it_moves, judged, look, moving, planned, report, state
+from support.told_runs import (
+    ABOUT,
+    before_it_moves,
+    judged,
+    look,
+    moving,
+    planned,
+    report,
+    servo_report,
+    servo_state,
+    state,
+)
 
 
 def fed() -> Feed:
@@ -60,8 +70,8 @@ AT_HAND = HandSeen(5.0, "resting", 0.8, 0.0, 0.0, 8.0, None, (), (), (), 0)
 TURNERS: dict[str, tuple[Report, Callable[[float], RunEvent], dict[str, float]]] = {
     "arm": (report((0.0,) * 6), lambda time_s: ArmSeen(state(time_s, (0.0,) * 6, (0.0,) * 6), 0), {"arm": 47.0}),
     "servo": (
-        replace(report((0.0,)), state=JointState(0.0, 0.0, (0.1,), (0.0,))),
-        lambda time_s: ArmSeen(JointState(time_s, 0.0, (0.1,), (0.0,)), 0),
+        servo_report(servo_state(0.0, 0.1)),
+        lambda time_s: ArmSeen(servo_state(time_s, 0.1), 0),
         {"arm": 47.0},
     ),
     "hand": (HAND.look(HAND.section()), lambda _: AT_HAND, {}),

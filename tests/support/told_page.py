@@ -75,8 +75,9 @@ class Telling:
                 if not self.repeating.is_set():
                     self._seen, self._samples = later(self._seen), more(self._samples)
                     self.times += 1
-                for event in filter(None, (self._samples, self._seen)):
-                    self._feed.event(event)
+                if self._samples is not None:
+                    self._feed.event(self._samples)
+                self._feed.event(self._seen)
 
 
 def goes_on(seen: ArmSeen | HandSeen) -> bool:

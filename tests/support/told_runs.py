@@ -29,6 +29,8 @@ from rig.station.events import (
     StepStarted,
     VerdictReached,
 )
+from rig.turners.servo.models import MODELS
+from rig.turners.servo.state import ServoReport, ServoState
 from rig.turners.ur.report import ArmReport
 from support.paths import DEMO
 
@@ -82,6 +84,33 @@ def report(q_rad: Joints) -> ArmReport:
         state=state(0.0, q_rad, (0.0,) * 6),
         called="UR10",
         model="UR10e or UR12e",
+    )
+
+
+def servo_state(time_s: float, angle_rad: float) -> ServoState:
+    """A healthy servo that stands."""
+    return ServoState(time_s, time_s, (angle_rad,), (0.0,), 0.001, 0, 0, 0, 0, 0.0, 12.0, 30.0)
+
+
+def servo_report(state: ServoState) -> ServoReport:
+    """A servo as it comes from its maker, in extended position mode, seen so."""
+    return ServoReport(
+        port="/dev/servo",
+        servo_id=1,
+        servo=MODELS[0],
+        firmware=45,
+        drive_mode=0,
+        operating_mode=4,
+        secondary_id=255,
+        homing_offset=0,
+        temperature_limit_c=72,
+        voltage_limits_v=(6.5, 12.0),
+        velocity_limit_rad_s=6.3,
+        startup=0,
+        shutdown=52,
+        torque_on=False,
+        round_trip_s=0.001,
+        state=state,
     )
 
 

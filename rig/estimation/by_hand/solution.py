@@ -150,6 +150,7 @@ def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.zeros((0, 3)),
         widened=max(1.0, fit.sizes.repeat_rad / STATED.repeat_rad),
+        widened_freedom=np.inf,
         budget=_budget(fit, to_parameters, clock),
         observations=len(fit.session.rests) + sum(move.tells for move in fit.session.moves),
         rank=12,
