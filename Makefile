@@ -4,7 +4,7 @@
 # make test    everything CI checks: lint, types, import layers, all tests
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
-# make bench   every benchmark, ratios measured side by side; not faults, long_life and damaged_frames, which take hours
+# make bench   every benchmark, ratios measured side by side; not faults, long_life, damaged_frames and hidden_worlds, which take hours
 # make lock    pins what `make demo` installs anew, by version and hash (requirements/demo.txt)
 # make sbom    what is installed, as a CycloneDX bill of materials: build/sbom.json
 # make figures the pictures in docs/results.md, by the studies and the experiments
@@ -14,7 +14,7 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
+LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py hidden_worlds.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
 .PHONY: demo all-extras system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean

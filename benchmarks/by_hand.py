@@ -1,6 +1,6 @@
 """The same sessions by hand through imucal and through the rig's graph of rests and moves: errors of scale and axes.
 
-PYTHONPATH=tests python benchmarks/by_hand.py [SESSIONS]          # needs the extra `bench`
+python benchmarks/by_hand.py [SESSIONS]          # needs the extra `bench`
 
 A session of 40 s is twelve flips over all six faces and a whole turn back about each axis, as the simulated hand makes
 them (`rig.world.hand`). imucal is given its six holds and three turns without an error of annotation; the rig is given
@@ -8,6 +8,7 @@ the readings and nothing else.
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 from imucal import FerrarisCalibration, FerrarisSignalRegions
@@ -17,6 +18,9 @@ from rig.estimation.by_hand import Handled, Told, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.handled import handled
 from rig.world.hand.habits import Action, Turn
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.handled_body import TWELVE, handle
 
 SESSION: tuple[Action, ...] = (Turn(-1), TWELVE[0], Turn(-1), TWELVE[1], Turn(-1), *TWELVE[2:])  # on +z, +x and +y
