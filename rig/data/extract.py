@@ -1,37 +1,43 @@
-"""Takes a run file apart, as a process of its own: `python -m rig.data.extract FILE` writes its contents to stdout.
+"""Takes a run file apart, in a process of its own (`rig.data.reading_process`).
 
-The HDF5 library does not come back from some damaged files, and nothing in a process can end it then, no signal
-either. So a file is read where it can be ended from outside, and only what proved whole reaches the rig: a line of JSON
-(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, the turner's
-states, events, and the tables of readings from elsewhere.
-What is of another shape ends in one line on stderr and exit status 1, an output that takes no more in NO_ROOM.
+What it yields: a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the
+turner's states, events, and the tables of readings from elsewhere.
 Rows are of plain numbers; whether of those that the texts describe is for whoever reads them to judge, for here only
 what this takes is imported.
 """
 
-import io
-import json
-import os
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.reading_process import MAX_UNPACKED, ReadingLimits, size_without_holes
 from rig.data.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, states_name
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
-NO_ROOM = 2
 MAX_SENSORS = 64
 MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
-MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
 MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
 LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
+
+
+def limits_of_run(stored_bytes: int, time_s: float) -> ReadingLimits:
+    """Return what may be taken to read a run file: a packed piece need not be as long as it says."""
+    rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
+    return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
+
+
+def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
+    """Yield the contents of a run file, header first. Raise ValueError with the reason, whatever h5py raises."""
+    try:
+        yield from extract(path)
+    except Exception as error:  # of whatever kind: what it is damaged into is up to chance
+        raise ValueError(reason(error)) from error
 
 
 def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
@@ -121,25 +127,11 @@ def _check(dataset: Any, name: str) -> None:
 
 def _refuse_endless(path: Path, unpacked: int) -> None:
     """Raises ValueError for what would not fit a computer, though it fits an e-mail: packed, or full of holes."""
-    stored = _stored_bytes(path)
+    with path.open("rb") as file:
+        stored = size_without_holes(file)
     for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
         if size > MAX_UNPACKED * stored + MAX_UNWRITTEN_BYTES:
             raise ValueError(f"{what} {stored} bytes to {size}")
-
-
-def _stored_bytes(path: Path) -> int:
-    """Size of a file without its holes, which take no room on the disk; where the system does not tell, its size."""
-    if not hasattr(os, "SEEK_DATA"):
-        return path.stat().st_size
-    stored = end = 0
-    with path.open("rb") as file:
-        while True:
-            try:
-                start = os.lseek(file.fileno(), end, os.SEEK_DATA)
-            except OSError:  # no more data
-                return stored
-            end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
-            stored += end - start
 
 
 def _stored_rows(dataset: Any) -> int:
@@ -167,48 +159,3 @@ def _plain(value: Any) -> Any:
     if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
         raise ValueError("an attribute of it is longer than any a run has")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
-def _limit_memory(path: Path) -> None:
-    """Let this process have no more memory than what a file may hold: a packed piece need not be as long as it says."""
-    try:
-        import resource
-    except ModuleNotFoundError:  # Windows
-        return
-    limit = LIBRARIES_BYTES + 3 * (MAX_UNPACKED * _stored_bytes(path) + MAX_UNWRITTEN_BYTES)  # rows, and their copies
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    resource.setrlimit(resource.RLIMIT_AS, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))
-
-
-def _main() -> int:
-    path = Path(sys.argv[1])
-    try:
-        _limit_memory(path)
-        for part in extract(path):
-            encoded = _encoded(part)
-            try:
-                sys.stdout.buffer.write(encoded)
-                sys.stdout.flush()
-            except OSError as error:
-                _end(NO_ROOM, error)
-    except Exception as error:  # of whatever kind: what it is damaged into is up to chance
-        _end(1, error)
-    return 0
-
-
-def _encoded(part: dict[str, Any] | NDArray[Any]) -> bytes:
-    if isinstance(part, dict):
-        return json.dumps(part).encode() + b"\n"
-    encoded = io.BytesIO()
-    np.save(encoded, part)
-    return encoded.getvalue()
-
-
-def _end(status: int, error: Exception) -> NoReturn:
-    sys.stderr.write(reason(error) + "\n")
-    sys.stderr.flush()
-    os._exit(status)  # HDF5 may not close what it could not open
-
-
-if __name__ == "__main__":
-    sys.exit(_main())

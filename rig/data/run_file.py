@@ -7,8 +7,6 @@ anything that points to it. What lies where is said in `rig.data.layout`.
 
 import json
 import os
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -16,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +23,17 @@ from rig.config.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular
 from rig.config.section import SensorName
 from rig.data.checked import LARGEST_NUMBER, checked, parsed
 from rig.data.events import Event, Recorded, from_lines, to_line
-from rig.data.extract import NO_ROOM, reason
+from rig.data.extract import limits_of_run, reason
 from rig.data.layout import Contents, append, check_rows, empty, lay_out, table_of
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
+from rig.data.reading_process import NoRoomToRead, UnreadableFile, read_apart, size_without_holes
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner, check_joints
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
-from rig.data.silence import Silence
 from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
@@ -43,11 +41,7 @@ from rig.motion.state import State
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
-READ_TICK_S = 0.1
 LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
-# A file that somebody made loads no plugin of the library; and threads for linear algebra reserve memory by gigabytes.
-READING = {f"{each}_NUM_THREADS": "1" for each in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
-READ_SPARED = 6  # … and at most so many times that, when the reading process gets no processor
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,33 +258,23 @@ def make_plain(path: Path) -> None:
 
 def _contents(path: Path, timeout_s: float | None) -> Contents:
     """What the file holds, read by a process that can be ended: see `rig.data.extract`."""
-    _refuse_unreadable(path)
+    stored = _stored_bytes(path)
     if timeout_s is None:
-        timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
-    # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
-    command = [sys.executable, "-P", "-m", "rig.data.extract", str(path)]
-    environment = {**os.environ, **READING, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with tempfile.TemporaryFile() as out:
-        with subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, env=environment
-        ) as reading:
-            try:
-                complaint = _awaited(reading, timeout_s)
-            except TimeoutError:
-                raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None
-            finally:
-                reading.kill()
-        if reading.returncode != 0:
-            said = complaint.decode(errors="replace").strip().splitlines() or ["reading it ended the HDF5 library"]
-            if reading.returncode == NO_ROOM:
-                raise _no_room(path, said[-1])
-            raise _not_a_run_file(path, said[-1])
-        out.seek(0)
-        header = json.loads(out.readline())
-        samples = {name: np.load(out) for name in header["described"]}
-        states, events = np.load(out), np.load(out)
-        tables = {name: np.load(out) for name in (TABLES if header["schema"] == SCHEMA_ELSEWHERE else ())}
-    contents = Contents(**header, samples=samples, states=states, events=events, tables=tables)
+        timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
+    try:
+        header, *arrays = read_apart("rig.data.extract:contents", path, {}, limits_of_run(stored, timeout_s))
+    except NoRoomToRead as error:
+        raise _no_room(path, str(error)) from error
+    except UnreadableFile as error:
+        raise _not_a_run_file(path, str(error)) from error
+    told, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
+    contents = Contents(
+        **told,
+        samples={name: next(rows) for name in told["described"]},
+        states=next(rows),
+        events=next(rows),
+        tables={name: next(rows) for name in (TABLES if told["schema"] == SCHEMA_ELSEWHERE else ())},
+    )
     try:
         check_rows(contents)
     except (ValueError, RecursionError) as error:
@@ -298,10 +282,10 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
     return contents
 
 
-def _refuse_unreadable(path: Path) -> None:
+def _stored_bytes(path: Path) -> int:
     try:
-        with open_regular_file(path, RECORDING_MAX_BYTES):
-            return
+        with open_regular_file(path, RECORDING_MAX_BYTES) as file:
+            return size_without_holes(file)
     except FileNotFoundError:
         why = f"there is no file {path}"
     except UnfitFile as error:
@@ -309,21 +293,6 @@ def _refuse_unreadable(path: Path) -> None:
     except OSError as error:
         why = f"{path} cannot be read: {error.strerror}"
     raise Refused("no_run_file", why, "Give the path of a run.h5 that you may read")
-
-
-def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:
-    """What it wrote to stderr, once it has ended. Raises TimeoutError.
-
-    What the library does not come back from it sleeps in, so its time on a processor would not tell; a process that
-    waits for one, or for the disk, does not sleep.
-    """
-    silent = Silence(reading.pid, spared=READ_SPARED)
-    while not silent.lasts_over(timeout_s / READ_TICK_S):
-        try:
-            return reading.communicate(timeout=READ_TICK_S)[1]
-        except subprocess.TimeoutExpired:
-            silent.tick()
-    raise TimeoutError
 
 
 def _not_a_run_file(path: Path, why: str) -> Refused:

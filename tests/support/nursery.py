@@ -27,9 +27,9 @@ IMPORTED = (
     *("rig.turners.ur.kind", "rig.turners.servo.kind", "rig.turners.hand.kind"),
     *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage"),
 )
-# What takes a run file apart is allowed little memory, and imports little.
-READS = ("h5py", "rig.data.schema")
-LABORATORY, READER = "rig.world", "rig.data.extract"
+# What reads a file of others is allowed little memory, and imports little.
+READS = ("h5py", "rig.data.schema", "rig.data.reading_process")
+LABORATORY, READER = "rig.world", "rig.data.reading_child"
 
 Order = dict[str, Any]
 

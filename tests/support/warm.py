@@ -16,7 +16,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from rig.data.run_file import READING
+from rig.data.reading_process import ENVIRONMENT
 from support.nursery import READER, Forked, forked_here
 
 NURSERY = Path(__file__).with_name("nursery.py")
@@ -38,7 +38,7 @@ class _Nursery:
         return self._addresses.get(module, self._addresses["rig"])
 
     def _begun(self) -> dict[str, str]:
-        command = [sys.executable, str(NURSERY), json.dumps(READING)]
+        command = [sys.executable, str(NURSERY), json.dumps(ENVIRONMENT)]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert process.stdin is not None and process.stdout is not None
         pipes = (process.stdin, process.stdout)
