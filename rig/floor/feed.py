@@ -3,11 +3,14 @@
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
+from typing import Any
 
 from sqlalchemy import func, select
+from sqlalchemy.exc import SQLAlchemyError
 
 from rig.errors import Refused
+from rig.errors.quoting import shorten
 from rig.floor import shown
 from rig.history import schema, stations
 from rig.history.address import Place
@@ -38,7 +41,7 @@ def _look(place: Place, feed: Sections, over: threading.Event) -> None:
                 feed.put(history={"label": place.label, "silent": None})
                 _follow(history, feed, over)
         except Exception as error:  # the page says it, and goes on trying
-            why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+            why = error.what if isinstance(error, Refused) else f"{type(error).__name__}: {shorten(str(error))}"
             feed.put(history={"label": place.label, "silent": why})
             over.wait(LOOK_S)
 
@@ -47,13 +50,25 @@ def _follow(history: History, feed: Sections, over: threading.Event) -> None:
     before: object = None
     while not over.is_set():
         today = datetime.now(UTC).date()
-        feed.put(rigs=shown.rigs(stations.heard(history.engine)))
+        feed.put(**shown.rigs(*stations.heard(history.engine)))
         entered = today, _entered(history)
         if entered != before:  # trends of a long history take longer than a second
-            before, pasts = entered, history.calibrations()
-            recalls = shown.recalls(pasts, today)
-            feed.put(today=shown.todays(pasts, today), standards=shown.standards(pasts), recalls=recalls)
+            before = entered
+            feed.put(**_past(history, today))
         over.wait(LOOK_S)
+
+
+def _past(history: History, today: date) -> dict[str, Any]:
+    """What the history has of the past; of rows that cannot be read only that: the rigs are shown all the same."""
+    try:
+        pasts = history.calibrations()
+        recalls = shown.recalls(pasts, today)
+        found = {"today": shown.todays(pasts, today), "standards": shown.standards(pasts), "recalls": recalls}
+    except SQLAlchemyError:
+        raise  # the history does not answer
+    except Exception as error:
+        return {"unread": f"{type(error).__name__}: {shorten(str(error))}"}
+    return {**found, "unread": None}
 
 
 def _entered(history: History) -> tuple[int, int]:

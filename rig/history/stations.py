@@ -14,9 +14,13 @@ from sqlalchemy import (
     Connection,
     Engine,
     Float,
+    LargeBinary,
     MetaData,
     String,
     Table,
+    case,
+    cast,
+    func,
     insert,
     inspect,
     literal_column,
@@ -29,6 +33,8 @@ from rig.history.engine import WRITES
 
 LONGEST = 20_000  # characters of what a station says
 NAME = 200
+MOST = 100  # stations that are told of
+SOONEST_S, LATEST_S = -1.0, 3e9  # ages that can be: clocks are corrected, and nobody told anything a century ago
 metadata = MetaData()
 station = Table(
     "station",
@@ -46,12 +52,15 @@ _NOW: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the station of a `rig` on a `computer` said last, as JSON, and how long ago."""
+    """What the station of a `rig` on a `computer` said last, as JSON, and how long ago; None if no time is told.
+
+    Whoever may write to the history may have written anything there.
+    """
 
     rig: str
     computer: str
     told: str
-    age_s: float
+    age_s: float | None
 
 
 def make_table(engine: Engine) -> None:
@@ -76,14 +85,43 @@ def tell(engine: Engine, rig: str, computer: str, told: str) -> None:
             connection.execute(insert(station).values(**key, **row))
 
 
-def heard(engine: Engine) -> list[Told]:
-    """What all stations said last, by the rig's name; nothing where none ever said anything."""
+def heard(engine: Engine) -> tuple[list[Told], int]:
+    """Return what stations said last, by the rig's name, and how many more there are; none if no one ever said a word.
+
+    Of more than `MOST` stations those that were heard last.
+    """
     if not inspect(engine).has_table(station.name):
-        return []
+        return [], 0
     with engine.connect() as connection:
         age = _now(connection) - station.c.heard_s
-        question = select(station.c.rig, station.c.computer, station.c.told, age).order_by(*station.primary_key)
-        return [Told(*row) for row in connection.execute(question).all()]
+        texts = (_text(connection, column, most) for column, most in _LENGTHS)
+        cannot_be = case((age.between(SOONEST_S, LATEST_S), 0), else_=1)
+        question = select(*texts, age).order_by(cannot_be, age, *station.primary_key).limit(MOST)
+        rows: list[tuple[Any, ...]] = [tuple(row) for row in connection.execute(question)]
+        every = connection.scalar(select(func.count()).select_from(station)) or 0
+    told = [Told(*map(_decoded, words), _age_s(age)) for *words, age in rows]
+    return sorted(told, key=lambda each: (each.rig, each.computer)), max(every - len(told), 0)
+
+
+_LENGTHS = ((station.c.rig, NAME), (station.c.computer, NAME), (station.c.told, LONGEST + 1))
+
+
+def _text(connection: Connection, column: ColumnElement[str], most: int) -> ColumnElement[Any]:
+    """The beginning of a text. Of SQLite as bytes: a column holds whatever was put there, also what is no UTF-8."""
+    start = func.substr(column, 1, most)
+    return cast(start, LargeBinary) if connection.dialect.name == "sqlite" else start
+
+
+def _decoded(value: Any) -> str:
+    return value.decode(errors="replace") if isinstance(value, bytes) else "" if value is None else str(value)
+
+
+def _age_s(value: Any) -> float | None:
+    try:
+        age_s = float(value)
+    except (TypeError, ValueError):
+        return None
+    return max(age_s, 0.0) if SOONEST_S <= age_s <= LATEST_S else None
 
 
 def _writing(engine: Engine) -> Connection:

@@ -4,6 +4,7 @@ import { live, SIGNS, silent, up, WORDS } from "./live.js";
 
 const $ = (id) => document.getElementById(id);
 const shown = {};
+const RIG = "rig "; // how the section of a rig begins
 const CONTROL = { in: "✓ in control", out: "✗ OUT OF CONTROL", "too few": "too few calibrations" };
 
 const element = (name, text, data = {}) => {
@@ -37,7 +38,7 @@ function rig(of) {
   doing.className = "doing";
   const counts = Object.entries(of.counts ?? {}).map(([state, count]) => `${count} ${state}`).join(", ");
   const who = [of.operator, of.work_order && `order ${of.work_order}`, of.computer, of.at !== of.rig && `at ${of.at}`, of.simulated && "simulated"].filter(Boolean).join(" · ");
-  const age = of.state === "dead" ? `last heard ${of.age_s} s ago · ` : "";
+  const age = of.state === "dead" ? `last heard ${of.age} · ` : "";
   const tray = element("ul");
   tray.className = "tray";
   tray.append(...(of.parts ?? []).map(([serial, state], at) => {
@@ -52,8 +53,14 @@ function rig(of) {
 
 const SHOW = {
   history: ({ label }) => { $("history").textContent = label; },
-  rigs(list) {
-    $("rigs").replaceChildren(...(list.length ? list.map(rig) : [element("p", "No station has told this history anything yet.")]));
+  rigs({ count, more }) {
+    $("no-rigs").hidden = count > 0;
+    $("more-rigs").hidden = !more;
+    $("more-rigs").textContent = `and ${more} more, which were heard before these`;
+  },
+  unread(why) {
+    $("unread").hidden = !why;
+    $("unread").textContent = `What was calibrated cannot be read: ${why}`;
   },
   today: (list) => rows("today", list, (each) => [
     [each.time], [each.rig], [each.serial], [each.sensor + (each.simulated ? " (simulated)" : "")], [each.verdict.toUpperCase(), each.verdict], [each.number],
@@ -66,6 +73,13 @@ const SHOW = {
   ], "None."),
 };
 
+/** A rig's card, in its place among the others; null where there is none any more. */
+function place(section, of) {
+  const number = Number(section.slice(RIG.length));
+  while ($("rigs").children.length <= number) $("rigs").append(element("div"));
+  $("rigs").children[number].replaceWith(of === null ? element("div") : rig(of));
+}
+
 function tell() {
   const mute = shown.history?.silent;
   const lost = silent() || (!up && shown.history);
@@ -75,5 +89,6 @@ function tell() {
 
 live((section, content) => {
   shown[section] = content;
-  SHOW[section]?.(content);
+  if (section.startsWith(RIG)) place(section, content);
+  else SHOW[section]?.(content);
 }, tell, () => false);
