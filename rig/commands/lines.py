@@ -31,19 +31,20 @@ def run(options: Namespace) -> int:
     from rig.commands.claims import claimed_sensor
     from rig.sensors.lines.guessing import guess
     from rig.sensors.lines.listening import listen
-    from rig.sensors.lines.shape import shape_of
+    from rig.sensors.lines.shape import NoShape, shape_of
     from rig.sensors.lines.written import section
 
     if not all(0.5 <= each <= 600 for each in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")
     with raised_as(Refused), claimed_sensor(options.name, options.port):
         baud, lines, still_s = listen(options.port, options.baud, _tell, tuple(options.seconds))
-    shape = shape_of(lines)
-    if isinstance(shape, str):
+    try:
+        shape = shape_of(lines)
+        found = guess(shape, still_s)
+    except NoShape as why:
         raise Refused(
-            "lines_no_pattern", f"{options.port}: {shape}", "Let its program print one sample a line, numbers only"
-        )
-    found = guess(shape, still_s)
+            "lines_no_pattern", f"{options.port}: {why}", "Let its program print one sample a line, numbers only"
+        ) from why
     for told in found.told:
         _tell(told)
     for untold in found.untold:

@@ -11,7 +11,7 @@ import yaml
 
 from rig.config.lines_section import LinesSection
 from rig.sensors.lines.guessing import Guess, guess
-from rig.sensors.lines.shape import Line, Shape, shape_of
+from rig.sensors.lines.shape import Line, NoShape, Shape, shape_of
 from rig.sensors.lines.written import section
 from support.printed_lines import summed
 
@@ -173,7 +173,6 @@ FORMATS = {
 
 def looked_at(name: str) -> tuple[Shape, Guess]:
     shape = shape_of(arrived(FORMATS[name]))
-    assert isinstance(shape, Shape), shape
     return shape, guess(shape, STILL_S)
 
 
@@ -203,5 +202,34 @@ def test_the_section_is_right_or_says_what_it_cannot_tell(name: str) -> None:
 
 def test_what_is_no_sample_a_line_is_said_to_be_none() -> None:
     lines = [Line(0.01 * n, ("gyro: 1 2 3", "acc: 4 5", "status ok")[n % 3]) for n in range(300)]
-    assert "look alike" in str(shape_of(lines))
-    assert "which is too few" in str(shape_of(lines[:5]))
+    with pytest.raises(NoShape, match="look alike"):
+        shape_of(lines)
+    with pytest.raises(NoShape, match="which is too few"):
+        shape_of(lines[:5])
+
+
+HARM = {
+    "numbers beyond all": (lambda n: f"{n},1e400,-1e400,0.{n}", "numbers that nothing measures: 1e400"),
+    "ten thousand columns": (lambda n: ",".join(["0.5"] * 10_000), "longer than 2000 characters"),
+    "a hundred columns": (lambda n: ",".join(["0.5"] * 100), "a line holds 100 numbers"),
+    "a key that writes on the terminal": (lambda n: f"\x1b[2J{n} a{n} b{n}", "has nothing in common|stands|look alike"),
+    "a key of a megabyte": (lambda n: "k" * 1_000_000 + f"{n},{n},{n}", "longer than 2000 characters"),
+}
+
+
+@pytest.mark.parametrize("harm", HARM)
+def test_lines_that_no_device_prints_are_refused_at_once(harm: str) -> None:
+    line, why = HARM[harm]
+    with pytest.raises(NoShape, match=why) as refused:
+        guess(shape_of([Line(0.01 * n, line(n)) for n in range(1, 61)]), STILL_S)
+    assert len(str(refused.value)) < 200 and str(refused.value).isprintable()
+
+
+def test_one_impossible_number_costs_its_line_and_a_device_that_stood_mute_is_told() -> None:
+    lines = [Line(0.01 * n, f"{n},{n % 7},{n % 5},0.{n}") for n in range(1000)]
+    lines[500] = Line(5.0, "500,1e400,2,3")
+    shape = shape_of(lines)
+    assert len(shape.values) == 999 and shape.others == 1
+    assert guess(shape, STILL_S).columns[0] == "sequence"
+    with pytest.raises(NoShape, match="only 0 of its lines came while it lay still"):
+        guess(shape, 0.0)

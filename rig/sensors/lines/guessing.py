@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
-from rig.sensors.lines.shape import Shape
+from rig.sensors.lines.shape import NoShape, Shape
 
 Flags = NDArray[np.bool_]
 G = 9.80665
+FEWEST = 10  # lines at rest, and in motion
 ON_HAND = 0.12  # of a size that is known, as far as an accelerometer that nobody calibrated and a hand may be off
 COUNTS_PER_G = (1024, 2048, 4096, 8192, 16384, 32768)
 # °/s of a count: InvenSense (131 … 16.4 counts a °/s), ST (8.75 … 70 m°/s), Bosch (the same), Analog Devices.
@@ -54,7 +55,14 @@ class Guess:
 
 
 def guess(shape: Shape, still_until_s: float) -> Guess:
-    """What the columns are; the device lay still until then, by the computer's clock, and was turned afterwards."""
+    """What the columns are; the device lay still until then, by the computer's clock, and was turned afterwards.
+
+    Raises NoShape where too few lines came while it did.
+    """
+    still = int(np.count_nonzero(shape.arrived_s < still_until_s))
+    for lines, when in ((still, "while it lay still"), (len(shape.arrived_s) - still, "while it was turned")):
+        if lines < FEWEST:
+            raise NoShape(f"only {lines} of its lines came {when}")
     count = shape.values.shape[1]
     found = Guess(["-"] * count)
     named = _named(shape.names)
@@ -176,8 +184,6 @@ def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
 
 def _kind(values: Array, still: Flags) -> str | None:
     rest, turned = values[still], values[~still]
-    if len(rest) < 10 or len(turned) < 10:
-        return None
     sizes = np.linalg.norm(values, axis=1)
     level = float(np.median(sizes[still]))
     scatter = float(np.linalg.norm(rest.std(axis=0)))

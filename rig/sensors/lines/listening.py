@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 from rig.sensors.errors import SensorError
+from rig.sensors.lines.decoding import LONGEST_LINE
 from rig.sensors.lines.shape import Line
 from rig.sensors.own_port import opened
 
@@ -11,6 +12,7 @@ USUAL = (115200, 921600, 460800, 230400, 57600, 38400, 19200, 9600, 500000, 1000
 TRIED_S = 1.2  # at each speed
 LIKE_TEXT = 0.97
 STILL_S, TURNED_S = 4.0, 6.0
+ENDLESS = LONGEST_LINE + 100  # bytes of a line that are kept: it is too long in any case
 
 
 def listen(
@@ -31,9 +33,9 @@ def listen(
             if at_s > still_s and not told:
                 told = True
                 tell(f"now turn it in your hand, about every axis, by half a turn and back, for {turned_s:g} s")
-            *whole, rest = (rest + serial.read()).replace(b"\r", b"\n").split(b"\n")
+            *whole, rest = (rest[:ENDLESS] + serial.read()).replace(b"\r", b"\n").split(b"\n")
             arrived_s = time.monotonic() - began_s
-            lines += [Line(arrived_s, each.decode("ascii", "replace")) for each in whole if each]
+            lines += [Line(arrived_s, each[:ENDLESS].decode("ascii", "replace")) for each in whole if each]
     except OSError as error:
         raise SensorError(
             "lines_link_lost", f"the port {port} closed: {error}", "Check its supply and cable"

@@ -9,13 +9,18 @@ from operator import xor
 
 import numpy as np
 
+from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
+from rig.sensors.lines.decoding import LONGEST_LINE
 
+MOST_NUMBERS = 40  # in a line, as a section has room for
+LARGEST = 1e30  # what is beyond was not measured, and its square overflows
 ENOUGH = 0.6  # share of the lines that have to be alike
 FEWEST = 30
 _NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![A-Za-z0-9_])")
 _SUM = re.compile(r"\*([0-9A-Fa-f]{2})$")
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "": "space"}
+_Told = tuple["Line", str, bool]  # a line, its text without a sum at its end, and whether that is the sum
 _AROUND = " \t,;{}[]()|&"
 
 
@@ -46,41 +51,71 @@ class Shape:
     others: int
 
 
-def shape_of(lines: Sequence[Line]) -> Shape | str:
-    """The shape that most lines have; a sentence saying why there is none."""
-    told = [(line, *_without_sum(line.text.strip())) for line in lines if line.text.strip()]
-    if len(told) < FEWEST:
-        return f"only {len(told)} lines came, which is too few to see what they have in common"
-    pieces = Counter(tuple(piece.strip(" ") for piece in _NUMBER.split(text)) for _, text, _ in told)
-    common, count = pieces.most_common(1)[0]
-    if count < ENOUGH * len(told):
-        return f"only {count} of {len(told)} lines look alike: its lines are not one sample each, or of several kinds"
-    if len(common) < 4:
-        return f"a line holds {len(common) - 1} numbers, and three axes of a gyroscope are three"
-    alike = [
-        (line, text, summed) for line, text, summed in told
-        if tuple(piece.strip(" ") for piece in _NUMBER.split(text)) == common
-    ]  # fmt: skip
+class NoShape(Exception):
+    """Why lines have nothing in common, in a sentence."""
+
+
+def shape_of(lines: Sequence[Line]) -> Shape:
+    """The shape that most lines have. Raises NoShape."""
+    told = _short_ones([(line, *_without_sum(line.text.strip())) for line in lines if line.text.strip()])
+    pieces = [tuple(piece.strip(" ") for piece in _NUMBER.split(text)) for _, text, _ in told]
+    common = _common(pieces)
+    alike = [each for each, its in zip(told, pieces, strict=True) if its == common]
     if any(not ok for _, _, ok in alike) and any(_SUM.search(line.text.strip()) for line, _, _ in alike):
-        return "its lines end as if with a sum, which is another one than NMEA's"
-    between = _between(common)
-    if isinstance(between, str):
-        return between
-    separator, prefix, keys = between
+        raise NoShape("its lines end as if with a sum, which is another one than NMEA's")
+    separator, prefix, keys = _between(common)
     numbers = [_NUMBER.findall(text) for _, text, _ in alike]
-    others = [text for _, text, _ in told if tuple(piece.strip(" ") for piece in _NUMBER.split(text)) != common]
+    values = np.array(numbers, dtype=np.float64)
+    measured = (np.abs(values) < LARGEST).all(axis=1)
+    if np.count_nonzero(measured) < ENOUGH * len(told):
+        raise NoShape(f"it prints numbers that nothing measures: {_one_beyond(numbers, values)}")
+    arrived_s = np.array([line.arrived_s for line, _, _ in alike])[measured]
+    if not arrived_s[-1] > arrived_s[0]:
+        raise NoShape("all its lines came at the same moment")
+    others = [text for (_, text, _), its in zip(told, pieces, strict=True) if its != common]
     checksum = _SUM.search(alike[0][0].text.strip()) is not None
+    columns = zip(*(row for row, is_measured in zip(numbers, measured, strict=True) if is_measured), strict=True)
     return Shape(
         separator,
         prefix,
         keys,
         checksum,
         tuple(key.strip(_AROUND + "\"':= ") for key in keys) or _header(others, separator, len(common) - 1),
-        np.array(numbers, dtype=np.float64),
-        np.array([line.arrived_s for line, _, _ in alike]),
-        tuple(_decimals(column) for column in zip(*numbers, strict=True)),
-        len(others),
+        values[measured],
+        arrived_s,
+        tuple(map(_decimals, columns)),
+        len(others) + int(np.count_nonzero(~measured)),
     )
+
+
+def _short_ones(told: list[_Told]) -> list[_Told]:
+    """The lines that are not too long to be one sample each. Raises NoShape where they are too few."""
+    if len(told) < FEWEST:
+        raise NoShape(f"only {len(told)} lines came, which is too few to see what they have in common")
+    short = [each for each in told if len(each[1]) <= LONGEST_LINE]
+    if len(short) < ENOUGH * len(told):
+        raise NoShape(f"its lines are longer than {LONGEST_LINE} characters")
+    return short
+
+
+def _common(pieces: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """What stands around the numbers of most lines. Raises NoShape."""
+    common, count = Counter(pieces).most_common(1)[0]
+    numbers = len(common) - 1
+    if count < ENOUGH * len(pieces):
+        raise NoShape(
+            f"only {count} of {len(pieces)} lines look alike: its lines are not one sample each, or of several kinds"
+        )
+    if numbers < 3:
+        raise NoShape(f"a line holds {numbers} numbers, and three axes of a gyroscope are three")
+    if numbers > MOST_NUMBERS:
+        raise NoShape(f"a line holds {numbers} numbers, and a section has room for {MOST_NUMBERS}")
+    return common
+
+
+def _one_beyond(numbers: Sequence[Sequence[str]], values: Array) -> str:
+    row, column = np.argwhere(~(np.abs(values) < LARGEST))[0]
+    return shorten(numbers[row][column])
 
 
 def _without_sum(text: str) -> tuple[str, bool]:
@@ -93,8 +128,8 @@ def _without_sum(text: str) -> tuple[str, bool]:
     return body, right
 
 
-def _between(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]] | str:
-    """Separator, prefix and keys of what stands before, between and after the numbers; or why it can be none."""
+def _between(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]]:
+    """Separator, prefix and keys of what stands before, between and after the numbers. Raises NoShape."""
     before, *inside, after = common
     if len({*inside}) == 1 and inside[0] in _SEPARATORS and not after.strip(_AROUND):
         if not after.strip() and before.strip(_AROUND):
@@ -104,7 +139,7 @@ def _between(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]] | str:
     keys = tuple(piece.strip(_AROUND) for piece in (before, *inside))
     if all(keys) and len(set(keys)) == len(keys) and not after.strip(_AROUND):
         return "comma", "", keys
-    return f"between its numbers stands {' … '.join(repr(piece) for piece in (before, *inside[:3], after))}"
+    raise NoShape(f"between its numbers stands {' … '.join(quote(piece) for piece in (before, *inside[:3], after))}")
 
 
 def _header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
