@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 import numpy as np
 
@@ -29,9 +29,9 @@ def _main() -> NoReturn:
     _end_with_parent()
     written_bytes = _limit(limits)
     try:
-        for part in _read(request):
-            sys.stdout.buffer.write(_encoded(part))
-        sys.stdout.flush()
+        with _output() as out:
+            for part in _read(request):
+                out.write(_encoded(part))
     except Refused as refused:
         _end(Status.REFUSED, json.dumps(refused.problem))
     except MemoryError:
@@ -42,8 +42,16 @@ def _main() -> NoReturn:
             _end(Status.TOO_LONG)
         if code in (errno.EFBIG, errno.ENOSPC, errno.EDQUOT):
             _end(Status.NO_ROOM, str(error))
-        _end(Status.UNREADABLE, " ".join(str(error).split()) or type(error).__name__)
+        _end(Status.UNREADABLE, " ".join(str(error).split()).rstrip(".") or type(error).__name__)
     _end(Status.READ)
+
+
+def _output() -> BinaryIO:
+    """Return what stdout was, which from now on is nowhere: libraries print what they think of a file."""
+    out = os.fdopen(os.dup(1), "wb")
+    with Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    return out
 
 
 def _read(request: Mapping[str, Any]) -> Iterator[Part]:

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from itertools import islice
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from rig.config.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
 from rig.data.silence import Silence
 from rig.errors import Refused
+from rig.errors.quoting import printable
 
 Part = dict[str, Any] | NDArray[Any]
 Reader = Callable[..., Iterator[Part]]
@@ -32,14 +33,15 @@ Reader = Callable[..., Iterator[Part]]
 MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
 MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
 SPARE_BYTES = 32_000_000  # … and what a small file may come to
-MEMORY_BYTES, MEMORY_TIMES_STORED = 384 << 20, 2  # address space: half of the first are the libraries
+MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2  # address space: half of the first are the libraries
 PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB
 IDLE_TIMES_PROCESSOR = 1.5  # how long it may take in all where nothing else keeps the processor busy
-TICK_S = 0.1
+TICK_S, GONE_S = 0.1, 1.0
 SPARED = 6  # at most so many times that, when the reading process gets no processor
 # A file that somebody made loads no plugin of HDF5; and threads for linear algebra reserve memory by gigabytes.
 ENVIRONMENT = {f"{each}_NUM_THREADS": "1" for each in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
 COMPLAINT_BYTES = 65_536
+LONGEST_REASON = 300  # characters
 OUT_OF_TIME = getattr(signal, "SIGXCPU", None)  # which the system sends to a process that has used up its time
 
 
@@ -74,10 +76,6 @@ class UnreadableFile(Exception):
 
 class CostlyFile(UnreadableFile):
     """A file that takes more to be read than one of its size may."""
-
-
-class NoRoomToRead(Exception):
-    """Why what a file holds could not be put down: the temporary folder is full."""
 
 
 def limits_for(stored_bytes: int) -> ReadingLimits:
@@ -138,7 +136,7 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
     """Return the parts that a `reader` ("module:function") yields of a file, called with its path and `arguments`.
 
     The arguments are such as JSON has. Raise `UnreadableFile` for what cannot be read, `CostlyFile` for what goes
-    beyond the limits, `NoRoomToRead`, and Refused where the reader does.
+    beyond the limits; Refused `temporary_folder_full`, and as the reader does.
     """
     request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
     # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
@@ -150,16 +148,18 @@ def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: Re
             told.write(json.dumps(request).encode())
             told.seek(0)
         except OSError as error:
-            raise NoRoomToRead(str(error)) from error
+            raise _no_room(path, str(error)) from error
         environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
-        with subprocess.Popen(command, stdin=told, stdout=out, stderr=subprocess.PIPE, env=environment) as reading:
-            try:
-                complaint = _awaited(reading, limits.idle_s)
-            except TimeoutError:
-                raise CostlyFile(f"no end of it was found in {limits.idle_s:.0f} s") from None
-            finally:
-                reading.kill()
+        reading = subprocess.Popen(command, stdin=told, stdout=out, stderr=subprocess.PIPE, env=environment)
+        try:
+            complaint = _awaited(reading, limits.idle_s)
+        except TimeoutError:
+            raise CostlyFile(f"no end of it was found in {limits.idle_s:.0f} s") from None
+        finally:
+            _end(reading)
+        if reading.returncode == Status.NO_ROOM:
+            raise _no_room(path, complaint.decode(errors="replace").strip())
         _raise_failure(reading.returncode, complaint, limits)
         out.seek(0)
         return list(_parts(out))
@@ -180,23 +180,38 @@ def _awaited(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
     raise TimeoutError
 
 
+def _end(reading: "subprocess.Popen[bytes]") -> None:
+    """End the process, and wait until it is gone: for one that a dead disk holds no longer than a signal may take."""
+    reading.kill()
+    with suppress(subprocess.TimeoutExpired):
+        reading.wait(GONE_S)
+    if reading.stderr is not None:
+        reading.stderr.close()
+
+
 def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None:
     """Raise as `read_apart` if the status says that the file was not read."""
     if status == Status.READ:
         return
     lines = complaint[-COMPLAINT_BYTES:].decode(errors="replace").strip().splitlines()
-    why = lines[-1] if lines else "reading it ended the process that read it"
+    why = printable(lines[-1]) if lines else "reading it ended the process that read it"
     if status == Status.REFUSED:
-        raise Refused(*json.loads(why))
-    if status == Status.NO_ROOM:
-        raise NoRoomToRead(why)
+        raise Refused(*json.loads(lines[-1]))
     if status == Status.NO_MEMORY:
         raise CostlyFile(f"it takes more than {limits.memory_bytes >> 20} MiB of memory to be read")
     if status == Status.TOO_LONG:
         raise CostlyFile(f"what is packed in it is longer than {limits.written_bytes // 1_000_000} MB")
     if -status == OUT_OF_TIME:
         raise CostlyFile(f"it takes more than {limits.processor_s:.0f} s of a processor to be read")
-    raise UnreadableFile(why)
+    raise UnreadableFile(why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}…")
+
+
+def _no_room(path: Path, why: str) -> Refused:
+    return Refused(
+        "temporary_folder_full",
+        f"{tempfile.gettempdir()} has no room for what {path} holds ({why})",
+        "Make room there, or name another folder in the environment variable TMPDIR",
+    )
 
 
 def _parts(out: Any) -> Iterator[Part]:

@@ -7,7 +7,6 @@ anything that points to it. What lies where is said in `rig.data.layout`.
 
 import json
 import os
-import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -28,7 +27,7 @@ from rig.data.layout import Contents, append, check_rows, empty, lay_out, table_
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
 from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
-from rig.data.reading_process import NoRoomToRead, UnreadableFile, read_apart, size_without_holes
+from rig.data.reading_process import UnreadableFile, read_apart, size_without_holes
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner, check_joints
 from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
@@ -263,8 +262,6 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
     try:
         header, *arrays = read_apart("rig.data.extract:contents", path, {}, limits_of_run(stored, timeout_s))
-    except NoRoomToRead as error:
-        raise _no_room(path, str(error)) from error
     except UnreadableFile as error:
         raise _not_a_run_file(path, str(error)) from error
     told, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
@@ -300,14 +297,6 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
         "not_a_run_file",
         f"{path} cannot be read as a run ({why})",
         "Give the path of a run.h5 that the rig has written and that was not damaged since",
-    )
-
-
-def _no_room(path: Path, why: str) -> Refused:
-    return Refused(
-        "temporary_folder_full",
-        f"{tempfile.gettempdir()} has no room for what {path} holds ({why})",
-        "Make room there, or name another folder in the environment variable TMPDIR",
     )
 
 

@@ -1,8 +1,10 @@
 """Shows what somebody else wrote: serial numbers, names, paths, values. Nothing in it that a terminal would obey."""
 
+from collections.abc import Iterable
 from typing import Any
 
 SHOWN_CHARACTERS = 60
+SHOWN_NAMES = 12
 
 
 def printable(text: str) -> str:
@@ -26,3 +28,10 @@ def shorten(text: str) -> str:
 def quote(value: Any) -> str:
     """A value as Python writes it, shortened."""
     return shorten(repr(value))
+
+
+def listing(names: Iterable[str]) -> str:
+    """The first of many names, which are shortened already, and how many more there are."""
+    every = list(names)
+    more = len(every) - SHOWN_NAMES
+    return (", ".join(every[:SHOWN_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"

@@ -1,8 +1,8 @@
 """Readings and attitudes from a ROS 2 bag, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
 
 A reading has the time of its message's header, so readings and poses stand on the clock of whoever stamped them. A pose
-(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room: it holds from half-way to the one before
-until half-way to the next.
+(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. What reads a bag runs in a process of its
+own (`rig.observation.sample_files`) and keeps no more of the bag than a piece.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,14 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rig.data.motion_file import TIME
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.errors import Refused, RigError
+from rig.data.reading_process import Part
+from rig.errors import Refused
 from rig.errors.extras import missing_extra
-from rig.errors.quoting import quote
-from rig.estimation.arrays import Array
+from rig.errors.quoting import listing, quote, shorten
+from rig.observation.table_parts import in_blocks
 
 IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
 POSES = (
@@ -25,83 +24,77 @@ POSES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/TransformStamped",
 )
+QUATERNION = ("qw", "qx", "qy", "qz")
 NOT_MEASURED = -1.0  # first element of a covariance of what the message does not hold
 SUFFIXES = (".mcap", ".db3")
+METADATA = "metadata.yaml"
+METADATA_BYTES = 4_000_000  # of two thousand topics, with all that is said of how each was sent
+DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes of a message, with all comments
 NANO = 10**9
-_QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def is_bag(path: Path) -> bool:
     """Whether a path is a bag, a folder with its metadata or one of its files."""
-    return (path / "metadata.yaml").is_file() if path.is_dir() else path.suffix in SUFFIXES
+    return (path / METADATA).exists() if path.is_dir() else path.suffix in SUFFIXES
 
 
-def bag_readings(path: Path, topic: str | None) -> dict[str, Array]:
-    """The columns (n,) of readings in a bag, as those of a CSV file: of the topic, or of the only one with an Imu.
+def bag_of(path: Path) -> Path:
+    """Return the folder of a bag, of which `path` may be one of the files; a file without metadata beside it is one."""
+    return path if path.is_dir() or not (path.parent / METADATA).exists() else path.parent
 
-    Times are from the beginning of the bag on. Raises Refused `no_file`, `missing_extra`, `bag_topic`.
+
+def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
+    """Yield, `in_blocks`, the readings of the topic `inside` a bag, or of the only one with an Imu.
+
+    The columns are those of a CSV file, times are from the beginning of the bag on, and rows in the order of the bag.
+    Raise Refused `missing_extra`, `bag_topic`, and of a damaged bag whatever its parser ends in.
     """
     with _opened(path) as reader:
-        chosen = _chosen(reader, (IMU,) if topic is None else (IMU, MAGNETIC), topic, "readings")
+        chosen = _chosen(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
         if chosen[0].msgtype == MAGNETIC:
-            fields = [(_stamp_ns(each), *_xyz(each.magnetic_field)) for each in _messages(reader, chosen)]
-            return _table(fields, [TIME, *FIELD.columns], path, _began_ns(reader))
-        rows, force_told = [], True
-        for message in _messages(reader, chosen):
-            force_told = force_told and float(message.linear_acceleration_covariance[0]) != NOT_MEASURED
-            read = (*_xyz(message.angular_velocity), *_xyz(message.linear_acceleration))
-            rows.append((_stamp_ns(message), *read))
-        table = _table(rows, [TIME, *RATE.columns, *ACCELERATION.columns], path, _began_ns(reader))
-    return table if force_told else {name: table[name] for name in (TIME, *RATE.columns)}
+            fields = ((time_s, *_xyz(message.magnetic_field)) for time_s, message in _stamped(reader, chosen))
+            yield from in_blocks(fields, [TIME, *FIELD.columns])
+            return
+        columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
+
+        def rows() -> Iterator[tuple[float, ...]]:
+            for time_s, message in _stamped(reader, chosen):
+                if float(message.linear_acceleration_covariance[0]) == NOT_MEASURED:
+                    columns[-3:] = [None] * 3
+                yield time_s, *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration)
+
+        yield from in_blocks(rows(), columns)
 
 
-def bag_attitudes(path: Path, topic: str | None) -> dict[str, Array]:
-    """The columns (N,) of attitudes in a bag, as those of a CSV file. Raises Refused as `bag_readings`."""
+def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
+    """Yield, `in_blocks`, the poses in a bag: a time and a quaternion each. Raise as `bag_readings`."""
     with _opened(path) as reader:
-        rows = []
-        for message in _messages(reader, _chosen(reader, POSES, topic, "attitudes")):
-            turned = _orientation(message)
-            rows.append((_stamp_ns(message), turned.w, turned.x, turned.y, turned.z))
-        table = _table(rows, [TIME, *_QUATERNION], path, _began_ns(reader))
-    time_s = table.pop(TIME)
-    if len(time_s) < 2:
-        raise Refused("bag_topic", f"{path} holds {len(time_s)} poses", "Record the poses while the sensor is turned")
-    between = (time_s[1:] + time_s[:-1]) / 2
-    first, last = time_s[0] - (between[0] - time_s[0]), time_s[-1] + (time_s[-1] - between[-1])
-    return {"start_s": np.append(first, between), "end_s": np.append(between, last), **table}
+        poses = _stamped(reader, _chosen(reader, POSES, inside, "attitudes"))
+        turned = ((time_s, _orientation(message)) for time_s, message in poses)
+        yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in turned), [TIME, *QUATERNION])
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """The bag's reader. Raises Refused `no_file`, `missing_extra`."""
+    """Open the bag's reader. Raise Refused `missing_extra`."""
     try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
+        from rosbags.rosbag2 import Reader
     except ImportError as error:
         raise missing_extra(error, "ros2") from error
-    folder = path if path.is_dir() else path.parent
-    try:
-        with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
-            yield reader
-    except RigError:
-        raise
-    except Exception as error:  # of a damaged bag it raises whatever its parser ends in
-        why = " ".join(str(error).split()) or type(error).__name__
-        raise Refused(
-            "no_file",
-            f"{path} is no bag that can be read: {why}",
-            "Name the folder of the bag, with its metadata.yaml; `ros2 bag reindex FOLDER` writes one",
-        ) from error
+    if path.is_dir() and (size := (path / METADATA).stat().st_size) > METADATA_BYTES:
+        raise ValueError(f"its {METADATA} is {size} bytes long, {METADATA_BYTES} at most")
+    with Reader(path) as reader:
+        yield reader
 
 
 def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
-    """The connection of a topic; without a name, of the only one there is."""
+    """Return the connections of a topic; without a name, of the only one there is."""
     there = [each for each in reader.connections if each.msgtype in types]
     if topic is not None:
         there = [each for each in there if each.topic == topic]
-    names = sorted({each.topic for each in there})
+    names = {each.topic for each in there}
     if len(names) != 1:
-        known = ", ".join(sorted(f"{each.topic} ({each.msgtype})" for each in reader.connections)) or "none"
+        known = listing(f"{shorten(topic)} ({shorten(of)})" for topic, of in _offered(reader, types))
         asked = "" if topic is None else f" called {quote(topic)}"
         raise Refused(
             "bag_topic",
@@ -111,9 +104,54 @@ def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> 
     return there
 
 
-def _messages(reader: Any, connections: Any) -> Iterator[Any]:
+def _offered(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the topics and their types, first those that could have been meant."""
+    there = {(each.topic, each.msgtype) for each in reader.connections}
+    return sorted(there, key=lambda each: (each[1] not in types, each))
+
+
+def _stamped(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
+    """Yield the messages with the seconds from the beginning of the bag to the stamps in their headers.
+
+    One beginning for every topic: seconds since 1970 leave a float no microseconds to spare.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    _check_layout(store, connections)
+    began_ns, count = int(reader.start_time), 0
     for connection, _, data in reader.messages(connections=connections):
-        yield reader.deserialize(data, connection.msgtype)
+        message = store.deserialize_cdr(data, connection.msgtype)
+        stamp = message.header.stamp
+        yield (int(stamp.sec) * NANO + int(stamp.nanosec) - began_ns) / NANO, message
+        count += 1
+    if not count:
+        raise Refused(
+            "bag_topic", f"{quote(connections[0].topic)} has no message in the bag", "Name another topic: BAG::/topic"
+        )
+
+
+def _check_layout(store: Any, connections: Any) -> None:
+    """Raise ValueError if messages are laid out otherwise than ROS 2 does, by the definition that comes with them.
+
+    The definition is compared and nothing more: rosbags would write a program by it and run that.
+    """
+    from rosbags.interfaces import MessageDefinitionFormat
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    for kind, definition in {(each.msgtype, each.msgdef) for each in connections}:
+        if len(definition.data) > DEFINITION_CHARACTERS:
+            raise ValueError(f"its definition of {kind} is {len(definition.data)} characters long")
+        if definition.format == MessageDefinitionFormat.MSG:
+            found = get_types_from_msg(definition.data, kind)
+        elif definition.format == MessageDefinitionFormat.IDL:
+            found = {}
+            for text in definition.data.split("=" * 80 + "\n"):
+                found |= get_types_from_idl(text.partition("\n")[2] if text.startswith("IDL: ") else text)
+        else:
+            continue
+        if other := sorted(name for name in found if name in store.fielddefs and found[name] != store.fielddefs[name]):
+            raise ValueError(f"its {listing(map(shorten, other))} is none of ROS 2")
 
 
 def _orientation(message: Any) -> Any:
@@ -125,21 +163,3 @@ def _orientation(message: Any) -> Any:
 
 def _xyz(vector: Any) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z
-
-
-def _stamp_ns(message: Any) -> int:
-    return int(message.header.stamp.sec) * NANO + int(message.header.stamp.nanosec)
-
-
-def _began_ns(reader: Any) -> int:
-    """One moment for every topic: seconds since 1970 leave a float no microseconds to spare."""
-    return int(reader.start_time)
-
-
-def _table(rows: list[tuple[Any, ...]], columns: Sequence[str], path: Path, began_ns: int) -> dict[str, Array]:
-    if not rows:
-        raise Refused("bag_topic", f"{path} holds no message of the topic", "Name another topic")
-    order = sorted(rows, key=lambda row: row[0])
-    since_ns = np.array([row[0] - began_ns for row in order], dtype=np.int64)
-    values = np.array([row[1:] for row in order], dtype=np.float64)
-    return {columns[0]: since_ns / NANO, **dict(zip(columns[1:], values.T, strict=True))}

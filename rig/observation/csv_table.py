@@ -1,21 +1,24 @@
 """Columns of numbers from a CSV file that somebody else wrote: within bounds, or refused by name."""
 
-from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.motion_file import LARGEST_NUMBER, Header
+from rig.data.reading_process import Part
 from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
 from rig.observation.csv_cells import TIMES, contradicted, is_number, origin_of, since, unit_of
-from rig.observation.csv_text import read_rows
+from rig.observation.csv_text import is_harmless, read_rows
+from rig.observation.table_parts import columns_of, in_blocks, parts_read_apart
 
 BLANK = float("nan")
+LINE = "line"  # a column beside those of the file
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ def read_columns(
 ) -> dict[str, Array]:
     """Return the columns of a file as `read_table`, none of whose cells is blank; times count from `origin_s`.
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Raises Refused as that.
     """
     table = read_table(path, header, largest_mb, mapped, origin_s)
     for name, column in table.columns.items():
@@ -69,9 +72,39 @@ def read_table(
     The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, or
     by tabs, all rows do; empty rows are none, nor are rows of units below the heading. Of a `mapped` file the columns
     that are named so or as here, whatever others it has. A file that gzip has packed is read as what it holds.
-    Times count from `origin_s`; None chooses it by the first of them.
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Times count from `origin_s`; None chooses it by the first of them. What is packed, or long, is read by a process of
+    its own; the rest is too short to do harm.
+    Raises Refused `no_file`, `file_too_costly`, `temporary_folder_full`, `wrong_columns`, `wrong_unit`,
+    `not_a_number`.
     """
+    if is_harmless(path, largest_mb):
+        parts = [*_parts(path, header, largest_mb, mapped, origin_s)]
+    else:
+        arguments = {
+            "names": [header.needed, header.one_of, header.optional],
+            "largest_mb": largest_mb,
+            "mapped": None if mapped is None else [dict(mapped.columns), mapped.skip_lines],
+            "origin_s": origin_s,
+        }
+        reader = "rig.observation.csv_table:csv_parts"
+        parts = parts_read_apart(reader, path, arguments, else_="cannot be read", remedy="Give a CSV file")
+    *rows, last = parts
+    columns = columns_of(rows)
+    lines = columns.pop(LINE).astype(np.int64)
+    return Table(columns, lines, cast("dict[str, int]", last)["origin_s"])
+
+
+def csv_parts(
+    path: Path, names: Sequence[Any], largest_mb: int, mapped: tuple[dict[str, Any], int] | None, origin_s: int | None
+) -> Iterator[Part]:
+    """Yield what `read_table` reads: by the three first fields of a header, and those of `Mapped`.
+
+    The rows come `in_blocks`, the number of its line before each; then `origin_s`.
+    """
+    return _parts(path, Header(*names), largest_mb, None if mapped is None else Mapped(*mapped), origin_s)
+
+
+def _parts(path: Path, header: Header, largest_mb: int, mapped: Mapped | None, origin_s: int | None) -> Iterator[Part]:
     skipped = 0 if mapped is None else mapped.skip_lines
     rows = read_rows(path, largest_mb, skipped)
     headings = [name.strip() for name in next(rows, [])]
@@ -80,22 +113,24 @@ def read_table(
     _check_columns(path, [*named.values()], header.needed, header.one_of, header.optional)
     factors = {} if mapped is None else {name: factor for name, (_, factor) in mapped.columns.items()}
     wanted = _Wanted(path, len(headings), named, tuple(factors.get(name, 1.0) for name in named.values()))
-    values, lines = array("d"), array("q")
-    numbers: Sequence[float]
-    for line, row in enumerate(rows, start=skipped + 2):
-        numbers = () if origin_s != 0 else wanted.plain_numbers(row)
-        if not numbers:
-            if not any(map(str.strip, row)) or (not lines and wanted.names_units(line, row)):
-                continue
-            cells = wanted.cells(line, row)
-            if origin_s is None:
-                origin_s = wanted.origin_s(cells)
-            numbers = wanted.numbers(line, cells, origin_s)
-        values.extend(numbers)
-        lines.append(line)
-    table = np.array(values, dtype=np.float64).reshape(-1, len(named))
-    columns = {name: table[:, i] for i, name in enumerate(named.values())}
-    return Table(columns, np.array(lines, dtype=np.int64), origin_s or 0)
+
+    def numbered() -> Iterator[Sequence[float]]:
+        nonlocal origin_s
+        begun = False
+        for line, row in enumerate(rows, start=skipped + 2):
+            numbers = () if origin_s != 0 else wanted.plain_numbers(row)
+            if not numbers:
+                if not any(map(str.strip, row)) or (not begun and wanted.names_units(line, row)):
+                    continue
+                cells = wanted.cells(line, row)
+                if origin_s is None:
+                    origin_s = wanted.origin_s(cells)
+                numbers = wanted.numbers(line, cells, origin_s)
+            begun = True
+            yield line, *numbers
+
+    yield from in_blocks(numbered(), [LINE, *named.values()])
+    yield {"origin_s": origin_s or 0}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,10 @@
 
 import codecs
 import csv
+import os
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from gzip import GzipFile
 from io import TextIOWrapper
 from itertools import chain, islice
@@ -13,6 +15,7 @@ from typing import BinaryIO
 from rig.config.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
 
+HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which come to four times that in memory
 LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MARKS = ";\t"
@@ -20,16 +23,31 @@ MARKS = ";\t"
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
     """Yield the rows of a regular file that is not too large, after so many lines of it. Raises Refused `no_file`."""
+    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
+        lines = _lines(text, largest_mb * 1_000_000)
+        first = next(islice(lines, skipped, None), "")
+        second = next(lines, "")
+        delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
+        rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
+        yield from islice(rows, 1)
+        for row in rows:
+            yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
+
+
+def is_harmless(path: Path, largest_mb: int) -> bool:
+    """Return whether a file is short, and not packed: then it cannot come to much.
+
+    Raises Refused `no_file`, also for one that is too large.
+    """
+    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file:
+        return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _beginning(file).startswith(GZIP)
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """Raise Refused `no_file` for a file that cannot be read, whatever its reader ends in."""
     try:
-        with open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
-            lines = _lines(text, largest_mb * 1_000_000)
-            first = next(islice(lines, skipped, None), "")
-            second = next(lines, "")
-            delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
-            rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
-            yield from islice(rows, 1)
-            for row in rows:
-                yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
+        yield
     except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
         raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
 

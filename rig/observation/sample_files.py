@@ -9,30 +9,49 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.data.motion_file import Columns
+import numpy as np
+
+from rig.data.motion_file import TIME, Columns
 from rig.data.result_file import FileEntry
 from rig.errors import Refused
 from rig.errors.quoting import printable
-from rig.observation.bag_samples import bag_attitudes, bag_readings, is_bag
-from rig.observation.ulog_samples import is_ulog, ulog_readings
+from rig.estimation.arrays import Array
+from rig.observation.bag_samples import bag_of, is_bag
+from rig.observation.table_parts import read_columns_apart
+from rig.observation.ulog_samples import is_ulog
 
 INSIDE = "::"
-Reads = Callable[[Path, str | None], Columns]
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """Whether a path `is_one`, and what reads its readings and its attitudes, None where it can hold none.
+    """A kind of file that is `called` so, and what reads it in a process of its own.
 
-    They get the path and what inside is meant, and give columns (n,) as a CSV file has them.
+    `readings` and `attitudes` are readers ("module:function", as `rig.data.reading_process` has them), None where it
+    can hold none. They get the path that `reads` makes of the given one, and what inside is meant, and yield columns
+    `in_blocks` (`rig.observation.table_parts`), named as those of a CSV file; of attitudes times and quaternions.
+    `remedy` is for what cannot be read.
     """
 
+    called: str
     is_one: Callable[[Path], bool]
-    readings: Reads
-    attitudes: Reads | None = None
+    remedy: str
+    readings: str
+    attitudes: str | None = None
+    reads: Callable[[Path], Path] = Path
 
 
-FORMATS = (Format(is_bag, bag_readings, bag_attitudes), Format(is_ulog, ulog_readings))
+FORMATS = (
+    Format(
+        "bag",
+        is_bag,
+        "Name the folder of the bag, with its metadata.yaml; `ros2 bag reindex FOLDER` writes one",
+        "rig.observation.bag_samples:bag_readings",
+        "rig.observation.bag_samples:bag_attitudes",
+        bag_of,
+    ),
+    Format("log", is_ulog, "Copy it anew from the card", "rig.observation.ulog_samples:ulog_readings"),
+)
 
 
 def whole(path: Path) -> Path:
@@ -41,32 +60,42 @@ def whole(path: Path) -> Path:
 
 
 def readings_in(path: Path) -> Columns | None:
-    """The readings of a file that is no CSV; None of one that may be. Raises Refused as its format does."""
+    """The readings of a file that is no CSV, in the order of time; None of one that may be.
+
+    Raises Refused as its reader does, `no_file`, `file_too_costly`, `temporary_folder_full`.
+    """
     found = _format(path)
-    return None if found is None else found.readings(whole(path), _inside(path))
+    return None if found is None else _read(found, found.readings, path)
 
 
 def attitudes_in(path: Path) -> Columns | None:
     """The attitudes in a file that is no CSV; None of one that may be.
 
-    Raises Refused as its format does, and `no_attitudes` where there can be none in it.
+    An attitude holds from half-way to the one before until half-way to the next. Raises Refused as `readings_in`, and
+    `no_attitudes` where there are none in it.
     """
     found = _format(path)
     if found is None:
         return None
-    if found.attitudes is None:
+    columns = {} if found.attitudes is None else _read(found, found.attitudes, path)
+    if not columns:
         raise Refused(
             "no_attitudes",
             f"{path} tells what sensors read, and nothing of the attitudes they were in",
             "Give the attitudes as CSV, or as poses in a ROS 2 bag",
         )
-    return found.attitudes(whole(path), _inside(path))
+    time_s = columns.pop(TIME)
+    if len(time_s) < 2:
+        raise Refused("no_attitudes", f"{path} holds one pose", "Record the poses while the sensor is turned")
+    between = (time_s[1:] + time_s[:-1]) / 2
+    first, last = time_s[0] - (between[0] - time_s[0]), time_s[-1] + (time_s[-1] - between[-1])
+    return {"start_s": np.append(first, between), "end_s": np.append(between, last), **columns}
 
 
 def entry_of(path: Path) -> FileEntry:
-    """A file by its name and its sum; of a folder, the sum of all its files in the order of their names."""
+    """A file by its name and its sum; of a folder, the sum of the files in it in the order of their names."""
     there = whole(path)
-    files = sorted(each for each in there.rglob("*") if each.is_file()) if there.is_dir() else [there]
+    files = sorted(each for each in there.iterdir() if each.is_file()) if there.is_dir() else [there]
     found = hashlib.sha256()
     for each in files:
         with each.open("rb") as file:
@@ -74,6 +103,19 @@ def entry_of(path: Path) -> FileEntry:
                 found.update(piece)
     name = path.name if INSIDE not in str(path) else there.name
     return FileEntry(name=printable(name), sha256=found.hexdigest())  # a name may be no UTF-8, which no document takes
+
+
+def _read(form: Format, reader: str, path: Path) -> dict[str, Array]:
+    """Return the columns, in the order of time. Raise Refused as `readings_in`."""
+    source = form.reads(whole(path))
+    columns = read_columns_apart(
+        reader, source, {"inside": _inside(path)}, else_=f"is no {form.called} that can be read", remedy=form.remedy
+    )
+    time_s = columns[TIME]
+    if (np.diff(time_s) < 0).any():
+        order = np.argsort(time_s, kind="stable")
+        columns = {name: column[order] for name, column in columns.items()}
+    return columns
 
 
 def _format(path: Path) -> Format | None:

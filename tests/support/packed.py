@@ -1,0 +1,25 @@
+"""Bytes as zstd packs them, which Python has from 3.14 on."""
+
+import sys
+from functools import cache
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import ZstdCompressor, compress
+else:
+    from backports.zstd import ZstdCompressor, compress
+
+MEGABYTE = bytes(1 << 20)
+
+
+def zstd(data: bytes) -> bytes:
+    """The bytes, packed."""
+    return compress(data)
+
+
+@cache
+def packed_zeros(size: int) -> bytes:
+    """So many zeros, packed to a thirty-thousandth, in one piece that says how many."""
+    packing = ZstdCompressor()
+    packing.set_pledged_input_size(size)
+    parts = [packing.compress(MEGABYTE) for _ in range(size >> 20)]
+    return b"".join([*parts, packing.flush()])
