@@ -99,7 +99,7 @@ def heard(engine: Engine) -> tuple[list[Told], int]:
         question = select(*texts, age).order_by(cannot_be, age, *station.primary_key).limit(MOST)
         rows: list[tuple[Any, ...]] = [tuple(row) for row in connection.execute(question)]
         every = connection.scalar(select(func.count()).select_from(station)) or 0
-    told = [Told(*map(_decoded, words), _age_s(age)) for *words, age in rows]
+    told = [Told(_decoded(rig), _decoded(computer), _decoded(said), _age_s(age)) for rig, computer, said, age in rows]
     return sorted(told, key=lambda each: (each.rig, each.computer)), max(every - len(told), 0)
 
 

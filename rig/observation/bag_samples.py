@@ -121,7 +121,7 @@ def _stamped(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
     _check_layout(store, connections)
     began_ns, count = int(reader.start_time), 0
     for connection, _, data in reader.messages(connections=connections):
-        message = store.deserialize_cdr(data, connection.msgtype)
+        message: Any = store.deserialize_cdr(data, connection.msgtype)
         stamp = message.header.stamp
         yield (int(stamp.sec) * NANO + int(stamp.nanosec) - began_ns) / NANO, message
         count += 1

@@ -54,7 +54,7 @@ def test_what_breaks_down_or_prints_harms_nobody(tmp_path: Path, capfd: pytest.C
 @pytest.mark.slow
 @pytest.mark.usefixtures("read_by_system")
 def test_nobody_reads_on_for_a_program_that_was_killed(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", READS_WITHOUT_END, tmp_path]
+    command = [sys.executable, "-c", READS_WITHOUT_END, str(tmp_path)]
     with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}) as program:
         children = Path(f"/proc/{program.pid}/task/{program.pid}/children")
         wait_for((tmp_path / "asleep").exists, "something reads for the program")

@@ -8,6 +8,7 @@ from functools import reduce
 from operator import xor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
@@ -66,7 +67,7 @@ def shape_of(lines: Sequence[Line]) -> Shape:
     separator, prefix, keys = _between(common)
     numbers = [_NUMBER.findall(text) for _, text, _ in alike]
     values = np.array(numbers, dtype=np.float64)
-    measured = (np.abs(values) < LARGEST).all(axis=1)
+    measured: NDArray[np.bool_] = (np.abs(values) < LARGEST).all(axis=1)
     if np.count_nonzero(measured) < ENOUGH * len(told):
         raise NoShape(f"it prints numbers that nothing measures: {_one_beyond(numbers, values)}")
     arrived_s = np.array([line.arrived_s for line, _, _ in alike])[measured]
