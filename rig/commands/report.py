@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_set
 from rig.commands.named_history import add_history, named_history
-from rig.config.written_file import write_new
+from rig.config.written_file import placed_together, write_new
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
@@ -111,18 +111,18 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     folder: Path = options.out or file.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        refuse_links(*(folder / name for name in written))
-        for name, content in written.items():
-            write_new(folder / name, content)
-        if pdf:
-            refuse_links(folder / PDF)
-            say_on_terminal("drawing the PDF")
-            try:
-                attached = {RESULT: file.read_bytes(), **digital}
-                written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options)
-                write_new(folder / PDF, written[PDF])
-            except Refused as error:
-                left_out.append(error)
+        refuse_links(*(folder / name for name in (*written, *([PDF] if pdf else []))))
+        with placed_together():
+            for name, content in written.items():
+                write_new(folder / name, content)
+            if pdf:
+                say_on_terminal("drawing the PDF")
+                try:
+                    attached = {RESULT: file.read_bytes(), **digital}
+                    written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options)
+                    write_new(folder / PDF, written[PDF])
+                except Refused as error:
+                    left_out.append(error)
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:

@@ -4,16 +4,40 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import BinaryIO
 
 PART = ".part"
+_held_back: ContextVar[dict[Path, Path] | None] = ContextVar("held_back", default=None)  # parts by their places
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+
+
+@contextmanager
+def placed_together() -> Iterator[None]:
+    """Hold the files back that this block writes: at its end all take their places, the one written last first.
+
+    If it ends in an error, or a file cannot take its place, those that have none are removed.
+    """
+    parts: dict[Path, Path] = {}
+    token = _held_back.set(parts)
+    try:
+        yield
+        for path in reversed([*parts]):
+            parts[path].replace(path)
+            del parts[path]
+    finally:
+        _held_back.reset(token)
+        for part in parts.values():
+            with suppress(OSError):
+                part.unlink()
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
     """A file to be written in this block, which then takes the place of `path`: whole, or not at all.
+
+    Within `placed_together` it does so at the end of that.
 
     What lies at `path` is replaced, a link itself and not what it leads to. Raises OSError as writing does, and where
     somebody lays something beside it at the same moment.
@@ -23,7 +47,10 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     try:
         with open(part, "xb", opener=_alone) as file:
             yield file
-        part.replace(path)
+        if (held_back := _held_back.get()) is None:
+            part.replace(path)
+        else:
+            held_back[path] = part
     except BaseException as error:
         with suppress(OSError):
             part.unlink()

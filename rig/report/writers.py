@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
+from rig.config.written_file import placed_together
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
@@ -21,7 +22,7 @@ WRITERS: Sequence[str] = (
 
 
 class Writer(Protocol):
-    """Writes files of its own into the run folder; returns what to tell of it.
+    """Writes files of its own into the run folder, by `rig.config.written_file`; returns what to tell of it.
 
     `outcome` has everything the analysis found, curves too; `document` is what `result.json` will say of it.
     """
@@ -30,12 +31,18 @@ class Writer(Protocol):
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
-    """All documents, then `result.json`, which ends the run; yields what to tell of them."""
+    """All documents and `result.json`, which ends the run; yields what to tell of them when they are there.
+
+    No document lies there without the result: on a full disk none of them takes its place, and the run can be resumed.
+    """
     document = document_of(outcome)
     pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, Without))
-    for name in (*pictures, *WRITERS):
-        yield from _writer(name)(outcome, document, folder)
-    write_result(document, folder)
+    told: list[RunEvent] = []
+    with placed_together():
+        for name in (*pictures, *WRITERS):
+            told += _writer(name)(outcome, document, folder)
+        write_result(document, folder)
+    yield from told
     yield DocumentWritten(folder / RESULT)
 
 

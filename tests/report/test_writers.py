@@ -14,6 +14,7 @@ from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
 from rig.report import writers
 from rig.station.events import DocumentWritten, RunEvent
+from support.full_disk import full_disk
 from support.paths import FIXTURES, ROOT
 from support.waiting import PATIENCE_S
 
@@ -34,13 +35,28 @@ def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> 
     raise OSError(28, "No space left on device")
 
 
-def test_the_result_comes_last_so_that_a_run_whose_documents_fail_is_not_ended(
+def test_a_run_whose_documents_fail_is_not_ended_and_no_document_says_that_it_passed(
     outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writers, "WRITERS", (*writers.WRITERS, f"{__name__}:on_a_full_disk"))
     with pytest.raises(OSError, match="No space"):
         list(writers.write_outcome(tmp_path, outcome))
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["calibration.h", "certificate.html"]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("room_bytes", [1000, 4000, 20_000])
+def test_on_a_full_disk_no_document_lies_without_its_result(outcome: Outcome, tmp_path: Path, room_bytes: int) -> None:
+    with full_disk(room_bytes), pytest.raises(OSError, match=f"too large: '{tmp_path}"):
+        list(writers.write_outcome(tmp_path, outcome))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_result_takes_its_place_first(outcome: Outcome, tmp_path: Path) -> None:
+    """Whatever ends the program between two of them; here a folder lies where the last one belongs."""
+    (tmp_path / "calibration.h").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        list(writers.write_outcome(tmp_path, outcome))
+    assert {file.name for file in tmp_path.iterdir()} == {"calibration.h", "certificate.html", "result.json"}
 
 
 TOY = """
