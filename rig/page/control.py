@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from rig.data.ending_signals import signal_name
+
 STOPPED = "stopped from the page"
 STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # its own: SIGINT may be ignored, as in a script's background
 
@@ -22,6 +24,7 @@ class Control:
         self._may_answer = may_answer
         self._changed = threading.Condition()
         self._stop: Callable[[], None] | None = None
+        self._stopping = False
         self._asked = 0
         self._answer: bool | None = None
         self._waiting = False
@@ -31,8 +34,8 @@ class Control:
     def stoppable(self) -> Iterator[None]:
         """A block of the main thread's in which `stop` ends in a KeyboardInterrupt."""
 
-        def stopped(*_: Any) -> None:
-            raise KeyboardInterrupt(STOPPED)
+        def stopped(number: int, _: Any) -> None:
+            raise KeyboardInterrupt(STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
 
         before = signal.signal(STOP_SIGNAL, stopped)
         try:
@@ -49,6 +52,7 @@ class Control:
         with self._changed:
             if self._stop is None:
                 return False
+            self._stopping = True
             self._stop()
             return True
 

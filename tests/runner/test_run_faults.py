@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import socket
@@ -20,6 +21,7 @@ from rig.data.run_file import read_run
 from support.arm_relay import relay
 from support.commands import rig as command
 from support.fault_matrix.setups import SETUPS
+from support.processes import descendant
 from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started
 from support.worlds import World, WorldHandle, fresh_host, hardware, merge
@@ -66,7 +68,11 @@ class RunningRig:
             start_new_session=True,
         )
 
-    def send(self, number: signal.Signals) -> None:
+    def driver(self) -> int:
+        """The process that drives the arm, which is in a session of its own."""
+        return descendant(self.process.pid, "spawn_main")
+
+    def send(self, number: int) -> None:
         """A signal to the command and all its processes in the foreground, as a terminal sends it."""
         os.killpg(self.process.pid, number)
 
@@ -135,17 +141,23 @@ def ignored(number: signal.Signals) -> Iterator[None]:
 
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGQUIT, marks=THOROUGH), signal.SIGTSTP],
-    ids=["Ctrl-C", "SIGTERM", "Ctrl-backslash", "Ctrl-Z"],
+    [
+        *(signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGQUIT, marks=THOROUGH), signal.SIGTSTP, signal.SIGUSR1),
+        *(pytest.param(each, marks=THOROUGH) for each in (signal.SIGHUP, signal.SIGUSR2, signal.SIGPROF, 40)),
+    ],
 )
-def test_an_interrupt_stops_the_arm_in_its_sweep(start: Start, number: signal.Signals) -> None:
+def test_an_interrupt_stops_the_arm_in_its_sweep(start: Start, number: int) -> None:
+    """Also if the process that drives the arm gets it too."""
     rig = start()
     rig.until_sweeping_slowly()
+    driver = rig.driver()
     rig.send(number)
+    if number != signal.SIGTERM:
+        os.kill(driver, number)
     assert rig.stops_in_its_sweep()
     status, errors = rig.end()
     assert status == 130
-    assert "interrupted; the arm is stopped and at rest; " in errors
+    assert re.search(r"interrupted( by SIG\w+| by signal \d+)?; the arm is stopped and at rest; ", errors), errors
     assert f"rig resume {rig.out}" in errors
     assert not rig.world.state()["program_running"]
     run = read_run(rig.out / "run.h5")
@@ -173,6 +185,29 @@ def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> Non
     rig.send(signal.SIGHUP)
     status, errors = rig.end()
     assert status == 0, errors
+
+
+@pytest.mark.parametrize("first", [signal.SIGINT, pytest.param(signal.SIGUSR1, marks=THOROUGH)])
+def test_no_signal_after_the_first_kills_the_program_before_the_arm_stands(start: Start, first: int) -> None:
+    rig = start()
+    rig.until_sweeping_slowly()
+    rig.send(first)
+    for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGHUP, signal.SIGUSR1):
+        rig.send(number)
+    assert rig.stops_in_its_sweep()
+    status, errors = rig.end()
+    assert status == 130 and "the arm is stopped and at rest; " in errors.splitlines()[-1], errors
+
+
+@pytest.mark.thorough
+def test_the_process_that_drives_the_arm_is_for_nobody_but_its_program_to_end(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP, signal.SIGQUIT, signal.SIGINT, 40):
+        os.kill(rig.driver(), number)
+    rig.until(lambda state: state["qd_rad_s"][5] > 0.5)  # on its way back
+    rig.send(signal.SIGINT)
+    assert rig.end()[0] == 130
 
 
 @pytest.mark.thorough

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
 from rig.config.written_file import opened_to_append
+from rig.data.ending_signals import ENDING_SIGNALS
 from rig.data.silence import Silence
 from rig.errors import Problem
 from rig.motion.state import ArmState
@@ -309,8 +310,13 @@ def _leave(status: int) -> NoReturn:
 
 
 def _outlive_the_parent() -> None:
-    """Signals meant for the whole group must not end the process that has to stop the arm; a closed pipe does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Signals meant for the whole group must not end the process that has to stop the arm; a closed pipe does.
+
+    SIGTERM stops the arm, and SIGALRM is how `_Child.abandon` ends a stop that does not come back.
+    """
+    for number in ENDING_SIGNALS:
+        if number not in (signal.SIGTERM, getattr(signal, "SIGALRM", None)):
+            signal.signal(number, signal.SIG_IGN)
     if hasattr(os, "setsid"):  # POSIX: a session of its own, which no key and no closed terminal reaches
         os.setsid()
 

@@ -277,6 +277,7 @@ CATALOGUE: tuple[Fault, ...] = (
     Fault("clock", "one hour back", _shift_clock(-3600), may_pass=True, known_s=None,
           environment={"CLOCK_SHIFT": "yes"}),
     *(_signal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)),
+    *(_signal(number) for number in (signal.SIGUSR1, signal.SIGALRM)),
 )  # fmt: skip
 
 BY_NAME: Mapping[str, Fault] = {f"{fault.area}: {fault.name}": fault for fault in CATALOGUE}
