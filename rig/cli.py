@@ -8,9 +8,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from rig.commands.endings import end_by_interrupt, ignore_endings
-from rig.commands.standard_streams import keep_streams_usable
+from rig.commands.standard_streams import keep_streams_usable, output_lost
 from rig.data.version import VERSION
-from rig.errors import Fault, RigError
+from rig.errors import Fault, RigError, Unprinted
 from rig.errors.quoting import printable_lines
 from rig.station.plain_text import for_file, say_on_terminal
 
@@ -78,7 +78,8 @@ FAULT, INTERRUPTED = Fault.exit_status, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0 to 4, or 130)."""
+    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0, 1, 2, 3, 4 or 130)."""
+    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0 to 5, or 130)."""
     keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["history"]:
@@ -114,7 +115,9 @@ def guarded(command: Callable[[], int]) -> int:
     end_by_interrupt()
     try:
         status = command()
-        sys.stdout.flush()
+        if (lost := output_lost()) is not None:
+            what = f"all is done, but stdout has not taken what was to be printed ({lost.strerror or lost})"
+            raise Unprinted("output_lost", what, "Make room, or print into another place")
         return status
     except RigError as error:
         return _ended(str(error), error.exit_status)

@@ -12,7 +12,8 @@ from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
 from rig.commands.simulated_operator import SimulatedOperator
-from rig.data.run_folder import CONFIG, LOG, WORLD_LATE
+from rig.commands.standard_streams import tell_where_the_result_is
+from rig.data.run_folder import CONFIG, LOG, RESULT, WORLD_LATE
 from rig.report.document import document_of
 from rig.report.table import print_kept
 from rig.runner.phases import Run
@@ -63,6 +64,7 @@ def carry_out(
                 station.event(entered)
             station.event(RunFolderWritten(folder))
         print_kept(folder, document_of(outcome), since_lines(beside), as_json=as_json)
+        tell_where_the_result_is(folder / RESULT)
         shown.stay()
     return 0 if outcome.passed else 1
 

@@ -113,6 +113,8 @@ def run(options: Namespace) -> int:
     """
     from rig.analysis.analyses import calibrated
     from rig.commands.remember import since_lines
+    from rig.commands.standard_streams import tell_where_the_result_is
+    from rig.data.run_folder import RESULT
     from rig.report.document import document_of
     from rig.report.table import print_kept, print_outcome
 
@@ -127,6 +129,8 @@ def run(options: Namespace) -> int:
         print_outcome(result, as_json=options.json, whole=options.all)
     else:
         print_kept(options.out, result, since_lines(beside), as_json=options.json)
+    if options.out is not None:
+        tell_where_the_result_is(options.out / RESULT)
     return 0 if outcome.passed else 1
 
 

@@ -2,18 +2,21 @@
 
 import os
 import sys
+from pathlib import Path
 from typing import Any, TextIO
+
+from rig.errors.quoting import printable
 
 
 class _Unbroken:
-    """A text stream whose loss is no error where it is refused with one of `lost`, and an error once where it is not.
+    """A text stream whose loss ends nothing: what it refuses is thrown away, and all that follows.
 
-    What it refuses is thrown away, and all that follows.
+    `lost` is why it refused, unless whoever read it has gone away: then it has what it wanted.
     """
 
-    def __init__(self, stream: TextIO, lost: type[OSError]) -> None:
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._lost = lost
+        self.lost: OSError | None = None
 
     def write(self, text: str) -> int:
         try:
@@ -36,15 +39,35 @@ class _Unbroken:
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, self._stream.fileno())
         os.close(nothing)
-        if not isinstance(error, self._lost):
-            raise error
+        if not isinstance(error, BrokenPipeError):
+            self.lost = error
+
+
+def output_lost() -> OSError | None:
+    """Return why stdout has not taken all that was printed since this was last asked; None if it has."""
+    stream = sys.stdout
+    if not isinstance(stream, _Unbroken):
+        return None
+    stream.flush()
+    lost, stream.lost = stream.lost, None
+    return lost
+
+
+def tell_where_the_result_is(result: Path) -> None:
+    """Say on stderr, if stdout has lost what was printed of a result, that it is whole in that file.
+
+    So the loss does not change what a run ends with.
+    """
+    if (lost := output_lost()) is not None:
+        why = f"stdout has not taken what was to be printed ({lost.strerror or lost})"
+        print(f"rig: output_lost: {why}. The result is whole: {printable(str(result))}", file=sys.stderr)
 
 
 def keep_streams_usable() -> None:
     """Make stdin, stdout and stderr usable whatever they are: closed, a pipe without a reader, a closed terminal.
 
-    A lost stderr carries only progress, so its loss is never an error. A full disk under stdout loses results, which
-    stays an `OSError`; a reader that has gone away (`rig plan … | head`) has what it wanted.
+    Neither a lost stdout nor a lost stderr ends what goes on. A lost stderr carries only progress. A full disk under
+    stdout loses results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has what it wanted.
     """
     # A closed descriptor would go to the next file opened, and stray output into that file.
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
@@ -57,4 +80,4 @@ def keep_streams_usable() -> None:
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure is not None:
         reconfigure(errors="replace")  # a terminal that knows no ° shows a question mark
-    sys.stdout, sys.stderr = _Unbroken(sys.stdout, BrokenPipeError), _Unbroken(sys.stderr, OSError)
+    sys.stdout, sys.stderr = _Unbroken(sys.stdout), _Unbroken(sys.stderr)

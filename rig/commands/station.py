@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
 from rig.commands.page_arguments import add_place, wish
+from rig.commands.standard_streams import tell_where_the_result_is
 from rig.errors import Fault
 from rig.station.plain_text import say
 
@@ -107,6 +108,7 @@ def _carried_out(options: Namespace, configured: "Configured", operator: "Asked"
         print(json.dumps(asdict(batch), indent=2))
     else:
         say(f"{summary(batch)}; {folder / CSV}")
+    tell_where_the_result_is(folder / CSV)
     return 0 if batch.passed else 1
 
 

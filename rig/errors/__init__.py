@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from firmware_host.problem import Problem, ProblemError
 
-__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "or_fault", "raised_as", "refuse"]
+__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "Unprinted", "or_fault", "raised_as", "refuse"]
 Result = TypeVar("Result")
 
 
@@ -27,6 +27,12 @@ class Refused(RigError):
 
 class Fault(RigError):
     """Something failed during the run; the arm is stopped and the data kept (exit status 3)."""
+
+
+class Unprinted(RigError):
+    """All was done, and what was to be printed of it is lost (exit status 5)."""
+
+    exit_status = 5
 
 
 def or_fault(solve: Callable[[], Result]) -> Result | Fault:

@@ -4,7 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TABLE = Path(__file__).with_name("catalogue.txt")
-KINDS = ("refused", "fault", "either", "simulated")  # how the source raises an error; catalogue.txt says what they mean
+KINDS = (
+    "refused",
+    "fault",
+    "either",
+    "unprinted",
+    "simulated",
+)  # how the source raises an error; catalogue.txt says what they mean
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from support.paths import ROOT
+from support.paths import DOCS, ROOT
 from support.waiting import PATIENCE_S
 
 CONFIG = ROOT / "configs" / "ci.yaml"
@@ -61,8 +61,19 @@ def test_the_help_of_every_command_is_shown_on_a_terminal_of_plain_ascii() -> No
 @pytest.mark.slow
 def test_results_that_cannot_be_written_are_a_named_error() -> None:
     done = shell(f"{PLAN} > /dev/full")
-    assert done.returncode == 3
-    assert done.stderr.startswith("rig: system: ") and "No space left" in done.stderr and done.stderr.count("\n") == 1
+    assert done.returncode == 5
+    assert done.stderr.startswith("rig: output_lost: ") and "No space left" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("room", ["/dev/full", "/dev/full 2> /dev/full", "/dev/null"])
+def test_a_result_that_is_kept_in_a_folder_keeps_its_verdict(tmp_path: Path, room: str) -> None:
+    examples = DOCS / "examples"
+    kept = f"solve {examples / 'samples.csv'} --sweeps {examples / 'sweeps.csv'} --out {tmp_path / 'run'}"
+    done = shell(f"{sys.executable} -m rig {kept} > {room}")
+    assert done.returncode == 0 and (tmp_path / "run" / "result.json").exists()
+    assert ("output_lost" in done.stderr) == (room == "/dev/full")
 
 
 @pytest.mark.slow

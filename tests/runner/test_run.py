@@ -21,6 +21,7 @@ from support.worlds import merge
 pytestmark = pytest.mark.slow
 
 Start = Callable[..., subprocess.Popen[str]]
+FULL = Path("/dev/full")
 
 
 @pytest.fixture
@@ -85,6 +86,21 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
         assert np.median(np.diff(states)) <= 1 / 125 + 1e-9
         sequence = file["samples/gyro"]["sequence"]
         assert np.array_equal(sequence, np.arange(len(sequence))), "samples are missing"
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no device that is always full")
+def test_a_passed_run_stays_passed_where_stdout_takes_no_more(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    with (
+        FULL.open("w") as full,
+        started(
+            "run", configuration(tmp_path), "--out", out, stdout=full, stderr=subprocess.PIPE, text=True
+        ) as process,
+    ):
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    assert errors.splitlines()[-1].startswith("rig: output_lost: ") and str(out / "result.json") in errors
+    assert json.loads((out / "result.json").read_text(encoding="utf-8"))["verdict"] == "pass"
 
 
 def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any], Any]) -> None:

@@ -15,6 +15,7 @@ THE_FORM_ITSELF = ROOT / "firmware_host" / "problem.py"
 MAKERS = {
     "Refused": "refused",
     "Fault": "fault",
+    "Unprinted": "unprinted",
     "RigError": "either",
     "BoardError": "either",
     "SensorError": "either",
