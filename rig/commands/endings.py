@@ -3,9 +3,9 @@
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from types import FrameType
 
-from rig.data.ending_signals import ENDING_SIGNALS, MEANT_SIGNALS, OTHER_SIGNALS, signal_name
+from rig.data.ending_signals import ENDING_SIGNALS, INTERRUPTS, MEANT_SIGNALS, OTHER_SIGNALS, signal_name
 
 _HANGING_UP = getattr(signal, "SIGHUP", None)
 _PRINTING_BEHIND = getattr(signal, "SIGTTOU", None)
@@ -17,6 +17,7 @@ def end_by_interrupt() -> None:
     Left alone, a closed terminal, Ctrl-\\, Ctrl-Z or any other of them would end or suspend this process while the arm
     goes on moving.
     """
+    INTERRUPTS.allow()
     for number in MEANT_SIGNALS:
         # A script's `&` starts programs that ignore Ctrl-C: an arm must stop by it all the same. That a run is to
         # outlive its terminal is said by ignoring SIGHUP alone (nohup).
@@ -49,5 +50,5 @@ def ending_by_interrupt() -> Iterator[None]:
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 
 
-def _interrupt(number: int, _: Any) -> None:
-    raise KeyboardInterrupt(*([] if number in MEANT_SIGNALS else [f"interrupted by {signal_name(number)}"]))
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    INTERRUPTS.hear(number, frame, "" if number in MEANT_SIGNALS else f"interrupted by {signal_name(number)}")

@@ -1,6 +1,10 @@
-"""The signals by which somebody may end or suspend a program from outside, if it does not handle them."""
+"""The signals by which somebody may end or suspend a program from outside, and the interrupt that they become."""
 
+import _thread
 import signal
+import threading
+import time
+from types import FrameType
 from typing import Final
 
 # Not among them: SIGKILL and SIGSTOP, which nobody can handle; SIGSEGV, SIGABRT and the like, which say that the
@@ -25,6 +29,64 @@ def _of_real_time() -> tuple[int, ...]:
 MEANT_SIGNALS: Final = _numbers(_BY_KEYS_AND_SYSTEM)  # which mean that the program should end or be suspended
 OTHER_SIGNALS: Final = _numbers(_BY_PROGRAMS) + _of_real_time()  # which mean anything, and end it by default
 ENDING_SIGNALS: Final = (*MEANT_SIGNALS, *OTHER_SIGNALS)
+
+
+BURST_S = 1.0  # a stop takes less: what comes within it of the first asks for the same
+LATER_S = 0.001
+_LOCK_METHODS = ("__enter__", "__exit__", "_acquire_restore", "_release_save")  # of `threading`, written in Python
+
+
+class Interrupts:
+    """Raises KeyboardInterrupt in the main thread when signals come, where nothing is left half done by it.
+
+    One that is raised while `threading` takes or leaves a lock would leave it taken, and whoever stops the arm needs
+    the same locks. The way out of a wait takes its lock again: a second one must not come before that.
+    """
+
+    def __init__(self) -> None:
+        self.allow()
+
+    def allow(self) -> None:
+        """Let the next signal raise, however soon it comes after the last."""
+        self._raised_s = float("-inf")
+        self._first_s: float | None = None  # when the signal came that waits for a lock
+
+    def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
+        """Raise, as the handler of a signal; not in a burst of them, and a moment later while a lock is being taken.
+
+        For a lock that another thread does not give back it waits no longer than for a burst.
+        """
+        now_s = time.monotonic()
+        if now_s - self._raised_s < BURST_S:
+            return
+        if _takes_a_lock(frame):
+            self._first_s = now_s if self._first_s is None else self._first_s
+            if now_s - self._first_s < BURST_S:
+                _thread.start_new_thread(_send_later, (_thread.get_ident(), number))
+                return
+        self._raised_s, self._first_s = now_s, None
+        raise KeyboardInterrupt(*filter(None, [text]))
+
+
+def _takes_a_lock(frame: FrameType | None) -> bool:
+    """Return whether what runs in a frame, or has called it, takes or leaves a lock."""
+    while frame is not None:
+        if frame.f_code.co_filename == threading.__file__ and frame.f_code.co_name in _LOCK_METHODS:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _send_later(thread: int, number: int) -> None:
+    """Send a thread a signal in a moment. Started without the module `threading`, whose locks may be taken just now."""
+    time.sleep(LATER_S)
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(thread, number)
+    else:  # Windows
+        signal.raise_signal(number)
+
+
+INTERRUPTS: Final = Interrupts()
 
 
 def signal_name(number: int) -> str:

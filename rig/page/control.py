@@ -9,9 +9,9 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from types import FrameType
 
-from rig.data.ending_signals import signal_name
+from rig.data.ending_signals import INTERRUPTS, signal_name
 
 STOPPED = "stopped from the page"
 STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # its own: SIGINT may be ignored, as in a script's background
@@ -34,9 +34,10 @@ class Control:
     def stoppable(self) -> Iterator[None]:
         """A block of the main thread's in which `stop` ends in a KeyboardInterrupt."""
 
-        def stopped(number: int, _: Any) -> None:
-            raise KeyboardInterrupt(STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
+        def stopped(number: int, frame: FrameType | None) -> None:
+            INTERRUPTS.hear(number, frame, STOPPED if self._stopping else f"interrupted by {signal_name(number)}")
 
+        INTERRUPTS.allow()
         before = signal.signal(STOP_SIGNAL, stopped)
         try:
             with self._changed:

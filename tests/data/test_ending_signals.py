@@ -1,0 +1,60 @@
+"""What a signal becomes: one interrupt, in a place where no lock is left taken by it."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+import pytest
+
+from rig.data.ending_signals import Interrupts
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGUSR1"), reason="a signal of POSIX")
+
+
+@pytest.fixture
+def interrupts() -> Iterator[Interrupts]:
+    """What handles SIGUSR1."""
+    made = Interrupts()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        made.hear(number, frame, "interrupted")
+
+    before = signal.signal(signal.SIGUSR1, interrupt)
+    yield made
+    signal.signal(signal.SIGUSR1, before)
+
+
+class Signalling:
+    """A lock during whose taking a signal comes."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.acquire, self.release, self.locked = self._lock.acquire, self._lock.release, self._lock.locked
+
+    def __enter__(self) -> bool:
+        taken = self._lock.acquire()
+        signal.raise_signal(signal.SIGUSR1)
+        return taken
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+def test_no_signal_leaves_a_lock_taken(interrupts: Interrupts) -> None:
+    for _ in range(20):
+        lock = Signalling()
+        interrupts.allow()
+        with pytest.raises(KeyboardInterrupt, match="interrupted"), threading.Condition(lock):  # type: ignore[arg-type]
+            signal.pause()
+        assert not lock.locked()
+
+
+def test_a_burst_of_signals_is_one_interrupt(interrupts: Interrupts) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGUSR1)
+    for _ in range(3):
+        signal.raise_signal(signal.SIGUSR1)
+    interrupts.allow()
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGUSR1)
