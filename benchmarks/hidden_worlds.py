@@ -1,10 +1,11 @@
 """Whether what is stated holds in laboratories that nobody has seen: `python benchmarks/hidden_worlds.py FOLDER`.
 
 Draws 60 laboratories with a quiet LSM9DS1, 40 with a noisy one, 20 with an ADIS16465 beside a quiet one, 20 of `imu`
-with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of four other arms and 6 with an autopilot
-(tests/support/hidden_worlds.py), runs `rig run` in each, and keeps its recording in FOLDER/family/seed; those that are
-there are not made again. Then all are solved, and a table says of each family, part and parameter: RMS of error over u,
-the share within U, the largest error over U, the spread of u, and which undamaged runs were refused and by what.
+with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of four other arms, 6 with an autopilot, and 100
+pairs and 40 of `imu` on arms that ripple by any order of the turn (tests/support/hidden_worlds.py), runs `rig run` in
+each, and keeps its recording in FOLDER/family/seed; those that are there are not made again. Then all are solved, and a
+table says of each family, part and parameter: RMS of error over u, the share within U, the largest error over U, the
+spread of u, and which undamaged runs were refused and by what.
 `--solve-only` runs nothing. `--family NAME` and `--count N` take fewer.
 """
 

@@ -36,7 +36,8 @@ JointRange = Annotated[float, Field(gt=0, le=363)]
 JointRanges = tuple[JointRange, JointRange, JointRange, JointRange, JointRange, JointRange]
 JointSpeed = Annotated[float, Field(gt=0, le=360)]
 JointSpeeds = tuple[JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed]
-Cycles = Annotated[int, Field(ge=1, le=200)]
+Cycles = Annotated[int, Field(ge=1, le=400)]
+VibrationFrequency = Annotated[float, Field(ge=0.1, le=200)]
 PartNumber = Annotated[str, Field(pattern=r"^[ -~]+$", max_length=40)]
 Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
@@ -186,7 +187,10 @@ class SimulatedArmSection(Section):
         le=1,
         description="RMS of a vibration of each wrist that is not locked to the turn and that no encoder sees",
     )
-    vibration_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
+    vibration_hz: VibrationFrequency = Field(default=10.0, description="its frequency")
+    vibration_more_hz: tuple[VibrationFrequency, ...] = Field(
+        default=(), max_length=20, description="further frequencies of it, each of which is as strong as the first"
+    )
     vibration_seen_rms_rad_s: float = Field(
         default=0.0,
         ge=0,

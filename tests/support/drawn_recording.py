@@ -22,6 +22,7 @@ from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.nonlinearity import CUBE_MISSED
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
 from rig.motion.steps import Sweep, Transfer
+from support.drawn_ripple import Ripple
 from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
 
 WRISTS = (3, 4, 5)
@@ -95,8 +96,8 @@ class Drawn:
     bias_rad_s: Array
 
 
-def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
-    """The movement is that of `setup`, if any."""
+def drawn(seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None) -> Drawn:
+    """The movement is that of `setup`, if any, and it is as uneven as `ripple` says, or as is usual."""
     rng = np.random.default_rng(seed)
     seen = rng.spawn(1)[0]
     setup = replace(
@@ -109,6 +110,16 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
         boot_s=float(rng.uniform(-1e4, 0.0)),
         drift=float(rng.uniform(-5e-5, 5e-5)),
     )
+    if ripple is not None:
+        setup = replace(
+            setup,
+            vibration=ripple.fraction,
+            orders=tuple(ripple.orders),
+            seen_vibration_rad_s=ripple.seen_rad_s,
+            seen_vibration_hz=ripple.seen_hz,
+            unseen_vibration_rad_s=ripple.unseen_rad_s,
+            unseen_vibration_hz=tuple(ripple.unseen_hz),
+        )
     motion = Motion(setup, rng)
     known = motion.settings.uncertainty
     assert known is not None
@@ -144,7 +155,11 @@ def _counts(read: Array, kind: Kind) -> Array:
 
 
 def _beside_the_encoders(
-    motion: Motion, time_s: Array, known: Uncertainty, rng: np.random.Generator, encoders_err: float
+    motion: Motion,
+    time_s: Array,
+    known: Uncertainty,
+    rng: np.random.Generator,
+    encoders_err: float,
 ) -> tuple[Array, Array, DenavitHartenberg]:
     """True angles and speeds, and how the arm is made; the encoders see neither."""
     q, qd = motion.joints(time_s)
@@ -177,7 +192,12 @@ def _beside_the_encoders(
         speed += ((share > 0) & (share < 1))[:, None] * (then - off) / OUTWARDS_S
         off = then
     vibration, hertz = rng.uniform(0, 0.004), rng.uniform(8, 30)
-    speed[:, WRISTS] += vibration * np.sqrt(2) * np.cos(2 * np.pi * hertz * time_s[:, None] + rng.uniform(0, 6, 3))
+    lines_hz = [hertz]
+    if motion.unseen_hz:
+        vibration, lines_hz = motion.unseen_rad_s, list(motion.unseen_hz)
+    for each in lines_hz:
+        wave = np.cos(2 * np.pi * each * time_s[:, None] + rng.uniform(0, 6, 3))
+        speed[:, WRISTS] += vibration * np.sqrt(2 / len(lines_hz)) * wave
     twist = np.zeros(6)
     twist[list(WRISTS)] = axis_rad * rng.uniform(-1, 1, 3)
     alpha = tuple((np.array(NOMINAL.alpha_rad) + twist).tolist())

@@ -21,6 +21,7 @@ from rig.config.load import load
 from rig.config.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from support.drawn_laboratory import PART_ERRORS, SQUARE_DEG, WAVE_RAD, leaning, seen_vibration
+from support.drawn_ripple import drawn_ripple, in_the_world
 from support.paths import CONFIGS
 from support.worlds import merge
 
@@ -193,6 +194,16 @@ def on_another_arm(model: str, seed: int) -> dict[str, Any]:
     return document
 
 
+def rippled(family: Callable[[int], dict[str, Any]], seed: int) -> dict[str, Any]:
+    """As a family, on an arm whose ripple and vibrations come at any order of the turn."""
+    document = family(seed)
+    turn_hz = document["procedure"]["speed_deg_s"] / 360
+    rates_hz = [each["rate_hz"] for each in document["sensors"].values() if each]
+    ripple = drawn_ripple(np.random.default_rng([seed, 47]), turn_hz, rates_hz)
+    changed: dict[str, Any] = merge(document, {"world": {"arm": in_the_world(ripple)}})
+    return changed
+
+
 OTHER_ARMS = ("ur3e", "ur5e", "ur20", "ur10_cb3")
 MORE_ARMS = ("ur7e", "ur12e", "ur16e", "ur30")  # of which one world each is enough: they differ from these in lengths
 FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
@@ -206,6 +217,8 @@ FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
         **{part: partial(by_its_sheet, part) for part in BY_SHEET},
         "autopilot": autopilot,
         "lines": prints_lines,
+        "rippled pair": partial(rippled, pair),
+        "rippled imu": partial(rippled, imu),
     }
 )
 WORLDS = MappingProxyType(
@@ -216,6 +229,8 @@ WORLDS = MappingProxyType(
         "imu": 20,
         "kvh": 10,
         **dict.fromkeys((*OTHER_ARMS, *BY_SHEET, "autopilot", "lines"), 6),
+        "rippled pair": 100,
+        "rippled imu": 40,
     }
 )
 

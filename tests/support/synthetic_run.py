@@ -68,8 +68,11 @@ class Setup:
     noise_correlation: float = 0.0  # from sample to sample
     mounting_error_rad: tuple[float, ...] = (0.05, -0.035, 0.06)
     vibration: float = 0.05  # RMS of the rate ripple over the rate
+    orders: tuple[int, ...] = (18, 31, 50)  # how many times each part of it comes in a turn
     seen_vibration_rad_s: float = 0.0  # RMS, of each wrist, that is not locked to its turning
     seen_vibration_hz: float = 10.0
+    unseen_vibration_rad_s: float = 0.0  # that no encoder sees, of `drawn_recording`: another is drawn if it has
+    unseen_vibration_hz: tuple[float, ...] = ()  # no frequencies
     state_rate_hz: float = 125.0
     encoder_step_rad: float = 6e-6
     sample_rate_hz: float = 238.0
@@ -112,10 +115,11 @@ class Motion:
         self.plan: Plan = plan_six_observation(config.arm, config.procedure)
         self.settings = settings_of(config, self.plan)
         self.ends = 101.0 + np.cumsum([step.duration_s for step in self.plan.steps])
-        self.cycles = np.array([18, 31, 50])
-        self.rates = np.full(3, setup.vibration * np.sqrt(2 / 3))
-        self.phases = rng.uniform(0, 2 * np.pi, 3)
+        self.cycles = np.array(setup.orders)
+        self.rates = np.full(len(setup.orders), setup.vibration * np.sqrt(2 / len(setup.orders)))
+        self.phases = rng.uniform(0, 2 * np.pi, len(setup.orders))
         self.seen_rad_s, self.seen_hz = setup.seen_vibration_rad_s, setup.seen_vibration_hz
+        self.unseen_rad_s, self.unseen_hz = setup.unseen_vibration_rad_s, setup.unseen_vibration_hz
         self.seen_phases = rng.spawn(1)[0].uniform(0, 2 * np.pi, 3)  # what is drawn after it stays what it was
         self.end_s = float(self.ends[-1]) + 1.0
 

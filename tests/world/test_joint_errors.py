@@ -13,7 +13,7 @@ from rig.world.ur10e.ripple import ripple
 from rig.world.ur10e.trajectory import Joints
 
 STILL: Joints = (0.0,) * 6
-ALL = Errors((1e-3,) * 6, 2e-4, 1e-4, 1e-4, 2 * math.pi * 13, 0.002, 1e-4, 2 * math.pi * 9, 0.2)
+ALL = Errors((1e-3,) * 6, 2e-4, 1e-4, 1e-4, (2 * math.pi * 13,), 0.002, 1e-4, 2 * math.pi * 9, 0.2)
 
 
 class Player:
@@ -92,7 +92,7 @@ def test_a_joint_stands_elsewhere_when_it_comes_from_the_other_side() -> None:
 
 
 def test_the_wrists_vibrate_with_the_asked_rms_and_frequency_and_unlocked() -> None:
-    errors = JointErrors(Errors(vibration_rad_s=2 * math.pi * 13, vibration_rms_rad_s=0.002), Random(1))
+    errors = JointErrors(Errors(vibration_rad_s=(2 * math.pi * 13,), vibration_rms_rad_s=0.002), Random(1))
     times_s = np.arange(0.0, 10.0, 1 / 500)
     rates = np.array([errors.at(t, STILL, STILL, STILL)[1] for t in times_s])
     assert np.sqrt(np.mean(rates**2, axis=0)) == pytest.approx([0, 0, 0, 0.002, 0.002, 0.002], rel=1e-3)

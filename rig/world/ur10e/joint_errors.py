@@ -23,14 +23,14 @@ FORGOTTEN = 12.0  # settling times after which nothing is left of it
 class Errors:
     """Sizes of errors. `hysteresis_rad`: between both directions; `vibration_rms_rad_s`: of each wrist's rate.
 
-    `vibration_rad_s`, `settling_rad_s`: angular frequencies.
+    `vibration_rad_s` (of each line), `settling_rad_s`: angular frequencies.
     """
 
     zero_rad: Sequence[float] = (0.0,) * 6
     encoder_once_rad: float = 0.0
     encoder_twice_rad: float = 0.0
     hysteresis_rad: float = 0.0
-    vibration_rad_s: float = 60.0
+    vibration_rad_s: Sequence[float] = (60.0,)
     vibration_rms_rad_s: float = 0.0
     settling_rad: float = 0.0
     settling_rad_s: float = 60.0
@@ -59,8 +59,10 @@ class JointErrors:
         self._reversal = [(0.0, 0.0)] * 6  # encoder's angle, and the hysteresis there
         self._moving = [False] * 6
         self._stops = [(-inf, 0.0)] * 6  # when, and from which direction
-        phases_rad = [self._phases[joint][2] for joint in WRISTS]
-        self._vibration = Vibration(errors.vibration_rms_rad_s, errors.vibration_rad_s, phases_rad)
+        first, *more = errors.vibration_rad_s
+        lines = [(first, [self._phases[joint][2] for joint in WRISTS])]
+        lines += [(turn, [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]) for turn in more]
+        self._vibration = Vibration(errors.vibration_rms_rad_s, lines)
         self._settling = errors.settling_rad_s
         self._patience_s = FORGOTTEN * errors.settling_decay_s
         self._placed = [(0.0, 0.0, 1.0, 0.0)] * 6  # last worked out: encoder's angle; angle and its two derivatives

@@ -118,7 +118,7 @@ def _errors(section: SimulatedArmSection) -> Errors:
         residue.encoder_once_rad,
         residue.encoder_twice_rad,
         residue.hysteresis_rad,
-        2.0 * pi * section.vibration_hz,
+        [2.0 * pi * hertz for hertz in (section.vibration_hz, *section.vibration_more_hz)],
         section.vibration_rms_rad_s,
         section.settling_rad,
         2.0 * pi * section.settling_hz,
