@@ -239,6 +239,7 @@ def sweeps_of(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
         covariances_m2_s4=np.array([each.harmonic.covariance_m2_s4 for each in swept]),
         axes_flange=np.array([each.axis_flange for each in swept]) @ mounting.T,
         speeds_rad_s=np.array([each.harmonic.speed_rad_s for each in swept]),
+        turning_rad2_s2=np.array([each.harmonic.turning_rad2_s2 for each in swept]),
         attitudes=np.array([(mounting @ each.attitude).T for each in swept]),
         arms_m=np.array([each.arm_m for each in swept]) @ mounting.T,
         stations=np.array([stations.index(each.station) for each in swept], dtype=np.intp),

@@ -11,9 +11,7 @@ from rig.analysis.planned_motion import PlannedRun, measured, planned_motion, ti
 from rig.analysis.ways import SPARSE_S, by_the_wrists, moved, pull_m_s2
 from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Sweep
-from rig.observation.arm_beside_lines import turned
 from rig.observation.arm_motion import ArmMotion
-from rig.observation.lines import NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +55,7 @@ def planned_pieces(run: PlannedRun) -> Planned:
             place=np.array([each.place for each in of]),
             means_rad_s=nothing,
             variances_rad2_s2=nothing,
-            rates_rad_s=np.array([turned(motion, each.start_s, each.end_s, NONE, 1)[0] for each in stretches]),
+            rates_rad_s=np.array([motion.mean_rate(each.start_s, each.end_s) for each in stretches]),
             pull_m_s2=np.array([pull_m_s2(each, run.site.down_m_s2, extension_m) for each in stretches]),
             attitudes=np.array([motion.attitude(each.start_s, each.end_s) for each in stretches]),
             speed_std=np.zeros(len(of)),

@@ -1,7 +1,7 @@
 """A recording in pieces: parts of revolutions and of rests, each with what the arm did meanwhile.
 
-A revolution's mean is free of the servo's vibration, its parts are not: the arm's measured rate is taken out of them,
-and so is what the sensor's filter delays of it.
+The lines that were taken out of a revolution's mean are taken out of its parts, and the weights that make the means of
+their readings make those of the arm's rate.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from rig.analysis.calibration import SensorResult
 from rig.data.quantity import RATE
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
+from rig.estimation.mean_weights import even_groups, mean_weights
 from rig.estimation.vector_fit import Explained
-from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, SAME, fitted, in_hertz, lines, swings, turning, waves
+from rig.observation.lines import NONE, LineSearch, find_lines, fitted, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -29,7 +29,7 @@ from rig.observation.tapered_weights import noise_at_zero
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
-TWICE = 2  # in a turn, at most, what a sensor feels comes and goes, and encoders err
+AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise one bin in 10⁹ does
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -131,14 +131,15 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
-    cut_up = partial(_cut, site=site, finds_lines=by_model)
-    room_hz = _in_the_room([(stream, rest) for _, stream, rest in rests]) if by_model else NONE
     found = [
         *(
-            cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts, room_hz=room_hz)
+            _cut_turn(stream, recording.motion, turn, site=site, parts=parts, sweep=sweep)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
-        *(cut_up(stream, recording.motion, rest, parts=of_rest) for recording, stream, rest in rests),
+        *(
+            _cut_rest(stream, recording.motion, rest, site=site, parts=of_rest, finds_lines=by_model)
+            for recording, stream, rest in rests
+        ),
     ]
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
     seen, pieces, pull_m_s2, times_s = explained.seen, list[_Piece](), list[Array](), list[Array]()
@@ -167,104 +168,135 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     )
 
 
-def _in_the_room(rests: Sequence[tuple[Stream, Average]]) -> Array:
-    """(k,) Hz of what vibrates in the longest of the rests."""
-    if not rests:
-        return NONE
-    stream, rest = max(rests, key=lambda each: each[1].duration_s)
-    inside = between(stream, rest.start_s, rest.end_s)
-    readings = stream.readings_rad_s[inside]
-    return in_hertz(lines(readings - readings.mean(axis=0)), stream.time_s[inside])
+@dataclass(frozen=True, slots=True)
+class _Parted:
+    """Samples at times (n,) in parts of equal length, which are `groups` (n, p), from `ends_s` (p,) to the next.
 
-
-def _lines_in(readings: Array, share: Array, known_cycles: Array, *, turns: bool) -> Array:
-    """(k,) cycles of what vibrates in readings (n, 3), where a share (n,) of the time is over.
-
-    They are told beside what comes and goes smoothly in a turn: beside means of parts they would leave steps, which
-    look like slow lines of another sign each way. Two that are near each other do not average out in a part.
+    `inside` are all samples of the window, of which those are `used` (m,) that lie in a part with `enough` of them.
     """
-    smooth = np.column_stack([np.ones(len(readings)), turning(2 * np.pi * share, TWICE if turns else 0)])
-    return lines(readings - smooth @ fitted(smooth, readings), known_cycles=known_cycles, apart_cycles=SAME)
+
+    inside: slice
+    used: NDArray[np.bool_]
+    time_s: Array
+    groups: Array
+    ends_s: Array
+    enough: tuple[int, ...]
+
+    @property
+    def averages(self) -> Array:
+        """(p, n) the weights of even means of the parts."""
+        return mean_weights(self.groups, self.groups[:, :0])
 
 
-def _cut(
-    stream: Stream,
-    motion: ArmMotion,
-    average: Average,
-    *,
-    site: Site,
-    parts: int,
-    finds_lines: bool,
-    sweep: int = REST,
-    turn: Observation | None = None,
-    room_hz: Array = NONE,
-) -> tuple[Window, list[_Piece]]:
-    """A revolution (`turn`) or a rest in parts of equal length; one of which too little is known is left out.
-
-    Where it `finds_lines`, what vibrates is taken out of the means of readings and rates alike, and out of the noise:
-    the encoders do not see all of it. What vibrates in the room, at `room_hz`, a turning sensor feels beside these
-    frequencies alone.
-    """
+def _parted(stream: Stream, average: Average, known: NDArray[np.bool_], parts: int) -> _Parted:
+    """The samples of an average, those of them that are `known` (m,), in so many parts, or in fewer of few samples."""
     inside = between(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
-    known = motion.covered(time_s) if turn is not None else np.ones(len(time_s), dtype=np.bool_)
     parts = max(1, min(parts, int(known.sum()) // FEWEST_SAMPLES))
-    ends = np.linspace(average.start_s, average.end_s, parts + 1)
-    part = np.where(known, np.clip(np.searchsorted(ends, time_s, side="right") - 1, 0, parts - 1), -1)
-    rate = motion.rate(time_s) if turn is not None else np.zeros((len(time_s), 3))
-    readings = stream.readings_rad_s[inside]
-    enough = [each for each in range(parts) if np.sum(part == each) >= FEWEST_SAMPLES / 2]
+    ends_s = np.linspace(average.start_s, average.end_s, parts + 1)
+    part = np.where(known, np.clip(np.searchsorted(ends_s, time_s, side="right") - 1, 0, parts - 1), -1)
+    enough = tuple(each for each in range(parts) if np.sum(part == each) >= FEWEST_SAMPLES / 2)
     used = np.isin(part, enough)
-    part, rate, readings, time_s = part[used], rate[used], readings[used], time_s[used]
-    means, rates = means_of_parts(readings, part, parts), means_of_parts(rate, part, parts)
-    residual, shaken = readings - means[part], np.zeros(readings.shape)
-    if turn is not None:
-        vibration = np.column_stack([rate @ turn.axis_flange, motion.rate(time_s, 1) @ turn.axis_flange])
-        vibration -= means_of_parts(vibration, part, parts)[part]
-        shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
-        residual = residual - shaken
-    left, taken, swing_rad2 = residual, 0, np.zeros(3)
-    if finds_lines:
-        share = np.arange(len(readings)) / len(readings)  # as they were found, some missing or none
-        cycles = _lines_in(readings, share, room_hz * average.duration_s, turns=turn is not None)
-        columns = waves(cycles, share)
-        taken = columns.shape[1]
-        means, left = beside(columns, readings, part, parts)
-        if turn is None:
-            swing_rad2 = swings(residual, columns, in_hertz(cycles, time_s))
-            residual = left
-        else:
-            rates, unexplained = beside(columns, rate, part, parts)
-            along = unexplained @ turn.axis_flange[:, None]
-            left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
-            if known.all():
-                rates = turned(motion, average.start_s, average.end_s, in_hertz(cycles, time_s), parts)
-    gyroscope = stream.sensor.channel(RATE)
-    count = gyroscope.unit_per_count
-    scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
-    if finds_lines and turn is not None:  # what the encoders miss of a ripple is no noise of a part's
-        noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
-    else:
-        noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
-        if taken:
-            at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
-            noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
+    return _Parted(inside, used, time_s[used], even_groups(part[used], parts), ends_s, enough)
+
+
+def _cut_turn(
+    stream: Stream, motion: ArmMotion, turn: Observation, *, site: Site, parts: int, sweep: int
+) -> tuple[Window, list[_Piece]]:
+    """A revolution or an arc in parts, beside the lines that were found when it was averaged.
+
+    The encoders do not see all that vibrates, and what they miss of a ripple is no noise of a part's.
+    """
+    average, axis = turn.average, turn.axis_flange
+    times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
+    parted = _parted(stream, average, motion.covered(times_s), parts)
+    readings = stream.readings_rad_s[parted.inside][parted.used]
+    rate = motion.sampled_rates(times_s)[parted.used]
+    lines = waves(
+        average.lines_hz * average.duration_s, (parted.time_s - average.start_s) / average.duration_s, turn.beats
+    )
+    weights = mean_weights(parted.groups, lines)
+    vibration = np.column_stack([rate @ axis, motion.rate(parted.time_s, 1) @ axis])
+    residual, vibration = (each - parted.groups @ (parted.averages @ each) for each in (readings, vibration))
+    shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
+    noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
+    count = stream.sensor.channel(RATE).unit_per_count
+    means = _Means(weights, readings, weights @ rate, noise, average.noise_rad_s**2)
+    window = Window(
+        sweep, _counts(stream, parted.inside), (residual - shaken) / count, np.sqrt(np.mean(shaken**2, axis=0)) / count
+    )
+    speed_std = turn.speed_std_rad_s / turn.speed_rad_s
+    return window, _pieces(parted, means, motion, site, count, sweep=sweep, speed_std=speed_std)
+
+
+def _cut_rest(
+    stream: Stream, motion: ArmMotion, average: Average, *, site: Site, parts: int, finds_lines: bool
+) -> tuple[Window, list[_Piece]]:
+    """A rest in parts. Where it `finds_lines`, what vibrates is taken out of their means and their noise."""
+    inside = between(stream, average.start_s, average.end_s)
+    parted = _parted(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), parts)
+    readings = stream.readings_rad_s[parted.inside][parted.used]
+    count = stream.sensor.channel(RATE).unit_per_count
+    share = (parted.time_s - average.start_s) / average.duration_s
+    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share) if finds_lines else NONE
+    lines = waves(cycles, share, AT_REST.beats)
+    weights = mean_weights(parted.groups, lines)
+    residual = readings - parted.groups @ (parted.averages @ readings)
+    beside = readings - parted.groups @ (weights @ readings)
+    left = beside - lines @ fitted(lines, beside)
+    free = max(len(left) - len(parted.enough) - lines.shape[1], 1)
+    scatter = np.maximum(np.sum(left**2, axis=0) / free, count**2 / 12)
+    noise = scatter * np.array([widening(axis) for axis in left.T])
+    if len(cycles):
+        at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
+        noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
+    means = _Means(weights, readings, np.zeros((len(weights), 3)), noise, scatter)
+    swing_rad2 = swings(residual, lines, cycles / average.duration_s)
+    window = Window(REST, _counts(stream, parted.inside), left / count, np.zeros(3), swing_rad2)
+    return window, _pieces(parted, means, motion, site, count, sweep=REST, speed_std=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Means:
+    """The means of readings (n, 3) in p parts by `weights` (p, n), and the flange's rates (p, 3) by the same.
+
+    One reading has the variance `noise_rad2_s2` (3,) as it counts in a mean, and `scatter_rad2_s2` (3,) in all.
+    """
+
+    weights: Array
+    readings_rad_s: Array
+    rates_rad_s: Array
+    noise_rad2_s2: Array
+    scatter_rad2_s2: Array
+
+
+def _pieces(
+    parted: _Parted, means: _Means, motion: ArmMotion, site: Site, count: float, *, sweep: int, speed_std: float
+) -> list[_Piece]:
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
-    pieces = []
-    for each in enough:
-        attitude = motion.attitude(ends[each], ends[each + 1])
+    read = means.weights @ means.readings_rad_s
+    rounding = rounding_left(means.scatter_rad2_s2, count)
+    last, pieces = len(means.weights) - 1, []
+    for each in parted.enough:
+        start_s, end_s = parted.ends_s[each], parted.ends_s[each + 1]
+        attitude = motion.attitude(start_s, end_s)
+        own = means.weights[each]
         pieces.append(
             _Piece(
                 sweep=sweep,
-                place=2 * each / (parts - 1) - 1 if parts > 1 else 0.0,
-                mean_rad_s=means[each],
-                variance_rad2_s2=noise / np.sum(part == each) + rounding_left(scatter, count),
-                rate_rad_s=rates[each] + attitude @ earth,
+                place=2 * each / last - 1 if last else 0.0,
+                mean_rad_s=read[each],
+                variance_rad2_s2=means.noise_rad2_s2 * float(own @ own) + rounding,
+                rate_rad_s=means.rates_rad_s[each] + attitude @ earth,
                 gravity_m_s2=attitude @ site.down_m_s2,
                 attitude=attitude,
-                speed_std=0.0 if turn is None else turn.speed_std_rad_s / turn.speed_rad_s,
-                stretch=Stretch(motion, float(ends[each]), float(ends[each + 1])),
+                speed_std=speed_std,
+                stretch=Stretch(motion, float(start_s), float(end_s)),
             )
         )
-    seen = gyroscope.counts(stream.raw)[inside].astype(np.int64)
-    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count, swing_rad2), pieces
+    return pieces
+
+
+def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:
+    counts: NDArray[np.int64] = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.int64)
+    return counts

@@ -102,6 +102,7 @@ def _swept(at: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) 
         freedom=0,
         residuals_m_s2=np.zeros((0, 3)),
         vibration_m_s2=np.zeros(3),
+        turning_rad2_s2=np.array([[turn.speed_rad_s**2, 0.0, 0.0], [0.0, 0.0, 0.0]]),
     )
     return of_turn(at.step, turn, harmonic)
 

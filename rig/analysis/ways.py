@@ -19,7 +19,6 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
 from rig.motion.geometry import flange_pose
-from rig.observation.arm_beside_lines import turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.known_motion import MIN_RATE_RAD_S
@@ -60,8 +59,7 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         readings = stream.readings_rad_s[between(stream, way.start_s, way.end_s)]
         attitude = way.motion.attitude(way.start_s, way.end_s)
         means.append(readings.mean(axis=0))
-        turn = turned(way.motion, way.start_s, way.end_s, np.zeros(0), 1)[0]
-        rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
+        rates.append(way.motion.mean_rate(way.start_s, way.end_s) + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
         pulls.append(pull_m_s2(way, site.down_m_s2, np.array(settings.extension_m)))
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, *_ in found])

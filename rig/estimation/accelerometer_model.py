@@ -10,6 +10,9 @@ a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ 
 
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
+A joint turns unevenly. The weights that make mean, cosine and sine of the readings make those of ω² and of α as the
+encoders have them (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r).
+
 ψ = ω τ is what the joint turns while the accelerometer lags behind the clock of its time stamps: with opposite signs
 for opposite directions. Where a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. What the
 filter takes of the size, (ω τ)²/2 at most, is left out: 14 ppm at 60°/s and 5 ms.
@@ -49,7 +52,7 @@ class Dwells:
 
 @dataclass(frozen=True, slots=True)
 class Sweeps:
-    """Whole revolutions at constant speed.
+    """Whole revolutions at nearly constant speed.
 
     - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z;
       `covariances_m2_s4` (M, 9, 9) of these nine, row by row. `rig.estimation.sweep_harmonics` makes both.
@@ -57,12 +60,14 @@ class Sweeps:
     - `attitudes` (M, 3, 3): flange to base where the angle is counted from.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
     - `stations` (M,): a number for each joint and pose; sweeps of one station, both ways, share the arm's errors.
+    - `turning_rad2_s2` (M, 2, 3): mean, cosine and sine of the rate's square and of the angular acceleration.
     """
 
     harmonics_m_s2: Array
     covariances_m2_s4: Array
     axes_flange: Array
     speeds_rad_s: Array
+    turning_rad2_s2: Array
     attitudes: Array
     arms_m: Array
     stations: NDArray[np.intp]
@@ -78,6 +83,7 @@ NO_SWEEPS = Sweeps(
     covariances_m2_s4=np.zeros((0, 9, 9)),
     axes_flange=np.zeros((0, 3)),
     speeds_rad_s=np.zeros(0),
+    turning_rad2_s2=np.zeros((0, 2, 3)),
     attitudes=np.zeros((0, 3, 3)),
     arms_m=np.zeros((0, 3)),
     stations=np.zeros(0, dtype=np.intp),
@@ -166,18 +172,18 @@ def of_gravity(delay_s: float, movement: Movement) -> Array:
 
 
 def of_lever(movement: Movement) -> Array:
-    """(K, 3, 3) what takes the lever arm to the centripetal acceleration: in the mean of a sweep alone."""
-    axes, speeds = movement.sweeps.axes_flange, movement.sweeps.speeds_rad_s
-    whole = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(speeds), 3, 3))
-    centripetal = axes[:, :, None] * axes[:, None, :] - np.eye(3)
-    whole[len(movement.dwells.readings_m_s2) :: 3] = speeds[:, None, None] ** 2 * centripetal
-    return whole
+    """(K, 3, 3) what takes the lever arm to the acceleration of turning: at constant speed in a sweep's mean alone."""
+    axes = movement.sweeps.axes_flange
+    centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
+    squares, accelerations = np.moveaxis(movement.sweeps.turning_rad2_s2, 1, 0)[..., None, None]
+    waves = squares * centripetal[:, None] + accelerations * euler[:, None]
+    return np.concatenate([np.zeros((len(movement.dwells.readings_m_s2), 3, 3)), waves.reshape(-1, 3, 3)])
 
 
 def of_arms(movement: Movement) -> Array:
-    """(K, 3) centripetal acceleration of the flange itself, m/s²."""
-    arms = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(movement.sweeps.arms_m), 3, 1))
-    arms[len(movement.dwells.readings_m_s2) :: 3, :, 0] = movement.sweeps.arms_m
+    """(K, 3) acceleration by which the flange itself turns, m/s²."""
+    still = np.zeros((len(movement.dwells.readings_m_s2), 3))
+    arms = np.concatenate([still, np.repeat(movement.sweeps.arms_m, 3, axis=0)])[..., None]
     acceleration: Array = (of_lever(movement) @ arms)[..., 0]
     return acceleration
 

@@ -34,7 +34,8 @@ class FirstHarmonic:
 
     `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample, by so
     many degrees of `freedom`; `residuals_m_s2` (n, 3) are samples less what was fitted. `vibration_m_s2` (3,) is the
-    RMS of what was taken out as the servo's or a swing.
+    RMS of what was taken out as the servo's or a swing. `turning_rad2_s2` (2, 3): mean, cosine and sine, by the very
+    same weights, of the rate's square and of the angular acceleration.
     """
 
     harmonic_m_s2: Array
@@ -44,6 +45,7 @@ class FirstHarmonic:
     freedom: int
     residuals_m_s2: Array
     vibration_m_s2: Array
+    turning_rad2_s2: Array
 
 
 def first_harmonic(
@@ -72,7 +74,8 @@ def first_harmonic(
         require_shape(name, array, shape)
     check_finite(time=t, readings=m, angle=angle, speed=speed)
     mean_speed = _mean_speed(t, angle)
-    columns = np.hstack([_waves(angle, WAVES), _of_vibration(t, angle, speed, mean_speed)])
+    uneven = _uneven(t, speed, mean_speed)
+    columns = np.hstack([_waves(angle, WAVES), _of_vibration(uneven, angle, mean_speed)])
     inverse, residuals = _regression(columns, m)
     swinging = np.hstack([columns, _line(t, residuals) if swings is None else swings(residuals)])
     without = _regression(swinging, m)
@@ -92,6 +95,7 @@ def first_harmonic(
         freedom=count - int(unknown),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(shaking**2, axis=0)),
+        turning_rad2_s2=np.stack([(mean_speed + uneven.rate) ** 2, uneven.acceleration]) @ gain.T,
     )
 
 
@@ -149,22 +153,40 @@ def _waves(angle_rad: Array, count: int) -> Array:
     return np.column_stack([np.ones_like(angle_rad), waves])
 
 
-def _of_vibration(time_s: Array, angle_rad: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> Array:
-    """(n, 6) what the joint's uneven speed is felt as.
+@dataclass(frozen=True, slots=True)
+class _Uneven:
+    """The joint's `rate` (n,) less its mean and `acceleration` (n,), and that of them which comes fast.
+
+    `fast` (4, n): the rate and its first three derivatives, without what changes once to four times in a turn.
+    """
+
+    rate: Array
+    acceleration: Array
+    fast: Array
+
+
+def _uneven(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Uneven:
+    """How unevenly the joint turns.
 
     Differences of encoder steps are noise, so the speed is smoothed first: it is what its waves in the time of a turn
-    make of it, and they are differentiated. A filter's lag shows α's change, and the change of this.
+    make of it, and they are differentiated.
     """
-    waves = _waves(mean_speed_rad_s * time_s, min(VIBRATION_WAVES, len(time_s) // 4))
+    waves = _waves(mean_speed_rad_s * (time_s - time_s[0]), min(VIBRATION_WAVES, len(time_s) // 4))
     together = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
     excess = np.asarray(np.linalg.solve(together, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
-    excess[: 1 + 2 * (WAVES + 1)] = 0.0  # times cos θ, a slower one is the mean or a wave that is wanted
-    changes = [excess]
+    fast = excess.copy()
+    fast[: 1 + 2 * (WAVES + 1)] = 0.0  # times cos θ, a slower one is the mean or a wave that is wanted
+    changes = [fast]
     for _ in range(3):
         changes.append(mean_speed_rad_s * _changed(changes[-1]))
-    uneven, *of_acceleration = np.array(changes) @ waves.T
-    squared = (2 * mean_speed_rad_s + uneven) * uneven
-    return np.column_stack([squared, *of_acceleration, uneven * np.cos(angle_rad), uneven * np.sin(angle_rad)])
+    return _Uneven(waves @ excess, waves @ (mean_speed_rad_s * _changed(excess)), np.array(changes) @ waves.T)
+
+
+def _of_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
+    """(n, 6) what the joint's uneven speed is felt as. A filter's lag shows α's change, and the change of this."""
+    rate, *of_acceleration = uneven.fast
+    squared = (2 * mean_speed_rad_s + rate) * rate
+    return np.column_stack([squared, *of_acceleration, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])
 
 
 def _changed(coefficients: Array) -> Array:

@@ -28,6 +28,7 @@ from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolu
 from rig.observation.windows import Window
 
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
+KNOT_S = 0.004  # between the knots of the rate: a faster ripple than it can follow would look like a slower one
 PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
 
@@ -68,16 +69,15 @@ class ArmMotion:
         if self._scatters:
             times_s, angles, joint_rates = smoothed(self.time_s, self._states["q_rad"])
             self.angles = CubicSpline(times_s, angles)
+            rates = flange_rate(angles, joint_rates, kinematics) @ self.mount.T
         else:
             self.angles = CubicSpline(self.time_s, self._states["q_rad"])
-            step = RATE_STEP_S / float(np.median(np.diff(self.time_s)))
-            every = max(min(round(step), len(self.time_s) // 4), 1)
-            times_s, angles = self.time_s[::every], self._states["q_rad"][::every]
-            joint_rates = (CubicSpline(times_s, angles) if every > 1 else self.angles)(times_s, 1)
-        rates = flange_rate(angles, joint_rates, kinematics)
+            step_s = float(np.median(np.diff(self.time_s)))
+            times_s = self.time_s[:: max(min(round(KNOT_S / step_s), len(self.time_s) // 4), 1)]
+            rates = self.mean_rates(times_s, max(RATE_STEP_S, step_s))
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
-        self.rate = CubicSpline(times_s, rates @ self.mount.T)
+        self.rate = CubicSpline(times_s, rates)
         close = np.diff(self.time_s) <= (SMOOTHED_S / 3 if self._scatters else MAX_STATE_STEP_S)
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 
@@ -128,6 +128,32 @@ class ArmMotion:
         """The angle (n,) rad of the joint that a sweep turns, at times (n,); with `derivative` 1 its rate in rad/s."""
         angle: Array = self.angles(time_s, derivative)[..., sweep.joint]
         return angle
+
+    def mean_rates(self, time_s: Array, lasting_s: float) -> Array:
+        """(n, 3) rad/s: the flange's mean rate over so long around each of the times (n,).
+
+        By how far its joints came: what one angle errs, the rates before and after take back, and of samples that
+        follow each other the mean is that between the ends.
+        """
+        came = self.angles(time_s + lasting_s / 2) - self.angles(time_s - lasting_s / 2)
+        rates: Array = flange_rate(self.angles(time_s), came / lasting_s, self.kinematics) @ self.mount.T
+        return rates
+
+    def sampled_rates(self, time_s: Array) -> Array:
+        """(n, 3) rad/s: the flange's rate as it is around samples at times (n,) that follow each other evenly.
+
+        The mean from half-way to the sample before to half-way to the next; of samples far apart the rate there.
+        """
+        step_s = float(np.median(np.diff(time_s)))
+        return self.mean_rates(time_s, step_s) if step_s <= MAX_STATE_STEP_S else self.rate(time_s)
+
+    def mean_rate(self, start_s: float, end_s: float) -> Array:
+        """(3,) rad/s: the flange's mean rate from one time to another."""
+        count = max(round((end_s - start_s) / RATE_STEP_S), 1)
+        lasting_s = (end_s - start_s) / count
+        middles_s = np.linspace(start_s + lasting_s / 2, end_s - lasting_s / 2, count)
+        rate: Array = self.mean_rates(middles_s, lasting_s).mean(axis=0)
+        return rate
 
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
         """The whole turn, or the arc, of a sweep that was made in a window.

@@ -13,7 +13,6 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
 from rig.observation.known_motion import KnownMotion
-from rig.observation.lines import in_hertz
 from rig.observation.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
@@ -27,7 +26,7 @@ class Average:
     `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
     arm's base frame into the flange's, None where no arm tells it. `freedom` (3,): with how many degrees of freedom the
     noise's part of the variance is known, infinite where nobody counted. `lines_hz` (k,): frequencies of what vibrates
-    and was taken out of the mean, and so has to be taken out of the arm's rate.
+    and was taken out of the mean.
     """
 
     mean_rad_s: Array
@@ -113,5 +112,5 @@ def averaged(stream: Stream, inside: slice, window: Window, mean: Mean) -> Avera
         end_s=window.end_s,
         temperature_c=stream.temperature_c(inside),
         freedom=mean.freedom,
-        lines_hz=in_hertz(mean.cycles, stream.time_s[inside]),
+        lines_hz=mean.cycles / (window.end_s - window.start_s),
     )

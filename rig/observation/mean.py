@@ -1,11 +1,10 @@
-"""Means of readings in any unit, with the variance of the mean: where something passes, where the arm shakes."""
+"""Means of readings in any unit, with the variance of the mean: where nothing passes, where the arm shakes."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.errors import Fault
@@ -65,44 +64,23 @@ def by_axis(freedom: Iterable[Array | float]) -> Array:
     return np.array([np.broadcast_to(each, 3) for each in freedom])
 
 
-def mean_of(
-    readings: Array,
-    count: float | Array,
-    passing: Array,
-    covered: NDArray[np.bool_],
-    left: Callable[[Array], Left] = left_of,
-) -> Mean:
-    """Mean and its variance of readings (n, 3) in steps of `count`.
+def even_mean(readings: Array, count: float | Array, left: Callable[[Array], Left] = left_of) -> Mean:
+    """The mean of readings (n, 3) in steps of `count` in which nothing passes: all of them count alike.
 
-    `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's rate less its mean 2π/T;
-    the arm tells where it is known, `covered` (n,).
-
-    A straight line of reading against what passes says what is read without it: few samples do not meet a vibration
-    evenly. The noise is what is left of that line, and never below the rounding to counts; the variance of the mean
-    allows for residuals that are not white, which `left` tells of each axis. What rounding leaves in a mean however
-    many samples there are is added.
+    The noise is their scatter, and never below the rounding to counts; the variance of the mean allows for readings
+    that are not white, which `left` tells of each axis. What rounding leaves in a mean however many samples there are
+    is added.
     """
-    columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), readings[covered]
-    coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
-    residual = known - columns @ coefficients
-    scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
-    variance = np.maximum(scatter, count**2 / 12)
-    coloured = [left(each) for each in residual.T]
+    variance = np.maximum(readings.var(axis=0, ddof=1), count**2 / 12)
+    coloured = [left(axis) for axis in (readings - readings.mean(axis=0)).T]
     factor = np.array([each.factor for each in coloured])
-    of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
     return Mean(
-        mean=coefficients[0],
-        variance=variance * factor * of_the_mean + rounding_left(variance, count),
+        mean=readings.mean(axis=0),
+        variance=variance * factor / len(readings) + rounding_left(variance, count),
         noise=np.sqrt(variance),
-        samples=len(known),
+        samples=len(readings),
         freedom=np.array([each.freedom for each in coloured]),
     )
-
-
-def even_mean(readings: Array, count: float | Array, left: Callable[[Array], Left] = left_of) -> Mean:
-    """The mean of readings (n, 3) in steps of `count` in which nothing passes: all of them count alike."""
-    steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
-    return mean_of(readings, count, steady, known, left)
 
 
 def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:

@@ -1,10 +1,8 @@
 """From a recording to averaged revolutions: what the estimators see.
 
 An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
-speed is 2π/T whatever the servo's vibration, over an arc it is Δθ/T by the encoders at its ends. Either way the mean
-times T is the integral of the readings between the ends, so the vibration is no noise either: the noise's variance
-comes from what is left of the readings once lines and the arm's measured rate are taken out of them. What of a line the
-encoders see is taken out of 2π/T too.
+speed is 2π/T whatever the servo's vibration, over an arc it is Δθ/T by the encoders at its ends. The weights that make
+the mean of the readings also make that of the arm's rate, so what the encoders see of a vibration is no noise either.
 The mean comes first; squaring is the estimator's business.
 
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
@@ -15,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
@@ -24,15 +23,15 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
-from rig.observation.arm_beside_lines import turned_beside
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
-from rig.observation.averaging import Averaging, Passing, averaging_of
-from rig.observation.lines import turning
+from rig.observation.averaging import Averaging, averaging_of
+from rig.observation.lines import BEATS, turning
 from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import TimeBase
+from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Finished, Window, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
@@ -46,8 +45,8 @@ class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
 
     Or an arc of `angle_rad` at Δθ/T; `arc_rad` are the joint's angles at its ends, the lower first, None of whole
-    turns, over which no encoder errs. `ripple` is how unevenly it turned, RMS as a share of the rate. Of a mean beside
-    lines, `speed_rad_s` and `axis_flange` are beside what the encoders see of the same lines.
+    turns, over which no encoder errs. `ripple` is how unevenly it turned, RMS as a share of the rate. `speed_rad_s` and
+    `axis_flange` are those of the arm's mean rate under the weights of the mean reading.
 
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
@@ -74,6 +73,7 @@ class Observation:
     angle_rad: float | None = None
     arc_rad: tuple[float, float] | None = None
     ripple: float = 0.0
+    beats: int = BEATS
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +166,9 @@ def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = motion.turn(finished.sweep, finished.window, settings)
-    averaging = averaging_of(run.settings)
-    seen = _observation(stream, motion, finished.sweep, turn, settings, averaging=averaging)
+    seen = _observation(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
+        averaging = averaging_of(run.settings)
         return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
     return seen
 
@@ -199,13 +199,7 @@ def _drifting(average: Average, drift: Array) -> Average:
 
 
 def _observation(
-    stream: Stream,
-    motion: ArmMotion,
-    sweep: Sweep,
-    turn: Revolution,
-    settings: ObservationThresholds,
-    *,
-    averaging: Averaging,
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
@@ -215,33 +209,24 @@ def _observation(
     covered = motion.covered(stream.time_s[inside])
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
-    turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-    waves = turning(turned_rad, 2 * turn.beats)
-    if not turn.closed:
-        waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
-    passing = Passing(
-        motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s,
-        covered,
-        waves,
-        turn.closed,
-        turn.beats,
-    )
-    readings = stream.readings_rad_s[inside]
-    found = averaging.turned(readings, stream.sensor.channel(RATE).resolution_of(readings), passing)
+    sampled = _sampled(stream.time_s[inside], motion, turn, covered)
+    readings = stream.readings_rad_s[inside][covered]
+    found, weights = turn_mean(readings, stream.sensor.channel(RATE).resolution_of(readings), sampled)
     average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
-    speed_rad_s, axis_flange = turned_beside(motion, turn, average.lines_hz)
+    rate = turn.speed_rad_s * turn.axis_flange if turn.uneven else weights @ sampled.rates_rad_s
+    speed_rad_s = float(np.linalg.norm(rate))
     return Observation(
         sweep=sweep.index,
         joint_name=sweep.joint_name,
         direction=sweep.direction,
         axis=axis,
         sign=sign,
-        axis_flange=axis_flange,
+        axis_flange=rate / speed_rad_s,
         speed_rad_s=speed_rad_s,
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
@@ -250,7 +235,26 @@ def _observation(
         arm_m=turn.arm_m,
         angle_rad=turn.angle_rad,
         arc_rad=None if turn.closed else sweep.revolution_rad,
-        ripple=float(passing.rate_rad_s[covered].std()) / turn.speed_rad_s,
+        ripple=float(sampled.uneven_rad_s.std()) / turn.speed_rad_s,
+        beats=turn.beats,
+    )
+
+
+def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
+    """A turn as samples at times (n,) see it, of which the arm's motion is known where they are `covered` (n,)."""
+    share = (time_s - turn.start_s) / turn.duration_s
+    waves = turning(turn.angle_rad * share, 2 * turn.beats)[covered]
+    if not turn.closed:
+        waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
+    rates = motion.sampled_rates(time_s)[covered]
+    return SampledTurn(
+        share=share[covered],
+        rates_rad_s=rates,
+        uneven_rad_s=rates @ turn.axis_flange - turn.speed_rad_s,
+        passing=waves,
+        beats=turn.beats,
+        encoders_true=not turn.uneven,
+        complete=bool(covered.all()),
     )
 
 

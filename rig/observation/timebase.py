@@ -31,6 +31,9 @@ MAX_DRIFT_STEPS = 20  # to either side
 NO_TURNING = 1e-12  # of the square of the fastest: a body that turns about one axis has only rounding about others
 SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
 FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
+SLOW_S, FINE_S = 0.1, 0.02  # over which rates are averaged, at first and then
+AVERAGED, EVERY = 10, 2  # rates in as long, and every so many of the averages is looked at
+LEAST_GAP = 0.5  # of the time between samples
 SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0  # then, and so often, what is left is gone at once, at most so far
 
 
@@ -238,7 +241,49 @@ def _explained(turning: Array, seen: NDArray[np.bool_], moving: Array, lags: NDA
     return shares
 
 
+class _SlowMotion:
+    """A `KnownMotion` between two times, of which the rate is averaged over so long."""
+
+    def __init__(self, motion: KnownMotion, over_s: float, start_s: float, end_s: float) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self.time_s, self.covered = motion.time_s, motion.covered
+        step_s = over_s / AVERAGED
+        times_s = np.arange(max(start_s, self.time_s[0]), min(end_s, self.time_s[-1]), step_s)
+        rates = np.cumsum(motion.rate(times_s), axis=0)
+        means = (rates[AVERAGED:] - rates[:-AVERAGED]) / AVERAGED
+        self.rate = CubicSpline(times_s[AVERAGED::EVERY] - (AVERAGED - 1) / 2 * step_s, means[::EVERY])
+
+
+def _averaged(time_s: Array, readings: Array, count: int) -> tuple[Array, Array]:
+    """Times (m,) and readings (m, 3), averages of so many that follow each other without a gap."""
+    starts = np.arange(0, len(time_s) - count + 1, count)
+    lasting_s = time_s[starts + count - 1] - time_s[starts]
+    starts = starts[lasting_s <= (count - 1 + LEAST_GAP) * float(np.median(np.diff(time_s)))]
+    inside = starts[:, None] + np.arange(count)
+    return time_s[inside].mean(axis=1), readings[inside].mean(axis=1)
+
+
 def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
+    """The clock under which readings and motion fit best, first what is slow in both.
+
+    A ripple looks alike one period earlier and later, and a fast one is not the same in readings and states, each of
+    which has a filter of its own.
+    """
+    start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
+    step_s = float(np.median(np.diff(board_time_s)))
+    for over_s in (SLOW_S, FINE_S):
+        count = round(over_s / step_s)
+        if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
+            continue
+        slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
+        clock = _converged(clock, *_averaged(board_time_s, readings, count), slow)
+        if over_s == FINE_S:
+            return clock
+    return _converged(clock, board_time_s, readings, motion)
+
+
+def _converged(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     moved = np.zeros(2)
     for number in range(1, FINE_STEPS + 1):
         before, last = clock, moved

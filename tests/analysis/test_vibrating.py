@@ -8,7 +8,7 @@ import pytest
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.lines import lines, swings, waves
+from rig.observation.lines import LineSearch, find_lines, swings, waves
 from support.checked_runs import checked, failed
 from support.drawn_recording import ADIS16465, KINDS, drawn
 
@@ -37,6 +37,9 @@ def test_a_vibration_and_another_of_twice_its_frequency_or_nearly_the_same_fail_
         assert not failed(checked(run)), seed
 
 
+SEARCH = LineSearch(stands_out=30.0)
+
+
 def sine(cycles: float, count: int) -> Array:
     return np.sin(2 * np.pi * cycles * np.arange(count) / count)[:, None] * [1.0, 0.5, -0.3]
 
@@ -46,14 +49,14 @@ def test_lines_that_come_to_be_one_are_none() -> None:
     rng = np.random.default_rng(1)
     noise = 0.01 * rng.standard_normal((600, 3))
     jerk = np.exp(-((np.arange(600) - 300.0) ** 2) / 8)[:, None] * sine(100.0, 600)
-    for found in (lines(noise + sine(50.3, 600)), lines(noise + 5 * jerk)):
+    for found in (find_lines(noise + sine(50.3, 600), SEARCH), find_lines(noise + 5 * jerk, SEARCH)):
         assert np.diff(np.sort(found)).min(initial=np.inf) >= 1.5
-    assert lines(noise + sine(50.3, 600)) == pytest.approx([50.3], abs=0.01)
+    assert find_lines(noise + sine(50.3, 600), SEARCH) == pytest.approx([50.3], abs=0.01)
 
 
 def test_lines_that_are_known_are_held() -> None:
     noise = 0.01 * np.random.default_rng(2).standard_normal((600, 3))
-    found = lines(noise + sine(50.3, 600) + sine(80.0, 600), known_cycles=np.array([49.3]))
+    found = find_lines(noise + sine(50.3, 600) + sine(80.0, 600), SEARCH, np.array([49.3]))
     assert found[0] == 49.3 and found[1:] == pytest.approx([80.0], abs=0.05)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import left_by_correlations, left_of
-from rig.observation.mean import mean_at_rest, mean_of
+from rig.observation.mean import even_mean, mean_at_rest
 from rig.observation.tapered_weights import freedom_at_zero, noise_at_zero, vibrates
 from rig.observation.windows import Window
 
@@ -62,5 +62,5 @@ def test_white_readings_have_one_less_than_there_are_and_a_vibration_costs_most_
     assert vibrates(shaking)
     found, _ = mean_at_rest(shaking, time_s, Window(0.0, 6.0), 1e-6)
     assert np.all(found.freedom < 100)
-    before = mean_of(quiet, 1e-6, np.zeros((1428, 1)), np.ones(1428, dtype=np.bool_), left_by_correlations)
+    before = even_mean(quiet, 1e-6, left_by_correlations)
     assert np.all(np.isinf(before.freedom)), "of recordings of before nobody counts them"

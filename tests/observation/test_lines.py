@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from rig.observation.lines import SAME, fitted, lines, waves
+from rig.observation.lines import LineSearch, find_lines, fitted, waves
 
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
+STRICT = LineSearch(stands_out=30.0)
 
 
 def residuals(seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0, noise: float = NOISE) -> np.ndarray:
@@ -19,7 +20,7 @@ def residuals(seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0
 
 
 def test_white_noise_has_no_lines() -> None:
-    assert all(lines(residuals(seed)).size == 0 for seed in range(50))
+    assert all(find_lines(residuals(seed), STRICT).size == 0 for seed in range(50))
 
 
 @pytest.mark.parametrize("turns", [0.0, 1.0])
@@ -28,7 +29,7 @@ def test_of_a_vibration_hardly_more_is_left_than_the_noise(turns: float) -> None
     share = np.arange(COUNT) / COUNT
     for seed, hertz in enumerate(np.linspace(8, 30, 12)):
         seen = residuals(seed, float(hertz), 0.004, turns)
-        cycles = lines(seen)
+        cycles = find_lines(seen, STRICT)
         columns = waves(cycles, share)
         left = seen - columns @ fitted(columns, seen)
         assert turns or np.abs(cycles - hertz * COUNT / RATE_HZ).min() < 0.05
@@ -40,10 +41,10 @@ def test_two_vibrations_that_are_near_each_other_are_told_apart() -> None:
     share, quiet = np.arange(COUNT) / COUNT, NOISE / 8
     for seed, apart_hz in enumerate(np.linspace(0.27, 0.47, 12)):
         seen = residuals(seed, 23.0, 0.001, 1.0, quiet) + residuals(100 + seed, 23.0 + float(apart_hz), 0.001, 0.0, 0.0)
-        columns = waves(lines(seen, apart_cycles=SAME), share)
+        columns = waves(find_lines(seen, STRICT), share)
         left = seen - columns @ fitted(columns, seen)
         assert left.std(axis=0).max() < 1.3 * quiet
 
 
 def test_readings_too_few_to_tell_a_line_have_none() -> None:
-    assert lines(residuals(1, 20.0, 0.1)[:40]).size == 0
+    assert find_lines(residuals(1, 20.0, 0.1)[:40], STRICT).size == 0

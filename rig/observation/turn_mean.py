@@ -1,0 +1,125 @@
+"""The mean of readings over a turn or an arc, and the mean of what the arm turned meanwhile, by the same weights.
+
+An even mean keeps of a vibration by how much its phase differs between both ends: 3 mrad/s at 8.5 Hz leave 20 µrad/s in
+six seconds, more than the noise of a good gyroscope does. What the encoders see of it is in both means alike, and does
+no harm. What they do not see is found in the readings as lines, and the weights leave nothing of these. The same
+weights then make the mean of the arm's rate: whatever they do to a ripple they do to both (`mean_weights`).
+
+What is left of the readings beside lines and rate is the noise, which is white more often than not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.mean_weights import even_groups, mean_weights
+from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
+from rig.observation.coloured_noise import MEMORIES
+from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, waves, wide
+from rig.observation.mean import Mean, rounding_left
+
+SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
+UNSEEN = LineSearch(slowest=5.0)
+SEEN = LineSearch(slowest=2.5, beats=0, most=5)
+
+
+@dataclass(frozen=True, slots=True)
+class SampledTurn:
+    """A turn or an arc as a sensor's n samples see it.
+
+    share (n,): which share of its time was over. rates_rad_s (n, 3): the flange's mean rate around each sample, as the
+    encoders have it. uneven_rad_s (n,): of that what is along the axis, less its mean over the turn by both ends.
+    passing (n, k): columns of what comes once, twice and so on in a turn, of an arc less their means. beats: those of
+    its lines, see `Revolution`. encoders_true: whether the encoders tell the turning within a turn, and not over whole
+    turns alone. complete: whether no sample is missing for long.
+    """
+
+    share: Array
+    rates_rad_s: Array
+    uneven_rad_s: Array
+    passing: Array
+    beats: int
+    encoders_true: bool
+    complete: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Lines that are taken out of a mean: `cycles` (k,) of each in the turn, the last `unseen` ones by no encoder.
+
+    What the encoders see of a slow ripple needs no line: it is `seen` (n, m) as one column, beside how it changes and
+    what else they tell, their noise above all. Columns (n, 0 or 1) of the `rate` are taken out of few samples, and of
+    those with a gap between: they do not meet a ripple evenly.
+    """
+
+    cycles: Array
+    unseen: int
+    seen: Array
+    rate: Array
+
+
+def turn_mean(readings: Array, resolution: float | Array, turn: SampledTurn) -> tuple[Mean, Array]:
+    """Return the mean of readings (n, 3) and its weights (n,), which are to make the mean of what turned as well.
+
+    resolution: the steps of the readings, one for all or of each axis.
+
+    A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation.
+    """
+    ones = even_groups(np.zeros(len(readings), dtype=np.intp), 1)
+    steady = np.column_stack([ones, turn.passing])
+    lines = _lines(readings, steady, turn)
+    shaking = waves(lines.cycles, turn.share, turn.beats)
+    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))[0]
+    columns = np.column_stack([steady, lines.rate, shaking, lines.seen])
+    columns = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
+    left = readings - columns @ coefficients
+    noise = noise_of(left, int(rank), resolution, BRIEF if lines.unseen else MEMORIES)
+    slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
+    changed = np.zeros(3)
+    if slow.any():
+        without = mean_weights(ones, np.column_stack([turn.passing, shaking[:, ~slow]]))[0]
+        uneven = np.column_stack([ones, turn.uneven_rad_s])
+        changed = (weights - without) @ (readings - uneven @ fitted(uneven, readings))
+    mean = Mean(
+        mean=weights @ readings,
+        variance=noise.in_a_mean * float(weights @ weights) + changed**2 + rounding_left(noise.scatter, resolution),
+        noise=np.sqrt(noise.scatter),
+        samples=len(readings),
+        freedom=noise.freedom,
+        cycles=lines.cycles,
+    )
+    return mean, weights
+
+
+def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
+    """Find what vibrates in readings (n, 3) beside steady columns (n, k) and what the encoders see.
+
+    Fast lines of the arm's rate are known to be in the readings, at the same frequency. What is left tells the others.
+    """
+    uneven = turn.uneven_rad_s[:, None]
+    none = uneven[:, :0]
+    if len(readings) < FEWEST:
+        return Lines(NONE, 0, none, uneven)
+    if not turn.complete:
+        known = np.column_stack([steady, uneven])
+        cycles = find_lines(readings - known @ fitted(known, readings), LineSearch(beats=turn.beats), share=turn.share)
+        return Lines(cycles, len(cycles), none, uneven)
+    along = uneven - steady @ fitted(steady, uneven)
+    left = readings - steady @ fitted(steady, readings)
+    if not turn.encoders_true:
+        cycles = find_lines(left, LineSearch(beats=turn.beats), share=turn.share)
+        return Lines(cycles, len(cycles), along, none)
+    heard = LineSearch(SEEN.stands_out, SEEN.slowest, SEEN.beats, SEEN.most, floor=median_power(left))
+    ripple = find_lines(along, heard, share=turn.share)
+    columns = waves(ripple, turn.share, SEEN.beats)
+    sizes = fitted(columns, along)
+    slow = np.repeat(ripple < SLOW, wide(SEEN.beats))
+    smooth = (columns[:, slow] @ sizes[slow])[:, 0]
+    seen = np.column_stack([smooth, np.gradient(smooth), along - columns @ sizes])
+    known = np.column_stack([steady, seen])
+    known = known / (np.linalg.norm(known, axis=0) + np.finfo(np.float64).tiny)
+    fast = ripple[ripple >= SLOW]
+    cycles = find_lines(readings - known @ fitted(known, readings), UNSEEN, fast, turn.share)
+    return Lines(cycles, len(cycles) - len(fast), seen, none)

@@ -1,0 +1,95 @@
+"""The mean of a turn's readings and that of its rate, of arms that ripple and vibrate by any order of the turn."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rig.estimation.arrays import Array
+from rig.observation.lines import BEATS, turning
+from rig.observation.mean import Mean
+from rig.observation.turn_mean import SampledTurn, turn_mean
+from support.drawn_ripple import Ripple, drawn_ripple
+
+AXIS = np.array([0.6, 0.0, 0.8])
+SPEED_RAD_S, RATE_HZ = 1.05, 200.0
+TURN_HZ = SPEED_RAD_S / (2 * np.pi)
+SCALE, BIAS_RAD_S, NOISE_RAD_S, STEP_RAD_S = 1.07, np.array([0.01, -0.02, 0.005]), 4.5e-4, 1e-5
+# these a scale factor was 12 to 42 standard uncertainties off by, where lines in the readings were fitted to the rate
+SLOW_BESIDE_FAST = [((6, 11, 75), 0.037), ((5, 68, 82), 0.082), ((5, 6, 9), 0.05)]
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """Readings (n, 3) of a turn, and the turn as the samples have it."""
+
+    readings: Array
+    turn: SampledTurn
+
+
+def sampled(ripple: Ripple, seed: int, *, complete: bool = True, encoders_true: bool = True) -> Sampled:
+    """Readings of a turn that begins and ends anywhere between two samples."""
+    rng = np.random.default_rng(seed)
+    count = int(RATE_HZ / TURN_HZ)
+    share: Array = (np.arange(count) + rng.uniform()) / (RATE_HZ / TURN_HZ)
+    size = SPEED_RAD_S * ripple.fraction * np.sqrt(2 / len(ripple.orders))
+    phases = rng.uniform(0, 2 * np.pi, len(ripple.orders))
+    uneven = size * np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases).sum(axis=1)
+    seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
+    rates = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
+    unseen = np.zeros((count, 3))
+    for hertz in ripple.unseen_hz:
+        wave = np.cos(2 * np.pi * hertz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
+        unseen += ripple.unseen_rad_s * np.sqrt(2 / len(ripple.unseen_hz)) * wave
+    readings = SCALE * (rates + unseen) + BIAS_RAD_S + NOISE_RAD_S * rng.standard_normal((count, 3))
+    turn = SampledTurn(
+        share=share,
+        rates_rad_s=rates,
+        uneven_rad_s=rates @ AXIS - SPEED_RAD_S,
+        passing=turning(2 * np.pi * share, 2 * BEATS),
+        beats=BEATS,
+        encoders_true=encoders_true,
+        complete=complete,
+    )
+    return Sampled(np.round(readings / STEP_RAD_S) * STEP_RAD_S, turn)
+
+
+def error(found: Mean, weights: Array, turn: SampledTurn) -> Array:
+    """(3,) of the mean reading beside what turned by the same weights, in standard deviations."""
+    off: Array = (found.mean - BIAS_RAD_S - SCALE * (weights @ turn.rates_rad_s)) / np.sqrt(found.variance)
+    return off
+
+
+@pytest.mark.parametrize(("orders", "fraction"), SLOW_BESIDE_FAST)
+def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(orders: tuple[int, ...], fraction: float) -> None:
+    ripple = Ripple(orders, fraction, unseen_rad_s=1e-3, unseen_hz=(1.7,), seen_rad_s=1e-3, seen_hz=0.9)
+    for seed in range(4):
+        case = sampled(ripple, seed)
+        found, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+        assert np.abs(error(found, weights, case.turn)).max() < 4.5
+        assert weights.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+def test_errors_are_as_large_as_is_stated_by_whatever_the_arm_ripples(thorough: bool) -> None:
+    """Of orders from 1 to 400, near each other, near the turn's own and near the ends of the band."""
+    found = []
+    for seed in range(1000 if thorough else 60):
+        ripple = drawn_ripple(np.random.default_rng([seed, 47]), TURN_HZ, [RATE_HZ])
+        case = sampled(ripple, seed)
+        mean, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+        found.append(error(mean, weights, case.turn))
+    off = np.array(found)
+    print(f"{len(off)} turns: RMS {np.sqrt(np.mean(off**2)):.3f}, largest {np.abs(off).max():.1f}")
+    assert 0.85 < np.sqrt(np.mean(off**2)) < 1.15
+    assert np.mean(np.abs(off) < 2) > 0.92
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_where_nothing_vibrates_unseen_the_mean_rate_is_that_of_a_turn(*, complete: bool) -> None:
+    """2π/T: exactly where the rate is taken out, and to the samples' ends of the turn where it turns evenly."""
+    ripple = Ripple((6, 11), 0.0 if complete else 0.05, unseen_rad_s=0.0, unseen_hz=(2.0,), seen_rad_s=0.0, seen_hz=1.0)
+    case = sampled(ripple, 1, complete=complete)
+    _, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+    assert float(weights @ case.turn.rates_rad_s @ AXIS) == pytest.approx(SPEED_RAD_S, rel=1e-12)
