@@ -10,6 +10,7 @@ import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.bias_drift import bias_drifts
+from rig.analysis.board_averages import board_averages
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
@@ -61,6 +62,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         return _elsewhere(runs, read, estimator)
     chosen = known_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs)
+    averages = [board_averages(name, recordings) for name in settings.to_calibrate] if settings.planned_sweeps else []
     if not recordings:
         raise Fault(
             "too_few_observations",
@@ -86,6 +88,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         onboard=swept.onboard,
         checks=(
             *swept.checks,
+            *(check for each in averages for check in each),
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
             *(check for each in of_kinds for check in each.checks),
