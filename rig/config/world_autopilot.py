@@ -41,6 +41,21 @@ class SimulatedAutopilotSection(Section):
     doubled: float = Field(
         default=0.0, ge=0, lt=1, description="fraction of messages that come twice", json_schema_extra=RATIO
     )
+    stolen: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="share of what it sends that another program reads, which has opened the same port",
+        json_schema_extra=RATIO,
+    )
+    provides_temperature: bool = Field(
+        default=True, description="whether its messages hold a temperature, or say that there is none"
+    )
+    mavlink_version: Literal[1, 2] = Field(
+        default=2,
+        description="version of the protocol that it sends; version 1 has no temperature of an IMU",
+        json_schema_extra=RATIO,
+    )
     slowest: float = Field(
         default=1.0,
         gt=0,

@@ -27,6 +27,13 @@ class SimulatedLinesSection(Section):
     lost_fraction: float = Field(
         default=0.0, ge=0, le=0.5, description="share of the samples that it does not print", json_schema_extra=RATIO
     )
+    stolen: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="share of what it prints that another program reads, which has opened the same port",
+        json_schema_extra=RATIO,
+    )
     bit_error_rate: float = Field(
         default=0.0, ge=0, le=0.01, description="share of wrong bits on the line", json_schema_extra=RATIO
     )
@@ -35,6 +42,26 @@ class SimulatedLinesSection(Section):
         description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
         json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
     )
+    trailing_separator: bool = Field(default=False, description="whether a separator stands behind the last column too")
+    texts: tuple[Annotated[str, Field(max_length=40)], ...] = Field(
+        default=(),
+        max_length=40,
+        description="what it prints in the columns `-`, from left to right, such as a date; left out, 0",
+        json_schema_extra={"usual": "none", "allowed": "at most 40 texts"},
+    )
+    colours: bool = Field(
+        default=False, description="whether codes for colours stand around a line, as of ESP-IDF's log"
+    )
+    temperature_text: str | None = Field(
+        default=None,
+        max_length=20,
+        description="what it prints for its temperature, such as `nan` or `-127.00`; left out, its temperature",
+        json_schema_extra={"usual": "its temperature", "allowed": "at most 20 characters"},
+    )
+    time_decimals: int = Field(
+        default=6, ge=0, le=9, description="decimals of its time, where that is in seconds", json_schema_extra=RATIO
+    )
+    time_in_single: bool = Field(default=False, description="whether its time is a number in single precision")
     prints: LinesSection | None = Field(
         default=None, description="what it prints in truth, for tests of what is refused; left out, as the section says"
     )

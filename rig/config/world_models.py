@@ -13,6 +13,7 @@ from rig.config.section import RATIO, Section, SensorName, Vector3
 from rig.config.servo_section import ServoSection
 from rig.config.stage_section import StageMountSection
 from rig.config.world_autopilot import SimulatedAutopilotSection
+from rig.config.world_faulty import SimulatedFaultySection
 from rig.config.world_hand import SimulatedHandSection
 from rig.config.world_lines import SimulatedLinesSection
 from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
@@ -437,6 +438,7 @@ class SimulatedSensorSection(Section):
         description="the autopilot it is in, of a `mavlink`; of several at one port the first says it",
     )
     lines: SimulatedLinesSection | None = Field(default=None, description="the device it is in, of `part: lines`")
+    faulty: SimulatedFaultySection = SimulatedFaultySection()
 
 
 class SimulatedPartSection(Section):

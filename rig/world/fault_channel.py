@@ -21,9 +21,9 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
-    autopilot_fault port lost doubled slowest armed deaf camera silent bit_error_rate host_baud   as above
+    autopilot_fault port lost doubled slowest armed deaf camera silent stolen bit_error_rate host_baud   as above
     autopilot_power port on
-    printer_fault sensor bit_error_rate lose stuck silent host_baud   of a device that prints lines, as above
+    printer_fault sensor bit_error_rate lose stuck silent stolen host_baud   of a device that prints lines, as above
     printer_power sensor on
     air temperature_c                           the air around the board, from now on, of a laboratory with `thermal`
     heater                                      which part of the time its pin is up, and how warm the board is
@@ -65,7 +65,7 @@ SHOWN = (
 )
 FAULTS = tuple(each.name for each in fields(Faults))
 KINDS = ("kvh", "autopilot", "printer")  # of instruments
-OF_LINE = {"bit_error_rate", "silent", "host_baud"}
+OF_LINE = {"bit_error_rate", "silent", "host_baud", "stolen"}
 
 
 class World(Protocol):

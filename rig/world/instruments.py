@@ -27,7 +27,7 @@ class Place(Protocol):
     """An instrument's place, and what stays there when it is switched off.
 
     `kind` is the word for it in requests; `pty` says that its port is to be a pseudo-terminal too. Of the bits on its
-    line the share `bit_error_rate` is wrong, to begin with.
+    line the share `bit_error_rate` is wrong, to begin with, and the share `stolen` is read by another program.
     """
 
     @property
@@ -36,6 +36,8 @@ class Place(Protocol):
     def pty(self) -> bool: ...
     @property
     def bit_error_rate(self) -> float: ...
+    @property
+    def stolen(self) -> float: ...
     @property
     def instrument(self) -> Instrument | None:
         """What stands there; None without power."""

@@ -64,7 +64,7 @@ class World:
             name: SerialLine(partial(getattr, place, "instrument"), section.seed) for name, place in places.items()
         }
         for name, line in self.instrument_lines.items():
-            line.bit_error_rate = places[name].bit_error_rate
+            line.bit_error_rate, line.stolen = places[name].bit_error_rate, places[name].stolen
         turning = self.laboratory.turning
         self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
         self.lines = (self.line, *self.instrument_lines.values(), *filter(None, [self.servo_line]))

@@ -26,6 +26,10 @@ SCALED = {26: 0, 116: 1, 129: 2}  # SCALED_IMU, SCALED_IMU2, SCALED_IMU3: which 
 RAW_IMU, HIGHRES_IMU, AUTOPILOT_VERSION = 27, 105, 148
 IMUS_FIRST = {**SCALED, RAW_IMU: 0, HIGHRES_IMU: 0}
 FASTEST_S = 1.0 / RATE_HZ
+HEAD_BYTES = 6  # of a message in MAVLink 1
+BAROMETER_S = 0.05  # between two readings of PX4's
+# HIGHRES_IMU_UPDATED_FLAGS: x y z of the accelerometer and of the gyroscope; temperature.
+UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 
 @dataclass(slots=True)
@@ -53,19 +57,24 @@ class SimulatedAutopilot:
         clock_ppm: float,
         on_for_s: float,
         armed: bool,
+        provides_temperature: bool = True,
+        mavlink_version: int = 2,
         seed: int,
         time_s: float,
     ) -> None:
         try:
+            from pymavlink.dialects.v10 import ardupilotmega as first_version
             from pymavlink.dialects.v20 import ardupilotmega
         except ImportError as error:
             raise missing_extra(error, "autopilot") from error
         self._mavlink: Any = ardupilotmega
+        self._sizes: Any = first_version.mavlink_map
         self._out = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
         self._in = ardupilotmega.MAVLink(None)
         self._in.robust_parsing = True
         self._firmware, self._imus, self.parameters = firmware, imus, parameters
-        self._baud = baud
+        self._baud, self._first_version = baud, mavlink_version == 1
+        self._provides_temperature, self._next_pressure_s = provides_temperature, 0.0
         self._uid, self.armed = bytes.fromhex(uid), armed
         self.faults = Faults()
         self._speed, self._began_s, self._on_for_s = 1.0 + 1e-6 * clock_ppm, time_s, on_for_s
@@ -127,16 +136,18 @@ class SimulatedAutopilot:
 
     def _send_imu(self, number: int, now_us: int) -> None:
         imu = self._imus[IMUS_FIRST[number]]
+        rate = imu.rate_to_send()
         px4 = self._firmware == "px4"
         time_us = imu.time_us if px4 else now_us
         if number == HIGHRES_IMU:
-            values = (*imu.force.tolist(), *imu.rate.tolist(), 0, 0, 0, 1013.0, 0, 0, imu.temperature_c + 3.0, 0x3F, 0)
+            celsius, flags = self._of_the_barometer(imu.temperature_c + 3.0)
+            values = (*imu.force.tolist(), *rate, 0, 0, 0, 1013.0, 0, 0, celsius, flags, 0)
             self._send(self._mavlink.MAVLink_highres_imu_message(time_us, *values))
             return
         # A float handed to an integer is cut toward zero.
         forces = [_int16(1000 * each / STANDARD_GRAVITY_M_S2) for each in imu.force]
-        rates = [_int16(1000 * each) for each in imu.rate]
-        centi = _int16(100 * imu.temperature_c)
+        rates = [_int16(1000 * each) for each in rate]
+        centi = (_int16(100 * imu.temperature_c) or 1) if self._provides_temperature else 0
         if number == RAW_IMU:
             message = self._mavlink.MAVLink_raw_imu_message(time_us, *forces, *rates, 0, 0, 0, 0, centi)
         else:
@@ -144,14 +155,33 @@ class SimulatedAutopilot:
             message = kind(time_us // 1000 % 2**32, *forces, *rates, 0, 0, 0, centi)
         self._send(message)
 
+    def _of_the_barometer(self, celsius: float) -> tuple[float, int]:
+        """Temperature, and the flags of the fields that are new: ArduPilot's is always, PX4's where it was read."""
+        if not self._provides_temperature:
+            return 0.0, UPDATED
+        own_s = self._steps / RATE_HZ
+        new = self._firmware == "ardupilot" or own_s >= self._next_pressure_s
+        if new:
+            self._next_pressure_s = own_s + BAROMETER_S
+        return celsius, UPDATED | TEMPERATURE_UPDATED * new
+
     def _send(self, message: Any) -> None:
-        data = message.pack(self._out)
+        data = self._as_first_version(message) if self._first_version else message.pack(self._out)
         self._out.seq = (self._out.seq + 1) % 256
         if self.faults.lost and self._random.random() < self.faults.lost:
             return
         self._sent += data
         if self.faults.doubled and self._random.random() < self.faults.doubled:
             self._sent += data
+
+    def _as_first_version(self, message: Any) -> bytes:
+        """The bytes of a message in MAVLink 1, whose payload ends before the fields that version 2 has added."""
+        size = self._sizes[message.get_msgId()].unpacker.size
+        begin, length, *rest = message.pack(self._out, force_mavlink1=True)[: HEAD_BYTES + size]
+        checked = bytes([min(length, size), *rest])
+        crc = self._mavlink.x25crc(checked)
+        crc.accumulate(bytes([message.crc_extra]))
+        return bytes([begin]) + checked + int(crc.crc).to_bytes(2, "little")
 
     # -- what it is told ---------------------------------------------------------------------------------------------
     def _obey(self, message: Any) -> None:
@@ -188,18 +218,20 @@ class SimulatedAutopilot:
                 self._mavlink.MAVLink_autopilot_version_message(0, version, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0, uid)
             )
             return ACCEPTED
-        if message.command != 511:
+        if message.command not in (511, 512):
             return UNSUPPORTED
         number, interval_us = int(message.param1), message.param2
         if number not in IMUS_FIRST or IMUS_FIRST[number] >= len(self._imus) or isnan(interval_us):
             return DENIED
         if number == RAW_IMU and self._firmware == "px4":
             return DENIED
-        if interval_us <= 0:  # never, or as often as it would by itself, which is never
+        if message.command == 512:
+            self._send_imu(number, round((self._on_for_s + self._steps / RATE_HZ) * 1e6))
+        elif interval_us <= 0:  # never, or as often as it would by itself, which is never
             self._intervals_s.pop(number, None)
-            return ACCEPTED
-        self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)
-        self._next_s[number] = self._steps / RATE_HZ
+        else:
+            self._intervals_s[number] = max(1e-6 * interval_us, FASTEST_S)
+            self._next_s[number] = self._steps / RATE_HZ
         return ACCEPTED
 
 

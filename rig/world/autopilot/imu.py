@@ -8,13 +8,16 @@ from numpy.typing import NDArray
 
 from firmware_host.emulator.accelerometer import Accelerometer
 from firmware_host.emulator.gyroscope import Gyroscope
+from rig.config.world_faulty import SimulatedFaultySection
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
 RATE_HZ = 400.0  # at which it is read: a quick main loop's
 AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz
 TURNS = {0: (), 2: ((2, 90),), 4: ((2, 180),), 6: ((2, 270),), 8: ((0, 180),), 12: ((1, 180),), 24: ((1, 90),)}
+FAULTLESS = SimulatedFaultySection()
 Vector = NDArray[np.float64]
 
 
@@ -57,9 +60,11 @@ class Imu:
         *,
         px4: bool,
         seed: np.random.SeedSequence,
+        faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
         self._place, self._parameters, self._px4 = place, parameters, px4
-        self._gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         assert truth.accelerometer is not None, "an autopilot's IMU always has one"
         self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
         self._low_passes = (LowPass(), LowPass())
@@ -74,6 +79,10 @@ class Imu:
             gyro = f"INS_GYR{nth}OFFS" if place else "INS_GYROFFS"
             stems = (f"{gyro}_{{}}", f"INS_ACC{nth}OFFS_{{}}", f"INS_ACC{nth}SCAL_{{}}")
         self._names = [[stem.format(axis) for axis in "XYZ"] for stem in stems]
+
+    def rate_to_send(self) -> list[float]:
+        """Return the rate (3,), rad/s, of the next message."""
+        return list(self._repeats.sent(self.rate.tolist()))
 
     def step(self, at_s: float, time_us: int) -> None:
         """Read it once at the virtual time, which is `time_us` by the autopilot's clock."""

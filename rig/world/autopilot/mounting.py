@@ -38,6 +38,11 @@ class AutopilotMount:
         """Whether a pseudo-terminal is wanted too."""
         return self.section.pty
 
+    @property
+    def stolen(self) -> float:
+        """Share of what it sends that another program reads."""
+        return self.section.stolen
+
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
         if self.instrument is not None:
@@ -52,6 +57,8 @@ class AutopilotMount:
             clock_ppm=section.clock_ppm,
             on_for_s=section.on_for_s,
             armed=section.armed,
+            provides_temperature=section.provides_temperature,
+            mavlink_version=section.mavlink_version,
             seed=self.world.seed,
             time_s=time_s,
         )
@@ -69,7 +76,8 @@ class AutopilotMount:
         of_another = [] if place in self.imus else [place]
         seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *of_another])
         px4 = self.section.firmware == "px4"
-        return Imu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed)
+        faulty = self.world.sensors[name].faulty
+        return Imu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed, faulty=faulty)
 
 
 def autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, AutopilotMount]:

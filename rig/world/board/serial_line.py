@@ -48,6 +48,7 @@ class SerialLine:
 
     `host_baud` is the host's baud rate where the transport does not tell (None: the same as the device's); a `silent`
     line loses everything both ways; of what the device sends, each bit is wrong with the probability `bit_error_rate`.
+    Another program that has opened the same port takes the rest of what came in a tick with the probability `stolen`.
     """
 
     def __init__(self, device: Callable[[], Device | None], seed: int = 0) -> None:
@@ -56,6 +57,7 @@ class SerialLine:
         self.host_baud: float | None = None
         self.silent = False
         self.bit_error_rate = 0.0
+        self.stolen = 0.0
         self.fresh = b""  # what the device has sent in the last tick, as the line carries it
 
     @property
@@ -67,6 +69,8 @@ class SerialLine:
     def tick(self) -> None:
         device = self._device()
         self.fresh = device.transmitted() if device is not None else b""
+        if self.stolen and self.fresh and self._random.random() < self.stolen:
+            self.fresh = self.fresh[: int(self._random.integers(len(self.fresh)))]
         if self.bit_error_rate and self.fresh:
             bits = np.unpackbits(np.frombuffer(self.fresh, np.uint8))
             self.fresh = np.packbits(bits ^ (self._random.random(len(bits)) < self.bit_error_rate)).tobytes()

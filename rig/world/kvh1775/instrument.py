@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
 from firmware_host.emulator.gyroscope import Gyroscope
 from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
+from rig.config.world_faulty import SimulatedFaultySection
 from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 from rig.world.kvh1775.memory import Memory
 
 INTERNAL_STEP_S = 1e-3  # at most, between two looks at the motion that a delta angle is summed of
 LINE_END = b"\r\n"
 LONGEST_COMMAND = 200
 PERFECT = MagnetometerTruth()
+FAULTLESS = SimulatedFaultySection()
 
 
 def no_field(time_s: float) -> Sequence[float]:
@@ -58,6 +61,7 @@ class Kvh1775:
         on_for_s: float,
         seed: np.random.SeedSequence,
         time_s: float,
+        faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
         self.faults = Faults()
         self._truth, self._motion_at, self._memory = truth, motion_at, memory
@@ -65,7 +69,8 @@ class Kvh1775:
         self._speed = 1.0 + 1e-6 * oscillator_ppm
         self._counted_from_s = time_s - on_for_s / self._speed
         self._felt: Sequence[float] = ()
-        self._gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
+        gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
+        self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
         self._magnetometer = Magnetometer(field_at, magnetometer, _another(seed))
         self._now_s = time_s
@@ -142,7 +147,7 @@ class Kvh1775:
         delta = memory["ROTFMT"] == "DELTA"
         self._felt = [total / self._steps_each for total in self._sum] if delta else cast(Sequence[float], self._before)
         self._sum = [0.0] * 6
-        rotation = np.array(self._gyroscope.read(at_s))
+        rotation = np.array(self._repeats.sent(self._gyroscope.read(at_s)))
         if delta:
             rotation /= float(memory["DR"])
         if memory["ROTUNITS"] == "DEG":

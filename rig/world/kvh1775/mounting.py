@@ -21,6 +21,7 @@ class Mount:
 
     kind: ClassVar[str] = "kvh"
     bit_error_rate: ClassVar[float] = 0.0
+    stolen: ClassVar[float] = 0.0
     name: str
     config: RigConfig
     world: WorldSection
@@ -54,6 +55,7 @@ class Mount:
             on_for_s=section.on_for_s,
             seed=np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(self.name)]),
             time_s=time_s,
+            faulty=simulated.faulty,
         )
 
     def switch_off(self) -> None:

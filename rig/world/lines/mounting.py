@@ -39,6 +39,11 @@ class PrinterMount:
         """Share of wrong bits on its line."""
         return self.section.bit_error_rate
 
+    @property
+    def stolen(self) -> float:
+        """Share of what it prints that another program reads."""
+        return self.section.stolen
+
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
         if self.instrument is not None:
@@ -63,6 +68,7 @@ class PrinterMount:
             baud_rate=float(baud),
             seed=np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(self.name)]),
             time_s=time_s,
+            faulty=simulated.faulty,
         )
 
     def switch_off(self) -> None:

@@ -15,8 +15,10 @@ from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelero
 from firmware_host.emulator.gyroscope import Gyroscope
 from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
 from rig.config.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
+from rig.config.world_faulty import SimulatedFaultySection
 from rig.config.world_lines import SimulatedLinesSection
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 
 BETWEEN = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 # What one of each unit is, in rad/s, m/s² and T; and of each unit of time in one second.
@@ -27,7 +29,9 @@ SIZES = {
 }  # fmt: skip
 IN_A_SECOND = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0}
 USUAL_DECIMALS = 5
+COLOURED = "\033[0;32m{}\033[0m"  # green, as ESP-IDF's log has what is of level I
 LINE_END = b"\r\n"
+FAULTLESS = SimulatedFaultySection()
 
 
 @dataclass(slots=True)
@@ -58,6 +62,7 @@ class Printer:
         baud_rate: float,
         seed: np.random.SeedSequence,
         time_s: float,
+        faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
         self.faults = Faults()
         self.baud_rate = baud_rate
@@ -66,7 +71,8 @@ class Printer:
         self._counted_from_s = time_s - section.on_for_s / self._speed
         self._step_s = 1.0 / rate_hz / self._speed
         self._began_s, self._samples, self._printed = time_s, 0, 0
-        self._gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)
+        self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)
         self._accelerometer = None
         if truth.accelerometer is not None:
             self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
@@ -107,7 +113,7 @@ class Printer:
     def _sampled(self, at_s: float) -> bytes:
         """The line of a sample."""
         prints = self._prints
-        rates = self._gyroscope.read(at_s)
+        rates = self._repeats.sent(self._gyroscope.read(at_s))
         values = {axis: _printed(each, prints.rate) for axis, each in zip(("gx", "gy", "gz"), rates, strict=True)}
         if self._accelerometer is not None:
             forces = self._accelerometer.read(at_s)
@@ -119,20 +125,23 @@ class Printer:
         told = prints.temperature
         celsius = self._gyroscope.temperature_c(at_s)
         decimals = 2 if told.decimals is None else told.decimals
-        values["temperature"] = f"{(celsius - told.offset_c) / told.scale:.{decimals}f}"
+        warm = f"{(celsius - told.offset_c) / told.scale:.{decimals}f}"
+        values["temperature"] = warm if self._section.temperature_text is None else self._section.temperature_text
         values["time"] = self._time(at_s)
         sequence = self._samples % prints.sequence_wrap if prints.sequence_wrap else self._samples
         values["sequence"] = str(sequence)
         values |= {name: f"{value:.{USUAL_DECIMALS}f}" for name, value in self._section.scalars.items()}
-        numbers = [values.get(name, "0") for name in prints.columns]
+        texts = iter(self._section.texts)
+        numbers = [next(texts, "0") if name == "-" else values.get(name, "0") for name in prints.columns]
         if prints.keys:
             text = ",".join(key + number for key, number in zip(prints.keys, numbers, strict=True))
         else:
-            text = BETWEEN[prints.separator].join(numbers)
-        text = prints.prefix + text
+            between = BETWEEN[prints.separator]
+            text = between.join(numbers) + between * self._section.trailing_separator
+        text = prints.prefix.replace("*", str(int(1e3 * at_s))) + text
         if prints.checksum == "nmea":
             text += f"*{reduce(xor, text.lstrip('$!').encode(), 0):02X}"
-        return text.encode() + LINE_END
+        return (COLOURED.format(text) if self._section.colours else text).encode() + LINE_END
 
     def _time(self, at_s: float) -> str:
         time = self._prints.time
@@ -140,7 +149,8 @@ class Printer:
             return "0"
         counted = (at_s - self._counted_from_s) * self._speed * IN_A_SECOND[time.unit]
         counted = fmod(counted, time.wrap) if time.wrap else counted
-        return f"{counted:.6f}" if time.unit == "s" else str(int(counted))
+        counted = float(np.float32(counted)) if self._section.time_in_single else counted
+        return f"{counted:.{self._section.time_decimals}f}" if time.unit == "s" else str(int(counted))
 
 
 def _printed(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:

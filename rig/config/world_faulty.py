@@ -1,0 +1,26 @@
+"""The section of what the electronics of a simulated sensor do wrong, of one that has a port of its own."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from rig.config.section import RATIO, Section
+
+
+class SimulatedFaultySection(Section):
+    """What the sensor's electronics do wrong with its rates, of a sensor with a port of its own."""
+
+    frozen_axis: Literal["x", "y", "z"] | None = Field(
+        default=None, description="axis whose rate stands still at what it was; left out, none"
+    )
+    frozen_from_s: float = Field(default=0.0, ge=0, le=1e6, description="time of the world from which it stands still")
+    repeated: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="share of the samples that hold rates which were sent before",
+        json_schema_extra=RATIO,
+    )
+    repeated_length: int = Field(
+        default=1, ge=1, le=1000, description="how many samples come again in a row", json_schema_extra=RATIO
+    )
