@@ -1,7 +1,7 @@
 """Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 
@@ -75,7 +75,7 @@ class AccelerometerResult:
     dwells: tuple[DwellReading, ...]
     sweeps: int
     held_out: HeldOut | None
-    temperature_c: float
+    temperature_c: float | None
 
     @property
     def correction_matrix(self) -> Array:
@@ -151,7 +151,7 @@ def _calibrated(
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
     end_of_scale = sensor.channel(ACCELERATION).range
     if settings.knows_accelerometers and known is not None and end_of_scale is not None:
-        sheet = sheet_of(known, name, sensor.part, end_of_scale)
+        sheet = replace(sheet_of(known, name, sensor.part, end_of_scale), temperature_words=sensor.temperature_words)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
@@ -196,7 +196,7 @@ def _calibrated(
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
-        temperature_c=temperature_c,
+        temperature_c=None if np.isnan(temperature_c) else temperature_c,
     )
 
 

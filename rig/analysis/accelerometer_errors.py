@@ -9,7 +9,6 @@ from rig.analysis.arm_patterns import Stood, arm_turns
 from rig.analysis.vector_inputs import since_first_s
 from rig.config.judged_by import OfSensor
 from rig.data.budget_entries import IN_U
-from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
@@ -20,6 +19,7 @@ from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.own_errors import (
     BIAS_OVER_TEMPERATURE,
     NONLINEARITY,
+    OF_THE_PART,
     SCALE_OVER_TEMPERATURE,
     from_their_mean,
     unseen_k,
@@ -31,7 +31,6 @@ from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 
-KNOWN = "what is known of the part"
 STANDARD = np.sqrt(3)  # a half-width is so many standard uncertainties
 MILLI_G = 1000  # µg
 
@@ -40,7 +39,7 @@ MILLI_G = 1000  # µg
 class Sheet:
     """What is stated of one accelerometer, or known of its part: half-widths, but for the least Allan deviation.
 
-    `nonlinearity_percent` of `over_g`, either way.
+    `nonlinearity_percent` of `over_g`, either way. `temperature_words` are as of `KnownSensor`.
     """
 
     nonlinearity_percent: float
@@ -48,6 +47,7 @@ class Sheet:
     bias_mg_k: float
     scale_ppm_k: float
     bias_instability_ug: float
+    temperature_words: str = ""
 
     @property
     def even_s2_m(self) -> float:
@@ -141,7 +141,7 @@ def with_errors(
     settings: RunSettings,
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
-    own = errors_of(sheet, pieces, sensor.channel(TEMPERATURE).resolution, second_order=settings.second_order)
+    own = errors_of(sheet, pieces, sensor.unseen_change_k, second_order=settings.second_order)
     if not settings.expects_few_disturbed:
         own = replace(own, disturbed_odds=len(pieces) / (len(pieces) + 1), turning_odds=1 / (len(pieces) + 1))
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
@@ -156,18 +156,19 @@ def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -
     wandered, flickered = (
         spread.response @ each @ spread.response.T for each in (wandering(movement), flickering(movement))
     )
+    warm = "; ".join(filter(None, (OF_THE_PART, sheet.temperature_words)))
     by_sheet = {
-        BIAS_OVER_TEMPERATURE: (sheet.bias_mg_k, "mg/K", bias_warming(movement)),
-        SCALE_OVER_TEMPERATURE: (sheet.scale_ppm_k, "ppm/K", scale_warming(theta, movement)),
-        NONLINEARITY: (sheet.nonlinearity_percent, f"% of {sheet.over_g:.3g} g", bending(theta, movement)),
+        BIAS_OVER_TEMPERATURE: (sheet.bias_mg_k, "mg/K", warm, bias_warming(movement)),
+        SCALE_OVER_TEMPERATURE: (sheet.scale_ppm_k, "ppm/K", warm, scale_warming(theta, movement)),
+        NONLINEARITY: (sheet.nonlinearity_percent, f"% of {sheet.over_g:.3g} g", OF_THE_PART, bending(theta, movement)),
     }
     stability = f"least Allan deviation: {sheet.bias_instability_ug:.3g} µg"
     lines = [
         Contributor(WANDERING, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, wandered),
         Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flickered),
         *(
-            Contributor(name, "B", "rectangular", half_width, unit, KNOWN, np.inf, spread.of(patterns))
-            for name, (half_width, unit, patterns) in by_sheet.items()
+            Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread.of(patterns))
+            for name, (half_width, unit, source, patterns) in by_sheet.items()
         ),
     ]
     own = np.sum([each.covariance for each in lines], axis=0)

@@ -21,7 +21,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
-from rig.estimation.own_errors import KnownSensor, own_errors
+from rig.estimation.own_errors import KnownSensor, own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.arm_motion import ArmMotion
 
@@ -157,7 +157,11 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
             np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
         ]
     )
-    of_the_sensor = [_curved(pieces.stretches, matrix, known.curve), *_of_temperature(pieces, matrix, known)]
+    of_the_sensor = [
+        _curved(pieces.stretches, matrix, known.curve),
+        *_of_temperature(pieces, matrix, known),
+        *_of_rounding(pieces),
+    ]
     found = np.concatenate([of_the_arm @ matrix.T, *of_the_sensor])
     return np.asarray(found[found.any(axis=(1, 2))], dtype=np.float64)
 
@@ -314,3 +318,9 @@ def _of_temperature(pieces: Pieces, matrix: Array, known: Allowed) -> list[Array
     warm = replace(known.sensor, temperature_c=np.interp(inside, known.at_s[order], known.sensor.temperature_c[order]))
     turns = np.where((pieces.sweep == REST)[:, None], 0.0, pieces.rates_rad_s)
     return [each.patterns / np.sqrt(3) for each in own_errors(warm, matrix, turns, pieces.times_s, ())]
+
+
+def _of_rounding(pieces: Pieces) -> list[Array]:
+    """Patterns of one standard deviation of what rounding does to pieces alike."""
+    rounded = rounding_errors(pieces.means_rad_s, pieces.roundings_rad_s, pieces.variances_rad2_s2)
+    return [each.patterns / np.sqrt(3) for each in rounded]

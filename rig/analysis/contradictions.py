@@ -12,10 +12,11 @@ from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import consistency
 from rig.analysis.cut_recording import cut
+from rig.analysis.frozen_axis import longest_frozen
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.over_temperature import taken_to_reference
-from rig.analysis.readings import judge_readings
+from rig.analysis.readings import digits_of, judge_readings
 from rig.analysis.reference_contradictions import (
     DISTURBED_SWEEP,
     ReadInReference,
@@ -85,13 +86,20 @@ def contradictions(
             known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
             allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
-        gyroscope = recordings[0].run.sensors[name].channel(RATE)
+        sensor = recordings[0].run.sensors[name]
+        gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *named[sweep], sweep=sweep) for sweep in sorted(named)]
         checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
-        usual, has_bits = np.median if settings.holds_all_kinds else np.min, gyroscope.step is None
-        of_readings = judge_readings(counts, pieces.windows, rate, usual, has_bits=has_bits)
+        of_readings = judge_readings(
+            counts,
+            pieces.windows,
+            rate,
+            np.median if settings.holds_all_kinds else np.min,
+            digits=digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
+            frozen=max(longest_frozen(recording, name) for recording in recordings),
+        )
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
         if surroundings is not None and settings.checked_by_model:
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)

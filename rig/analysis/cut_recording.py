@@ -16,12 +16,12 @@ from rig.data.quantity import RATE
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.mean_weights import even_groups, mean_weights
+from rig.estimation.rounding import Steps, rounding_left
 from rig.estimation.vector_fit import Explained
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
 from rig.observation.lines import NONE, LineSearch, find_lines, fitted, swings, waves
-from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered_weights import noise_at_zero
@@ -93,7 +93,8 @@ class Pieces:
     `sweep` (N,) is the place of the revolution, −1 for a rest; `place` (N,) runs from −1 in its first part to 1 in its
     last; `means_rad_s`, `variances_rad2_s2` (N, 3); `rates_rad_s` (N, 3) of the flange, `pull_m_s2` (N, 3) what is
     felt as gravity, in its frame, `attitudes` (N, 3, 3) from the base into it; `speed_std` (N,) relative; `times_s`
-    (N, 2) from start to end on the clock of the first recording, `stretches` on that of their own.
+    (N, 2) from start to end on the clock of the first recording, `stretches` on that of their own. `roundings_rad_s`
+    (N, 3) is the standard uncertainty that rounding leaves in each mean.
     """
 
     sweep: NDArray[np.intp]
@@ -107,6 +108,7 @@ class Pieces:
     times_s: Array
     stretches: tuple[Stretch, ...]
     windows: tuple[Window, ...]
+    roundings_rad_s: Array | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,7 @@ class _Piece:
     place: float
     mean_rad_s: Array
     variance_rad2_s2: Array
+    rounding_rad2_s2: Array
     rate_rad_s: Array
     gravity_m_s2: Array
     attitude: Array
@@ -165,6 +168,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
         times_s=np.array(times_s),
         stretches=tuple(piece.stretch for piece in pieces),
         windows=tuple(window for window, _ in found),
+        roundings_rad_s=np.sqrt([piece.rounding_rad2_s2 for piece in pieces]),
     )
 
 
@@ -219,14 +223,19 @@ def _cut_turn(
     vibration = np.column_stack([rate @ axis, motion.rate(parted.time_s, 1) @ axis])
     residual, vibration = (each - parted.groups @ (parted.averages @ each) for each in (readings, vibration))
     shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
-    noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
-    count = stream.sensor.channel(RATE).unit_per_count
-    means = _Means(weights, readings, weights @ rate, noise, average.noise_rad_s**2)
-    window = Window(
-        sweep, _counts(stream, parted.inside), (residual - shaken) / count, np.sqrt(np.mean(shaken**2, axis=0)) / count
+    left = residual - shaken
+    left_beside_lines = left - lines @ fitted(lines, left)
+    means = _Means(
+        weights,
+        readings,
+        smooth_rad_s=readings - left_beside_lines,
+        rates_rad_s=weights @ rate,
+        noise_rad2_s2=average.noise_rad2_s2 * average.samples,
+        scatter_rad2_s2=average.noise_rad_s**2,
     )
+    window = _window(stream, parted.inside, sweep, residual=left, vibration=np.sqrt(np.mean(shaken**2, axis=0)))
     speed_std = turn.speed_std_rad_s / turn.speed_rad_s
-    return window, _pieces(parted, means, motion, site, count, sweep=sweep, speed_std=speed_std)
+    return window, _pieces(parted, means, motion, site, stream.steps, sweep=sweep, speed_std=speed_std)
 
 
 def _cut_rest(
@@ -236,7 +245,6 @@ def _cut_rest(
     inside = between(stream, average.start_s, average.end_s)
     parted = _parted(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), parts)
     readings = stream.readings_rad_s[parted.inside][parted.used]
-    count = stream.sensor.channel(RATE).unit_per_count
     share = (parted.time_s - average.start_s) / average.duration_s
     cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share) if finds_lines else NONE
     lines = waves(cycles, share, AT_REST.beats)
@@ -245,48 +253,58 @@ def _cut_rest(
     beside = readings - parted.groups @ (weights @ readings)
     left = beside - lines @ fitted(lines, beside)
     free = max(len(left) - len(parted.enough) - lines.shape[1], 1)
-    scatter = np.maximum(np.sum(left**2, axis=0) / free, count**2 / 12)
+    scatter = np.maximum(np.sum(left**2, axis=0) / free, stream.steps.variance)
     noise = scatter * np.array([widening(axis) for axis in left.T])
     if len(cycles):
-        at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
+        at_zero = np.maximum(noise_at_zero(left), stream.steps.variance)
         noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
-    means = _Means(weights, readings, np.zeros((len(weights), 3)), noise, scatter)
+    means = _Means(
+        weights,
+        readings,
+        smooth_rad_s=readings - left,
+        rates_rad_s=np.zeros((len(weights), 3)),
+        noise_rad2_s2=noise,
+        scatter_rad2_s2=scatter,
+    )
     swing_rad2 = swings(residual, lines, cycles / average.duration_s)
-    window = Window(REST, _counts(stream, parted.inside), left / count, np.zeros(3), swing_rad2)
-    return window, _pieces(parted, means, motion, site, count, sweep=REST, speed_std=0.0)
+    window = _window(stream, parted.inside, REST, residual=left, vibration=np.zeros(3), swing_rad2=swing_rad2)
+    return window, _pieces(parted, means, motion, site, stream.steps, sweep=REST, speed_std=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class _Means:
     """The means of readings (n, 3) in p parts by `weights` (p, n), and the flange's rates (p, 3) by the same.
 
-    One reading has the variance `noise_rad2_s2` (3,) as it counts in a mean, and `scatter_rad2_s2` (3,) in all.
+    `smooth_rad_s` (n, 3) is what of the readings is no noise. One reading has the variance `noise_rad2_s2` (3,) as it
+    counts in a mean, and `scatter_rad2_s2` (3,) in all.
     """
 
     weights: Array
     readings_rad_s: Array
+    smooth_rad_s: Array
     rates_rad_s: Array
     noise_rad2_s2: Array
     scatter_rad2_s2: Array
 
 
 def _pieces(
-    parted: _Parted, means: _Means, motion: ArmMotion, site: Site, count: float, *, sweep: int, speed_std: float
+    parted: _Parted, means: _Means, motion: ArmMotion, site: Site, steps: Steps, *, sweep: int, speed_std: float
 ) -> list[_Piece]:
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     read = means.weights @ means.readings_rad_s
-    rounding = rounding_left(means.scatter_rad2_s2, count)
     last, pieces = len(means.weights) - 1, []
     for each in parted.enough:
         start_s, end_s = parted.ends_s[each], parted.ends_s[each + 1]
         attitude = motion.attitude(start_s, end_s)
-        own = means.weights[each]
+        own, inside = means.weights[each], parted.groups[:, each] > 0
+        rounding = rounding_left(means.readings_rad_s[inside], steps, means.smooth_rad_s[inside], means.scatter_rad2_s2)
         pieces.append(
             _Piece(
                 sweep=sweep,
                 place=2 * each / last - 1 if last else 0.0,
                 mean_rad_s=read[each],
                 variance_rad2_s2=means.noise_rad2_s2 * float(own @ own) + rounding,
+                rounding_rad2_s2=rounding,
                 rate_rad_s=means.rates_rad_s[each] + attitude @ earth,
                 gravity_m_s2=attitude @ site.down_m_s2,
                 attitude=attitude,
@@ -297,6 +315,17 @@ def _pieces(
     return pieces
 
 
-def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:
-    counts: NDArray[np.int64] = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.int64)
-    return counts
+def _window(
+    stream: Stream,
+    inside: slice,
+    sweep: int,
+    *,
+    residual: Array,
+    vibration: Array,
+    swing_rad2: Array | None = None,
+) -> Window:
+    """The window of samples inside; `residual` (m, 3) and the RMS of `vibration` (3,) in rad/s."""
+    gyroscope = stream.sensor.channel(RATE)
+    counts, count = gyroscope.counts(stream.raw)[inside].astype(np.int64), gyroscope.unit_per_count
+    swing = np.zeros(3) if swing_rad2 is None else swing_rad2
+    return Window(sweep, counts, residual / count, vibration / count, swing)

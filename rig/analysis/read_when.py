@@ -40,11 +40,11 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """Readings of one window, which is on the clock of the first recording; how many, and how warm it was."""
+    """Readings of one window, which is on the clock of the first recording; how many, and how warm it was, or NaN."""
 
     window: Window
     weight: float
-    temperature_c: float | None
+    temperature_c: float
 
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
@@ -78,7 +78,7 @@ def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterab
         for each in dwelt(recording.run)
         if each.dwell.index in wanted
     }
-    return _when(recordings, name, [_Read(each, each.end_s - each.start_s, None) for each in windows.values()])
+    return _when(recordings, name, [_Read(each, each.end_s - each.start_s, float("nan")) for each in windows.values()])
 
 
 def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
@@ -104,7 +104,7 @@ def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -
 
     middles = [(each.window.start_s + each.window.end_s) / 2 for each in read]
     stated = recordings[0].run.sensors[name].temperature_stated
-    warm = [each.temperature_c for each in read if each.temperature_c is not None]
+    warm = [each.temperature_c for each in read if np.isfinite(each.temperature_c)]
     return When(
         utc(min(each.window.start_s for each in read)),
         utc(max(each.window.end_s for each in read)),

@@ -1,17 +1,22 @@
 """Whether readings are what a converter makes of a noisy quantity: their bits, their range, their repetitions. Pure.
 
-Noise above one count sets every low bit as often as not, has no gap and no heap at an end of its range, no run of equal
-readings and no two stretches alike. Where the noise is below a count none of this can be said, and nothing is.
+Noise above one step sets every low bit as often as not, has no gap and no heap at an end of its range, no run of equal
+readings and no two stretches alike. Where the noise is below a step none of this can be said, and nothing is. A step is
+that of the source: a count of a converter, a unit of a message that holds whole numbers, the last digit of a line.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.cut_recording import Window
+from rig.data.quantity import Quantity
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.coloured_noise import innovations
 from rig.observation.steps_that_count import SPIKE
 
@@ -19,8 +24,8 @@ Statistics = dict[str, tuple[float, float]]
 Usual = Callable[..., Any]  # `np.median`, `np.min`
 
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
-LONGEST_RUN = 25  # equal readings of one axis: at one count of noise every fourth reading equals the one before
-STRETCH = 8  # readings on three axes, some 50 bits at one count of noise
+LONGEST_RUN = 25  # equal readings of one axis: at one step of noise every fourth reading equals the one before
+STRETCH = 8  # readings on three axes, some 50 bits at one step of noise
 MEMORY = 12  # readings
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
@@ -29,6 +34,37 @@ SINGLE = 21  # bits that a number in single precision sets as often as not; its 
 FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
 VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
+LEAST_TO_SKEW = 0.7  # steps of noise: less falls on so few numbers that a mean between two of them makes it skewed
+BETWEEN_COUNTS = 1.5  # counts: readings that are farther apart are not a converter's
+
+
+@dataclass(frozen=True, slots=True)
+class Digits:
+    """What recorded numbers of a source are: the `steps` of counts in which they come, and whether they have bits."""
+
+    has_bits: bool
+    steps: Steps
+
+    @property
+    def step_counts(self) -> Array:
+        """(3,) how many counts neighbouring numbers are apart, at most."""
+        return self.steps.units * (2 if self.steps.cut else 1)
+
+
+COUNTS = Digits(True, Steps(1.0))
+
+
+def digits_of(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
+    """Return what the numbers of a sensor's quantity are, by all its samples (n,) of each recording.
+
+    A board records the counts of the part's converter, whatever they are. What other sources send they have calculated
+    or printed: where that comes in steps of several recorded counts, these have no bits to judge.
+    """
+    channel = sensor.channel(quantity)
+    steps = channel.steps(np.concatenate([channel.values(each) for each in samples]), trusts_counts=sensor.on_board)
+    counts = replace(steps, unit=np.maximum(steps.units / channel.unit_per_count, 1.0))
+    has_bits = not steps.cut and (sensor.on_board or bool(counts.units.max() <= BETWEEN_COUNTS))
+    return Digits(has_bits, counts)
 
 
 def judge_readings(
@@ -37,13 +73,14 @@ def judge_readings(
     rate: float,
     usual: Usual = np.median,
     *,
-    has_bits: bool = True,
+    digits: Digits = COUNTS,
+    frozen: int = 0,
 ) -> Statistics:
     """Every check's statistic and limit by its name, from all readings (n, 3) of each recording and from the windows.
 
     `rate` is that of false alarms for each, where it is not far smaller. The noise is the `usual` one of the windows,
-    the median: one in which an axis stands still does not make it a sensor without noise. Counts that are finer than
-    what was sent have no bits to judge, `has_bits`.
+    the median: one in which an axis stands still does not make it a sensor without noise. `frozen` is the longest run
+    of equal readings of an axis that moved meanwhile.
     """
     from scipy.special import ndtri
 
@@ -51,15 +88,19 @@ def judge_readings(
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [_noise(window.counts) for window in at_rest]
     noise = np.asarray(usual(noises, axis=0), dtype=np.float64)
-    spikes, of_a_bit = _spikes(windows)
+    steps_of_noise = noise / digits.step_counts
+    noisy = steps_of_noise >= 1
+    spikes, of_a_bit = _spikes(windows, digits.step_counts)
     found = {"spikes": (spikes, SPIKE)}
-    if has_bits:
+    if digits.has_bits:
         stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
         found = {"stuck_bit": (float(stuck), 0.0), **found}
-    if any(window.sweep < 0 for window in windows):
-        found["skewed_noise"] = _skewness(at_rest, sure)
-    if noise.min() >= 1:
-        found["stuck_axis"] = max(map(_longest_run, counts)), LONGEST_RUN
+    telling = steps_of_noise >= LEAST_TO_SKEW
+    if any(window.sweep < 0 for window in windows) and telling.any():
+        found["skewed_noise"] = _skewness(at_rest, telling, sure)
+    runs = [_longest_run(each[:, noisy]) for each in counts]
+    found["stuck_axis"] = float(max(frozen, *runs)), LONGEST_RUN
+    if noisy.all():
         found["repeated_readings"] = sum(map(_repeated, counts)), 0.0
         turning = [window for window in windows if window.sweep >= 0] or windows
         found["clipping"] = _heaped(np.concatenate([each.counts for each in turning]), sure), 0.0
@@ -106,13 +147,17 @@ def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
     return uneven
 
 
-def _spikes(windows: Sequence[Window]) -> tuple[float, int]:
-    """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such."""
+def _spikes(windows: Sequence[Window], step_counts: Array) -> tuple[float, int]:
+    """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such.
+
+    The noise is half a step at least.
+    """
+    half = step_counts / 2
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
     offs = [window.residual_counts - np.median(window.residual_counts, axis=0) for window in windows]
-    noises = [np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5) for off in offs]
+    noises = [np.maximum(1.4826 * np.median(np.abs(off), axis=0), half) for off in offs]
     telling = [noise for off, noise in zip(offs, noises, strict=True) if len(off) >= FEWEST_OF_NOISE]
-    least = np.min(telling or [np.full(3, 0.5)], axis=0)  # a short rest, as of an interrupted run, tells too little
+    least = np.min(telling or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
     for window, off, own in zip(windows, offs, noises, strict=True):
         noise = np.maximum(own, least)
         deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
@@ -134,8 +179,8 @@ def _one_bit(powers: Array) -> bool:
     return bool(which[most] >= 0 and often[most] >= ONE_BIT * len(powers))
 
 
-def _skewness(windows: Sequence[Window], sure: float) -> tuple[float, float]:
-    """The largest skewness of an axis' noise, which a bit that is now and then wrong makes, and what is allowed.
+def _skewness(windows: Sequence[Window], axes: NDArray[np.bool_], sure: float) -> tuple[float, float]:
+    """The largest skewness of the noise of such axes (3,), which a bit that is now and then wrong makes, and a limit.
 
     At rest: the arm's vibration need not be even.
     """
@@ -144,7 +189,7 @@ def _skewness(windows: Sequence[Window], sure: float) -> tuple[float, float]:
     noise -= noise.mean(axis=0)
     spread = np.sqrt(np.maximum(np.mean(noise**2, axis=0), 1e-12))  # an axis may stand still
     skewness = np.mean((noise / spread) ** 3, axis=0)  # by hand: scipy.stats takes half a second to import
-    return float(np.max(np.abs(skewness))), max(SKEWNESS, sure * float(np.sqrt(6 / len(noise))))
+    return float(np.max(np.abs(skewness[axes]))), max(SKEWNESS, sure * float(np.sqrt(6 / len(noise))))
 
 
 def _longest_run(counts: NDArray[np.int64]) -> int:

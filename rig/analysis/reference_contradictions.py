@@ -11,7 +11,7 @@ from rig.analysis.accelerometer_errors import pieces_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.cut_recording import Window
 from rig.analysis.magnetic_field import MagnetometerResult
-from rig.analysis.readings import judge_readings
+from rig.analysis.readings import COUNTS, Digits, digits_of, judge_readings
 from rig.analysis.reference_budgets import drift_patterns, lag_pattern
 from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_readings import (
@@ -52,7 +52,7 @@ class ReadInReference:
     """One sensor's readings: `counts` (n, 3) of each recording, the windows and dwells cut from them, and the model.
 
     `pieces` are the dwells and sweeps of `read`, in its order; `flicker_counts` is the least Allan deviation of the
-    bias, by which the halves of a dwell differ beside their noise. `has_bits`: see `judge_readings`.
+    bias, by which the halves of a dwell differ beside their noise. `digits`: see `judge_readings`.
     """
 
     counts: Sequence[NDArray[np.int64]]
@@ -61,7 +61,7 @@ class ReadInReference:
     read: Read
     pieces: Sequence[Place]
     flicker_counts: float = 0.0
-    has_bits: bool = True
+    digits: Digits = COUNTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def of_accelerometer(
     off_rad = solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(sensor.mounting), off_rad)
     return ReadInReference(
-        has_bits=channel.step is None,
+        digits=digits_of(sensor, ACCELERATION, [recording.run.samples[name] for recording in recordings]),
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
         sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
@@ -125,6 +125,7 @@ def of_magnetometer(
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, mounting, solution.attitude_std_rad)
     of_arm = arm_patterns(theta, movement, [Stood(each.q_rad) for each in dwells], arm)
     return ReadInReference(
+        digits=digits_of(result.sensor, FIELD, [recording.run.samples[name] for recording in recordings]),
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
         sweeps=(),
@@ -147,7 +148,7 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
     windows = [*resting(held.dwells), *held.sweeps]
     statistics = {
         **found.statistics,
-        **knocked(held.dwells, held.flicker_counts, rate),
-        **judge_readings(held.counts, windows, rate, has_bits=held.has_bits),
+        **knocked(held.dwells, held.flicker_counts, rate, held.digits.steps),
+        **judge_readings(held.counts, windows, rate, digits=held.digits),
     }
     return ReferenceStatistics(named or [(worst, found.piece)], statistics, found.told_from)

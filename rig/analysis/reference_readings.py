@@ -14,6 +14,7 @@ from rig.analysis.cut_recording import Window as Read
 from rig.analysis.suspicion import Statistic
 from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Stream, between
 from rig.observation.field import dwelt_field
@@ -87,11 +88,11 @@ def resting(dwells: Sequence[Dwelt]) -> list[Read]:
     return [Read(-1, dwell.counts, dwell.counts - dwell.counts.mean(axis=0), np.zeros(3)) for dwell in dwells]
 
 
-def knocked(dwells: Sequence[Dwelt], flicker_counts: float, rate: float) -> Mapping[str, Statistic]:
+def knocked(dwells: Sequence[Dwelt], flicker_counts: float, rate: float, steps: Steps) -> Mapping[str, Statistic]:
     """How much the halves of a dwell differ where they differ most, as χ² of three axes; nothing of short dwells.
 
     The limit is that of F: how readings scatter is found from those of the dwell. A bias that flickers by an Allan
-    deviation of `flicker_counts` makes the halves differ by √2 times as much.
+    deviation of `flicker_counts` makes the halves differ by √2 times as much. The counts come in these steps.
     """
     from scipy.special import fdtri
 
@@ -100,14 +101,14 @@ def knocked(dwells: Sequence[Dwelt], flicker_counts: float, rate: float) -> Mapp
         return {}
     freedom = min(len(dwell.counts) for dwell in told) - 2
     limit = 3 * float(fdtri(3, freedom, 1 - rate / len(told)))
-    return {"knocked_dwell": (max(_apart(each, flicker_counts) for each in told), limit)}
+    return {"knocked_dwell": (max(_apart(each, flicker_counts, steps) for each in told), limit)}
 
 
-def _apart(dwell: Dwelt, flicker_counts: float) -> float:
+def _apart(dwell: Dwelt, flicker_counts: float, steps: Steps) -> float:
     halves = Window(dwell.window.start_s, dwell.middle_s), Window(dwell.middle_s, dwell.window.end_s)
     early, means = dwell.time_s < dwell.middle_s, []
     for half, inside in zip(halves, (early, ~early), strict=True):
-        means.append(mean_at_rest(dwell.counts[inside].astype(np.float64), dwell.time_s[inside], half, 1.0)[0])
+        means.append(mean_at_rest(dwell.counts[inside].astype(np.float64), dwell.time_s[inside], half, steps)[0])
     first, last = means
     return float(np.sum((last.mean - first.mean) ** 2 / (first.variance + last.variance + 2 * flicker_counts**2)))
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
-from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
@@ -93,6 +92,7 @@ def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=by_axis(average.freedom for average in averages) if surroundings.counts_freedom else np.inf,
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
+        roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
 
 
@@ -101,7 +101,8 @@ def _sensor_of(
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
     of = name, sensor.part, sensor.range_rad_s
-    return known_sensor(surroundings.uncertainty, of, temperature_c, sensor.channel(TEMPERATURE).resolution)
+    known = known_sensor(surroundings.uncertainty, of, temperature_c, sensor.unseen_change_k)
+    return replace(known, temperature_words=sensor.temperature_words)
 
 
 def known_sensor(

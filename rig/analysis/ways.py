@@ -17,6 +17,7 @@ from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import rounding_left
 from rig.estimation.vector_fit import Explained
 from rig.motion.geometry import flange_pose
 from rig.observation.arm_motion import ArmMotion
@@ -53,10 +54,14 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     ]
     if not found:
         return pieces
-    density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
-    means, rates, attitudes, pulls = [], [], [], []
+    of_noise = pieces.variances_rad2_s2 - np.square(pieces.roundings_rad_s)
+    density = np.median(of_noise * np.diff(pieces.times_s), axis=0)
+    means, rates, attitudes, pulls, roundings = [], [], [], [], []
     for way, stream, _, settings, site in found:
-        readings = stream.readings_rad_s[between(stream, way.start_s, way.end_s)]
+        inside = between(stream, way.start_s, way.end_s)
+        readings = stream.readings_rad_s[inside]
+        moving = way.motion.rate(stream.time_s[inside]) @ explained.solution.matrix.T
+        roundings.append(rounding_left(readings, stream.steps, moving, stream.steps.variance))
         attitude = way.motion.attitude(way.start_s, way.end_s)
         means.append(readings.mean(axis=0))
         rates.append(way.motion.mean_rate(way.start_s, way.end_s) + attitude @ explained.seen.earth_rate_rad_s)
@@ -70,7 +75,12 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         sweep=np.concatenate([pieces.sweep, REST - 1 - np.arange(count)]),
         place=np.concatenate([pieces.place, np.zeros(count)]),
         means_rad_s=np.concatenate([pieces.means_rad_s, means]),
-        variances_rad2_s2=np.concatenate([pieces.variances_rad2_s2, density / lasting_s + swing_rad2 / lasting_s**2]),
+        variances_rad2_s2=np.concatenate(
+            [pieces.variances_rad2_s2, density / lasting_s + swing_rad2 / lasting_s**2 + roundings]
+        ),
+        roundings_rad_s=np.concatenate(
+            [np.broadcast_to(pieces.roundings_rad_s, pieces.means_rad_s.shape), np.sqrt(roundings)]
+        ),
         rates_rad_s=np.concatenate([pieces.rates_rad_s, rates]),
         pull_m_s2=np.concatenate([pieces.pull_m_s2, pulls]),
         attitudes=np.concatenate([pieces.attitudes, attitudes]),

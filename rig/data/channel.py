@@ -16,9 +16,11 @@ from rig.data.checked import Finite, Positive
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE, Quantity, Scalar
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps, cut_steps, found_steps
 
 ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]
 MAX_CHANNELS: Final = 16
+MOST_OF_A_CONVERTER: Final = 1 << 26  # counts to the end of the scale: no converter of an inertial sensor has more
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +54,19 @@ class Channel:
         """The step between neighbouring readings in the quantity's unit; 0 of numbers that are no counts."""
         return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
 
-    def resolution_of(self, readings: Array) -> float | Array:
-        """The step between readings (n, 3) like these: of numbers that were cut (3,), for about zero it is another.
+    @property
+    def is_fine(self) -> bool:
+        """Whether a count is no step of the source's, but far finer, so that a count may hold any number of it."""
+        return self.full_scale_counts is None or self.full_scale_counts > MOST_OF_A_CONVERTER
 
-        What they show of it is the distance of the number zero, one and a half of what is cut off, to its neighbours.
-        Where none is seen, hardly a reading was there, or all were the same, which tells nothing.
+    def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
+        """The steps of a quantity with axes, of all its readings (n, 3): as stated, or larger ones that they show.
+
+        `trusts_counts`: what is recorded are the converter's own counts, whatever the readings show.
         """
-        if self.step is None:
-            return self.resolution
-        apart = [np.diff(np.unique(axis)) / (self.step / 2) for axis in readings.T]
-        about_zero = [not len(each) or bool(np.any(np.abs(each - 1.5) < 0.25)) for each in apart]
-        return np.where(about_zero, self.step, self.step / 2)
+        if self.step is not None:
+            return cut_steps(readings, self.step / 2)
+        return Steps(self.resolution if trusts_counts else np.maximum(self.resolution, found_steps(readings)))
 
     def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
         """The numbers (n,) or (n, 3) in samples (n,), as they were recorded."""

@@ -26,7 +26,7 @@ class RepeatEntry(Entry):
     """
 
     time_s: float
-    temperature_c: float
+    temperature_c: float | None
     held: BiasEntry
     anew: BiasEntry | ErrorEntry
 
@@ -65,3 +65,9 @@ class DriftEntry(Entry):
     serial_number: str | None = None
     full_scale: float | None = None
     temperature_stated: bool = False
+
+    @property
+    def range_c(self) -> tuple[float, float] | None:
+        """Coldest and warmest repeat, °C; None if no temperature is known."""
+        known = [repeat.temperature_c for repeat in self.repeats if repeat.temperature_c is not None]
+        return (min(known), max(known)) if known else None

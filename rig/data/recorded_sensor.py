@@ -18,6 +18,9 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 MOUNTING_TOLERANCE = 1e-6
+# K by which a sensor's temperature may change in a run if nothing tells it: a flight controller in its case warms by so
+# much after it gets power. Assumed.
+UNKNOWN_CHANGE_K = 20.0
 
 Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
 Mounting = Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
@@ -57,6 +60,18 @@ class RecordedSensor:
     def temperature_stated(self) -> bool:
         """Whether somebody stated how warm it was: it has no thermometer."""
         return any(each.quantity == TEMPERATURE.name and each.stated is not None for each in self.channels)
+
+    @property
+    def unseen_change_k(self) -> float:
+        """Temperature, K, by which it may change while the recorded one does not."""
+        return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
+
+    @property
+    def temperature_words(self) -> str:
+        """What a budget says of how its temperature is known; nothing where a thermometer tells it."""
+        if not self.measures(TEMPERATURE):
+            return f"no temperature was provided or stated, a change of {UNKNOWN_CHANGE_K:g} K is assumed"
+        return f"temperature stated within {self.unseen_change_k:g} K" if self.temperature_stated else ""
 
     @property
     def sample_dtype(self) -> np.dtype[Any]:
@@ -114,7 +129,7 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """The sensor of a description in plain values.
 
     Raises ValueError naming what is wrong: a value, a quantity nobody knows or that comes twice, columns of one name, a
-    mounting that is no rotation, a gyroscope without range or thermometer.
+    mounting that is no rotation, a gyroscope without range.
     """
     sensor = checked(RecordedSensor, document, "sensor")
     quantities = [each.quantity for each in sensor.channels]
@@ -123,8 +138,8 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
         if quantity not in measured() or quantities.count(quantity) > 1:
             raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {known}")
     _ = sensor.sample_dtype
-    if sensor.measures(RATE) and (sensor.channel(RATE).range is None or not sensor.measures(TEMPERATURE)):
-        raise ValueError(f"the gyroscope {sensor.part} states no range or no temperature")
+    if sensor.measures(RATE) and sensor.channel(RATE).range is None:
+        raise ValueError(f"the gyroscope {sensor.part} states no range")
     check_rotation(sensor.mounting, f"the mounting of {sensor.part}")
     return sensor
 

@@ -38,9 +38,15 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
     """The slope of the bias of R repeats (R, 3), known to `std` (R, 3), their mean temperatures (R,) and times (R,).
 
     Deviations are as large as the residuals say, where these are larger. Raises Fault `too_few_observations`,
-    `temperature_range_too_small`, `temperature_and_time_confounded`.
+    `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.
     """
     check_count(len(bias), FEWEST, 3)
+    if np.isnan(temperature_c).any():
+        raise Fault(
+            "temperature_not_recorded",
+            "the slope of a bias over temperature is asked for, and the readings have no temperature",
+            "Use a sensor that provides its temperature, or record a thermometer beside it",
+        )
     low, high = float(temperature_c.min()), float(temperature_c.max())
     if high - low < MIN_RANGE_C:
         raise Fault(

@@ -197,7 +197,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
     for each in seen.own_errors(matrix):
-        yield assumed(each.name, each.half_width, each.unit, "what is known of the part", each.patterns)
+        yield assumed(each.name, each.half_width, each.unit, each.source, each.patterns)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
     any_sensitivity = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity

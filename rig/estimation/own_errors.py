@@ -15,6 +15,9 @@ from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED, bending
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
+OF_THE_PART = "what is known of the part"
+ROUNDING = "rounding of the readings"
+NOTHING_BESIDE = 1e-3  # of a mean's variance, that what means have in common by their rounding may be
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +26,8 @@ class KnownSensor:
 
     `nonlinearity` is how far a reading may be off the best straight line, as a share of `full_scale_rad_s`: by its odd
     part, and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,)
-    is recorded in steps of `temperature_step_k`. `instability_rad_s` is the least Allan deviation of its bias.
+    is recorded in steps of `temperature_step_k`, NaN if nothing tells it; `temperature_words` say how it is known, if
+    no thermometer tells it. `instability_rad_s` is the least Allan deviation of its bias.
     """
 
     nonlinearity: float
@@ -33,16 +37,21 @@ class KnownSensor:
     instability_rad_s: float
     temperature_c: Array
     temperature_step_k: float
+    temperature_words: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class OwnError:
-    """A line of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`."""
+    """A line of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`.
+
+    `source` says how that is known.
+    """
 
     name: str
     half_width: float
     unit: str
     patterns: Array
+    source: str = OF_THE_PART
 
 
 def own_errors(
@@ -58,14 +67,37 @@ def own_errors(
         sizes = known.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
         yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", sizes * bent)
     lasting = np.diff(windows_s)[:, 0]
+    source = "; ".join(filter(None, (OF_THE_PART, known.temperature_words)))
     warmer_k = _warmer_k(known, windows_s, lasting)
     patterns = known.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
-    yield OwnError(
-        BIAS_OVER_TEMPERATURE, float(np.degrees(known.bias_rad_s_per_k)), "°/s/K", patterns.reshape(6, -1, 3)
-    )
+    by_k = float(np.degrees(known.bias_rad_s_per_k))
+    yield OwnError(BIAS_OVER_TEMPERATURE, by_k, "°/s/K", patterns.reshape(6, -1, 3), source)
     warmer_k = _warmer_k(known, windows_s, lasting * turns_rad_s.any(axis=1))
     patterns = known.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
-    yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * known.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3))
+    yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * known.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3), source)
+
+
+def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
+    """What rounding to steps does to means (N, 3) alike, by the standard uncertainty (N, 3) that it leaves in each.
+
+    Means that are nearer to each other than the steps hide err together, such as those of all rests: no number of them
+    makes their rounding less. So an axis has an error for each group of such means, beside what each has for itself,
+    which is part of its variance (N, 3). What is nothing beside that is left out.
+    """
+    roundings = np.broadcast_to(roundings_rad_s, means_rad_s.shape)
+    patterns = []
+    for axis in range(3):
+        half_widths = np.sqrt(3) * roundings[:, axis]
+        order = np.argsort(means_rad_s[:, axis])
+        apart = np.diff(means_rad_s[order, axis]) > half_widths[order][1:] + half_widths[order][:-1]
+        for group in np.split(order, np.flatnonzero(apart) + 1):
+            size = np.zeros(means_rad_s.shape)
+            size[group, axis] = roundings[group, axis]
+            if np.any(size[group, axis] ** 2 > NOTHING_BESIDE * variances_rad2_s2[group, axis]):
+                patterns.append(np.sqrt(3) * size)
+    if patterns:
+        largest = float(np.degrees(np.max(patterns)))
+        yield OwnError(ROUNDING, largest, "°/s", np.array(patterns), "the steps in which the readings come")
 
 
 def _warmer_k(known: KnownSensor, windows_s: Array, weights: Array) -> Array:
@@ -84,6 +116,6 @@ def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
 
 
 def from_their_mean(values: Array, weights: Array) -> Array:
-    """(N,) values less their mean by these weights."""
-    away: Array = values - np.average(values, weights=weights)
+    """(N,) values less their mean by these weights; zero where they are not known, which is NaN."""
+    away: Array = np.nan_to_num(values - np.average(values, weights=weights))
     return away

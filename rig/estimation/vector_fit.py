@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, bias_process
 from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
-from rig.estimation.own_errors import KnownSensor, OwnError, own_errors
+from rig.estimation.own_errors import KnownSensor, OwnError, own_errors, rounding_errors
 from rig.estimation.vector_model import VectorSolution, check_told, design_matrix, of_the_speed
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
@@ -42,7 +42,7 @@ class Seen:
     (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
     motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
     what is known of the sensor beforehand, None in recordings of before. `ripples` (N,) are how unevenly each turned,
-    RMS as a share of its rate.
+    RMS as a share of its rate. `roundings_rad_s` (N, 3) is the standard uncertainty that rounding leaves in each mean.
     """
 
     means_rad_s: Array
@@ -62,6 +62,7 @@ class Seen:
     sensor: KnownSensor | None = None
     encoder_errors_rad_s: Array | None = None
     ripples: Array | float = 0.0
+    roundings_rad_s: Array | float = 0.0
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
@@ -114,7 +115,9 @@ class Seen:
         """What a sensor of that F (3, 3) may do beside the model."""
         if self.sensor is None:
             return ()
-        return tuple(own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s))
+        rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)
+        own = own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s)
+        return (*own, *rounded)
 
     def own_patterns(self, matrix: Array) -> Array:
         """(P, N, 3) what one standard deviation of each of the sensor's own errors adds."""

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
-from rig.observation.average import Stream, between
+from rig.observation.average import Stream, between, steps_of
 from rig.observation.averaging import dwelling_of
+from rig.observation.lost_samples import lost_samples
 from rig.observation.mean import Mean
 from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Dwelt, Window, dwelt
 
@@ -99,11 +101,11 @@ def _dwell_reading(
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = between(stream, window.start_s, window.end_s)
     _check_standing(motion, window, where)
-    check_complete(stream.raw[inside], where, settings)
+    check_complete(stream.sensor, stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
     readings = accelerations(stream, inside)
-    count = stream.sensor.channel(ACCELERATION).resolution_of(readings)
-    reading, _ = dwelling_of(run.settings).rested(readings, stream.time_s[inside], window, count)
+    steps = steps_of(stream.raw, stream.sensor, ACCELERATION)
+    reading, _ = dwelling_of(run.settings).rested(readings, stream.time_s[inside], window, steps)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
@@ -138,16 +140,15 @@ def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
         )
 
 
-def check_complete(samples: NDArray[Any], where: str, settings: ObservationThresholds) -> None:
+def check_complete(sensor: RecordedSensor, samples: NDArray[Any], where: str, settings: ObservationThresholds) -> None:
     """Raises Fault `lost_samples` where too few were recorded in a dwell, or too many of them are missing."""
     count, lost = len(samples), 0
     if count:
         sequence = samples["sequence"].astype(np.int64)
         lost = int(sequence[-1] - sequence[0]) + 1 - count
     if count < MIN_SAMPLES_AT_REST or lost > settings.max_lost_fraction * (count + lost):
-        raise Fault(
-            "lost_samples",
-            f"in {where} there are {count} samples and {lost} are missing, "
-            f"{100 * settings.max_lost_fraction:g} % may be missing, and {MIN_SAMPLES_AT_REST} are needed",
-            "Check the cable to the board and the load of this computer, or dwell longer",
+        what = (
+            f"there are {count} samples and {lost} are missing, {100 * settings.max_lost_fraction:g} % may be missing, "
+            f"and {MIN_SAMPLES_AT_REST} are needed"
         )
+        raise lost_samples(sensor, samples, where, what, "repeat the run, or dwell longer")

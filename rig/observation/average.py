@@ -12,10 +12,13 @@ from rig.data.quantity import RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
+from rig.estimation.rounding import Steps
 from rig.observation.known_motion import KnownMotion
 from rig.observation.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
+
+NO_STEPS = Steps(0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +29,7 @@ class Average:
     `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
     arm's base frame into the flange's, None where no arm tells it. `freedom` (3,): with how many degrees of freedom the
     noise's part of the variance is known, infinite where nobody counted. `lines_hz` (k,): frequencies of what vibrates
-    and was taken out of the mean.
+    and was taken out of the mean. `rounding_rad2_s2` (3,) is the part of the variance that is of the rounding to steps.
     """
 
     mean_rad_s: Array
@@ -40,11 +43,17 @@ class Average:
     drift_rad2_s2: Array | float = 0.0
     freedom: Array | float = np.inf
     lines_hz: Array = field(default_factory=partial(np.zeros, 0))
+    rounding_rad2_s2: Array | float = 0.0
 
     @property
     def duration_s(self) -> float:
         """Duration of what was averaged."""
         return self.end_s - self.start_s
+
+    @property
+    def noise_rad2_s2(self) -> Array:
+        """(3,) the part of the variance that is of the noise, (rad/s)²."""
+        return self.variance_rad2_s2 - self.drift_rad2_s2 - self.rounding_rad2_s2
 
     @property
     def mean_std_rad_s(self) -> Array:
@@ -55,7 +64,10 @@ class Average:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """A sensor's samples in physical units, on the controller's clock; by `polynomials` at one temperature."""
+    """A sensor's samples in physical units, on the controller's clock; by `polynomials` at one temperature.
+
+    Its rates come in `steps`.
+    """
 
     sensor: RecordedSensor
     clock: TimeBase
@@ -64,6 +76,7 @@ class Stream:
     readings_rad_s: Array
     raw: NDArray[Any]
     polynomials: Mapping[Quantity, OverTemperature] = field(default_factory=dict)
+    steps: Steps = NO_STEPS
 
     def at_reference(self, polynomials: Mapping[Quantity, OverTemperature]) -> "Stream":
         """A stream whose readings are those at the reference of these polynomials."""
@@ -78,7 +91,9 @@ class Stream:
         return self.polynomials[quantity].at_reference(readings, warm)
 
     def temperature_c(self, inside: slice) -> float:
-        """The mean of the samples inside."""
+        """The mean of the samples inside, NaN of a sensor whose temperature nothing tells."""
+        if not self.sensor.measures(TEMPERATURE):
+            return float("nan")
         thermometer = self.sensor.channel(TEMPERATURE)
         return float(thermometer.in_unit(float(thermometer.counts(self.raw)[inside].mean())))
 
@@ -93,7 +108,21 @@ def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stre
     """Samples (n,) of a gyroscope in rad/s at the controller's times, by a board's clock that is known."""
     board_time_s = raw["board_time_us"] * 1e-6
     readings = sensor.channel(RATE).values(raw)
-    return Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
+    return Stream(
+        sensor,
+        clock,
+        clock.controller_time_s(board_time_s),
+        board_time_s,
+        readings,
+        raw,
+        steps=steps_of(raw, sensor, RATE),
+    )
+
+
+def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
+    """The steps in which a quantity of all samples (n,) of a sensor comes: a board records the converter's counts."""
+    channel = sensor.channel(quantity)
+    return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 
 
 def between(stream: Stream, start_s: float, end_s: float) -> slice:
@@ -113,4 +142,5 @@ def averaged(stream: Stream, inside: slice, window: Window, mean: Mean) -> Avera
         temperature_c=stream.temperature_c(inside),
         freedom=mean.freedom,
         lines_hz=mean.cycles / (window.end_s - window.start_s),
+        rounding_rad2_s2=mean.rounding,
     )

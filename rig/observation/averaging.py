@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.beside_lines import FEWEST, colour_left, rest_beside_lines, swinging
 from rig.observation.coloured_noise import left_by_correlations, noise_left
 from rig.observation.mean import Mean, even_mean, mean_at_rest
@@ -17,14 +18,14 @@ from rig.observation.windows import Window
 
 @dataclass(frozen=True, slots=True)
 class Averaging:
-    """One way of averaging readings (n, 3) in steps of a count.
+    """One way of averaging readings (n, 3) that come in `Steps`.
 
-    `rested(readings, time_s, window, count)` is the mean of an arm that stands, and from when to when it is said to
+    `rested(readings, time_s, window, steps)` is the mean of an arm that stands, and from when to when it is said to
     last. Beside a harmonic `colour(residuals)` is the factor on the variance by residuals (n,) that are not white,
     `swings(residuals)` are the columns of what swings in residuals (n, 3), None where one line alone is looked for.
     """
 
-    rested: Callable[[Array, Array, Window, float | Array], tuple[Mean, Window]]
+    rested: Callable[[Array, Array, Window, Steps], tuple[Mean, Window]]
     colour: Callable[[Array], float] = noise_left
     swings: Callable[[Array], Array] | None = None
 
@@ -41,14 +42,14 @@ def dwelling_of(settings: RunSettings) -> Averaging:
     return BESIDE_LINES if settings.dwells_beside_lines else AUTOREGRESSIVE
 
 
-def _rested_correlated(readings: Array, _: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
-    return even_mean(readings, count, left_by_correlations), window
+def _rested_correlated(readings: Array, _: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    return even_mean(readings, steps, left_by_correlations), window
 
 
-def _rested_beside_lines(readings: Array, time_s: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
-    found, lasting = mean_at_rest(readings, time_s, window, count)
+def _rested_beside_lines(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    found, lasting = mean_at_rest(readings, time_s, window, steps)
     if len(readings) >= FEWEST and lasting != window:
-        found = rest_beside_lines(readings, time_s, window, count)
+        found = rest_beside_lines(readings, time_s, window, steps)
     return found, lasting
 
 

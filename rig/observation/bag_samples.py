@@ -25,7 +25,7 @@ POSES = (
     "geometry_msgs/msg/TransformStamped",
 )
 QUATERNION = ("qw", "qx", "qy", "qz")
-NOT_MEASURED = -1.0  # first element of a covariance of what the message does not hold
+NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of a covariance of what a message does not hold
 SUFFIXES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
 METADATA_BYTES = 4_000_000  # of two thousand topics, with all that is said of how each was sent
@@ -47,6 +47,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
     """Yield, `in_blocks`, the readings of the topic `inside` a bag, or of the only one with an Imu.
 
     The columns are those of a CSV file, times are from the beginning of the bag on, and rows in the order of the bag.
+    Messages that hold no rate are left out, and accelerations if some of the others hold none.
     Raise Refused `missing_extra`, `bag_topic`, and of a damaged bag whatever its parser ends in.
     """
     with _opened(path) as reader:
@@ -56,14 +57,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
             yield from in_blocks(fields, [TIME, *FIELD.columns])
             return
         columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
-
-        def rows() -> Iterator[tuple[float, ...]]:
-            for time_s, message in _stamped(reader, chosen):
-                if float(message.linear_acceleration_covariance[0]) == NOT_MEASURED:
-                    columns[-3:] = [None] * 3
-                yield time_s, *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration)
-
-        yield from in_blocks(rows(), columns)
+        yield from in_blocks(_inertial(_stamped(reader, chosen), columns), columns)
 
 
 def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
@@ -72,6 +66,35 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
         poses = _stamped(reader, _chosen(reader, POSES, inside, "attitudes"))
         turned = ((time_s, _orientation(message)) for time_s, message in poses)
         yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in turned), [TIME, *QUATERNION])
+
+
+def _inertial(messages: Iterator[tuple[float, Any]], columns: list[str | None]) -> Iterator[tuple[float, ...]]:
+    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; name None in `columns` what they do not hold.
+
+    Those without a rate are kept until one with a rate comes. Raise Refused `bag_topic` if none holds anything.
+    """
+    forces: list[tuple[float, ...]] = []
+    has_rates, all_forces = False, True
+    for time_s, message in messages:
+        row = (time_s, *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration))
+        has_force = float(message.linear_acceleration_covariance[0]) != NOT_PROVIDED
+        if float(message.angular_velocity_covariance[0]) != NOT_PROVIDED:
+            has_rates, all_forces = True, all_forces and has_force
+            forces.clear()
+            yield row
+        elif has_force and not has_rates:
+            forces.append(row)
+    if not has_rates and not forces:
+        raise Refused(
+            "bag_topic",
+            "the messages hold neither rates nor accelerations: the first element of their covariances is -1 in all",
+            "Name the topic of a sensor that measures behind the bag: BAG::/topic",
+        )
+    if not has_rates:
+        columns[1:4] = [None] * 3
+    elif not all_forces:
+        columns[4:] = [None] * 3
+    yield from forces
 
 
 @contextmanager

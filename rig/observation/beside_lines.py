@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import LineSearch, find_lines, fitted, waves
-from rig.observation.mean import Mean, rounding_left
+from rig.observation.mean import Mean
 from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
 
@@ -31,21 +32,22 @@ class Noise:
     freedom: Array
 
 
-def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float | Array) -> Mean:
+def rest_beside_lines(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
     """The mean at rest as `tapered_mean`, whose weights leave nothing of a vibration, by the noise beside its lines."""
     left = readings - readings.mean(axis=0)
     shaking = _columns(left, LineSearch(beats=0))
     columns = np.column_stack([np.ones(len(left)), shaking])
-    noise = noise_of(
-        left - columns @ fitted(columns, left), columns.shape[1], count, BRIEF if shaking.size else MEMORIES
-    )
+    smooth = columns @ fitted(columns, left)
+    noise = noise_of(left - smooth, columns.shape[1], steps, BRIEF if shaking.size else MEMORIES)
+    rounding = rounding_left(readings, steps, smooth, noise.scatter)
     shares = weights(time_s, window.start_s, window.end_s)
     return Mean(
         mean=shares @ readings,
-        variance=noise.in_a_mean * float(shares @ shares) + rounding_left(noise.scatter, count),
+        variance=noise.in_a_mean * float(shares @ shares) + rounding,
         noise=np.sqrt(noise.scatter),
         samples=len(readings),
         freedom=noise.freedom,
+        rounding=rounding,
     )
 
 
@@ -63,9 +65,9 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
     return waves(find_lines(residuals, search), np.arange(len(residuals)) / len(residuals), search.beats)
 
 
-def noise_of(residuals: Array, taken: int, count: float | Array, memories: Sequence[int]) -> Noise:
-    """The noise in residuals (n, 3) of readings in steps of `count`, less so many `taken` columns: see `left_of`."""
-    scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - taken), count**2 / 12)
+def noise_of(residuals: Array, taken: int, steps: Steps, memories: Sequence[int]) -> Noise:
+    """The noise in residuals (n, 3) of readings in these steps, less so many `taken` columns: see `left_of`."""
+    scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - taken), steps.variance)
     left = [left_of(each, memories) for each in residuals.T]
     return Noise(
         scatter=scatter,

@@ -11,6 +11,7 @@ LAGS = 20
 WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
 MEMORIES = (1, 2, 4, 8, 16, 32)  # residuals that tell something of the next; 32: a whole wave of 7 Hz at 238 a second
 SAMPLES_EACH = 12  # are needed to find one coefficient
+PREDICTED = 1e-12  # of their squares that a prediction leaves of residuals which it repeats, and of 1 − Σ a then
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,9 @@ def left_of(residuals: Array, memories: Sequence[int] = MEMORIES) -> Left:
     centred = residuals - residuals.mean()
     memories = [memory for memory in memories if memory * SAMPLES_EACH <= len(centred)]
     products, count = _products(centred, memories[-1]), len(centred) - memories[-1]
-    _, spectrum_at_zero, memory = min(_autoregression(products, count, memory) for memory in memories)
+    criterion, spectrum_at_zero, memory = min(_autoregression(products, count, memory) for memory in memories)
+    if np.isinf(criterion) and criterion > 0:
+        return Left(1.0, max(len(residuals) - 1.0, 1.0))
     return Left(spectrum_at_zero / float(np.mean(centred**2)), _freedom(centred, memory))
 
 
@@ -70,11 +73,16 @@ def _freedom(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Akaike's criterion and the spectrum at zero, by `_products` of so many residuals; this memory."""
+    """Akaike's criterion and the spectrum at zero, by `_products` of so many residuals; this memory.
+
+    Residuals that only repeat the one before, such as coarse readings of which few differ, tell no spectrum: 0 / 0.
+    """
     coefficients, power = _predicted(products[-memory - 1 :, -memory - 1 :])
     likelihood = count * float(np.log(power / count)) if power else -np.inf
     criterion = likelihood + 2 * memory
     damped = (1 - float(coefficients.sum())) ** 2
+    if power <= PREDICTED * products[-1, -1] and damped <= PREDICTED:
+        return np.inf, np.nan, memory
     return criterion, power / (count - memory) / damped if damped else np.inf, memory  # what never returns has no mean
 
 

@@ -72,6 +72,11 @@ def read_sample_table(
     """
     found = readings_in(path)
     if found is not None:
+        for quantity in needed:
+            if quantity.columns[0] not in found:
+                raise Refused(
+                    "wrong_columns", f"{path} holds no {' '.join(quantity.columns)}", "Name a recording that holds them"
+                )
         return SampleTable(found)
     table = read_table(path, samples_header(needed), SAMPLES_MB, mapped)
     there = [each for each in quantities().values() if each.columns[0] in table.columns]

@@ -6,13 +6,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rig.data.channel import Channel
 from rig.data.quantity import FIELD
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading, check_complete
+from rig.observation.average import steps_of
 from rig.observation.mean import Held, Mean, even_mean
 from rig.observation.observed_run import ObservedRun, one_clock
 from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, inside, rested
@@ -62,7 +62,7 @@ def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thre
     Raises Fault `lost_samples`, `saturation`.
     """
     samples = _samples(run, name, time_s, dwell.window)
-    return _mean(run.sensors[name].channel(FIELD), samples, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
+    return _mean(run, name, samples, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
 
 
 def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
@@ -85,11 +85,11 @@ def field_tests(
     other = beside(recording, name)
     if other is None:
         return ()
-    channel, time_s = recording.run.sensors[name].channel(FIELD), recording.time_s(name, other)
+    time_s = recording.time_s(name, other)
     samples = partial(_samples, recording.run, name, time_s)
     windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
     return tuple(
-        _mean(channel, samples(window), f"a field test of {name}", thresholds)
+        _mean(recording.run, name, samples(window), f"a field test of {name}", thresholds)
         for window in windows
         if window.end_s > window.start_s
         and _at_home(recording, window, home_q_rad)
@@ -102,15 +102,16 @@ def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) 
     return away_rad is not None and away_rad < AT_HOME_RAD
 
 
-def _mean(channel: Channel, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
-    check_complete(samples, where, thresholds)
+def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds: ObservationThresholds) -> Mean:
+    check_complete(run.sensors[name], samples, where, thresholds)
+    channel = run.sensors[name].channel(FIELD)
     if channel.saturated(samples).any():
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",
             "Choose a wider range_gauss, or take away the iron beside it",
         )
-    return even_mean(channel.values(samples), channel.resolution)
+    return even_mean(channel.values(samples), steps_of(run.samples[name], run.sensors[name], FIELD))
 
 
 def _samples(run: RunData, name: str, time_s: Array, window: Window) -> NDArray[Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.coloured_noise import Left, left_of
 from rig.observation.tapered_weights import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
@@ -19,7 +20,8 @@ class Mean:
     """Mean of readings in any unit: mean (3,), variance (3,) of that, `noise` (3,) of one, and how many there were.
 
     `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent. `cycles`
-    (k,): how often lines come in the readings that were taken out of the mean.
+    (k,): how often lines come in the readings that were taken out of the mean. `rounding` (3,) is the part of the
+    variance that rounding to steps leaves.
     """
 
     mean: Array
@@ -28,6 +30,7 @@ class Mean:
     samples: int
     freedom: Array | float = np.inf
     cycles: Array = field(default_factory=partial(np.zeros, 0))
+    rounding: Array | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,27 +67,29 @@ def by_axis(freedom: Iterable[Array | float]) -> Array:
     return np.array([np.broadcast_to(each, 3) for each in freedom])
 
 
-def even_mean(readings: Array, count: float | Array, left: Callable[[Array], Left] = left_of) -> Mean:
-    """The mean of readings (n, 3) in steps of `count` in which nothing passes: all of them count alike.
+def even_mean(readings: Array, steps: Steps, left: Callable[[Array], Left] = left_of) -> Mean:
+    """The mean of readings (n, 3) in these steps in which nothing passes: all of them count alike.
 
-    The noise is their scatter, and never below the rounding to counts; the variance of the mean allows for readings
-    that are not white, which `left` tells of each axis. What rounding leaves in a mean however many samples there are
-    is added.
+    The noise is their scatter, and never below the rounding to steps; the variance of the mean allows for readings that
+    are not white, which `left` tells of each axis. What rounding leaves in a mean however many samples there are is
+    added.
     """
-    variance = np.maximum(readings.var(axis=0, ddof=1), count**2 / 12)
+    variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
+    rounding = rounding_left(readings, steps, np.zeros(readings.shape), variance)
     coloured = [left(axis) for axis in (readings - readings.mean(axis=0)).T]
     factor = np.array([each.factor for each in coloured])
     return Mean(
         mean=readings.mean(axis=0),
-        variance=variance * factor / len(readings) + rounding_left(variance, count),
+        variance=variance * factor / len(readings) + rounding,
         noise=np.sqrt(variance),
         samples=len(readings),
         freedom=np.array([each.freedom for each in coloured]),
+        rounding=rounding,
     )
 
 
-def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float | Array) -> tuple[Mean, Window]:
-    """The mean of readings (n, 3) in steps of `count`, at times (n,), and from when to when it is said to last.
+def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    """The mean of readings (n, 3) in these steps, at times (n,), and from when to when it is said to last.
 
     Where the arm vibrates weights come and go, see `tapered_mean`: 2 mg at 14 Hz leave 10 µg in an even mean of three
     seconds. Such a mean lasts from where the weights have come half-way to where they have gone half-way: so long an
@@ -93,36 +98,24 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float | 
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2
         lasting = Window(window.start_s + half_s, window.end_s - half_s)
-        return tapered_mean(readings, time_s, window, count), lasting
-    return even_mean(readings, count), window
+        return tapered_mean(readings, time_s, window, steps), lasting
+    return even_mean(readings, steps), window
 
 
-def tapered_mean(readings: Array, time_s: Array, window: Window, count: float | Array) -> Mean:
-    """The mean of readings (n, 3) in steps of `count`, at times (n,): those in the middle of the window count most.
+def tapered_mean(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
+    """The mean of readings (n, 3) in these steps, at times (n,): those in the middle of the window count most.
 
     The variance is that of the noise without the vibration, which the weights leave nothing of.
     """
     shares = weights(time_s, window.start_s, window.end_s)
-    variance = np.maximum(np.var(readings, axis=0, ddof=1), count**2 / 12)
+    variance = np.maximum(np.var(readings, axis=0, ddof=1), steps.variance)
     at_zero = np.minimum(noise_at_zero(readings), variance)
+    rounding = rounding_left(readings, steps, np.zeros(readings.shape), variance)
     return Mean(
         mean=shares @ readings,
-        variance=at_zero * float(shares @ shares) + rounding_left(variance, count),
+        variance=at_zero * float(shares @ shares) + rounding,
         noise=np.sqrt(variance),
         samples=len(readings),
         freedom=np.full(3, freedom_at_zero(len(readings))),
+        rounding=rounding,
     )
-
-
-def rounding_left(variance: Array, count: float | Array) -> Array:
-    """The variance that rounding to multiples of `count` leaves in a mean over any number of samples, at most.
-
-    `variance` is that of a rounded sample, its own noise σ² and the rounding's count²/12 together (Sheppard). Rounding
-    averages out only as far as the noise carries the reading across counts. The mean of x + noise, rounded, is off by
-    Σ (−1)ⁿ count/(πn) exp(−2(πnσ/count)²) sin(2πnx/count): the sawtooth of the rounding error, each of its harmonics
-    damped by the noise's characteristic function (Widrow and Kollár, Quantization Noise, 2008). Over all x its square
-    is Σ count²/(2π²n²) exp(−(2πnσ/count)²), which the first exponential bounds: Σ count²/(2π²n²) = count²/12.
-    """
-    rounding = count**2 / 12
-    left: Array = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
-    return left

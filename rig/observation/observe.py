@@ -27,6 +27,7 @@ from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
 from rig.observation.averaging import Averaging, averaging_of
 from rig.observation.lines import BEATS, turning
+from rig.observation.lost_samples import lost_samples
 from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
@@ -35,6 +36,7 @@ from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Finished, Window, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
+FROZEN = 0.5  # of the rate of a sweep, by which an axis that repeats one reading must misread it
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
 MIN_RESTS = 3  # to tell whether the bias drifts
@@ -211,10 +213,11 @@ def _observation(
         raise arm_states_lost(where, "more than half the time")
     sampled = _sampled(stream.time_s[inside], motion, turn, covered)
     readings = stream.readings_rad_s[inside][covered]
-    found, weights = turn_mean(readings, stream.sensor.channel(RATE).resolution_of(readings), sampled)
+    found, weights = turn_mean(readings, stream.steps, sampled)
     average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
+    _check_frozen(readings, turned, turn.speed_rad_s * expected, where)
     _check_direction(turned, expected, where, settings)
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
@@ -267,8 +270,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averagin
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     readings = stream.readings_rad_s[inside]
-    count = stream.sensor.channel(RATE).resolution_of(readings)
-    found, lasting = averaging.rested(readings, stream.time_s[inside], still, count)
+    found, lasting = averaging.rested(readings, stream.time_s[inside], still, stream.steps)
     return _placed(averaged(stream, inside, lasting, found), motion)
 
 
@@ -284,11 +286,8 @@ def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresh
     count = inside.stop - inside.start
     if not covered or lost > settings.max_lost_fraction * (count + lost):
         what = f"{lost} of {count + lost} samples are missing" if covered else "the samples do not cover the revolution"
-        raise Fault(
-            "lost_samples",
-            f"in {where} {what}, {100 * settings.max_lost_fraction:g} % may be missing",
-            "Check the cable to the board and the load of this computer, then repeat the sweep",
-        )
+        what += f", {100 * settings.max_lost_fraction:g} % may be missing"
+        raise lost_samples(stream.sensor, stream.raw[inside], where, what, "repeat the sweep")
     return lost
 
 
@@ -314,6 +313,22 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
             "stuck_sensor",
             f"in {where} the gyroscope repeats one reading {longest} times",
             "Check the sensor's supply and its bus wiring, then repeat the sweep",
+        )
+
+
+def _check_frozen(readings: Array, turned: Array, expected_rad_s: Array, where: str) -> None:
+    """An axis that is turned does not repeat one reading that is not its rate, however coarse its steps are.
+
+    Of readings (n, 3), which read `turned` (3,) in the mean, `expected_rad_s` (3,) by the nominal mounting.
+    """
+    still = np.ptp(readings, axis=0) == 0
+    misread = np.abs(turned - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)
+    for axis in np.flatnonzero(still & misread):
+        raise Fault(
+            "stuck_axis",
+            f"in {where} the {'xyz'[axis]} axis of the gyroscope repeats {readings[0, axis]:.4g} rad/s, and turns at "
+            f"{expected_rad_s[axis]:.4g} rad/s",
+            "Check the sensor and its supply; if it stays, replace the sensor",
         )
 
 

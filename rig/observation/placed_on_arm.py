@@ -10,6 +10,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.acceleration import check_complete, without_leaving
+from rig.observation.average import steps_of
 from rig.observation.mean import Mean, even_mean
 from rig.observation.observed_run import ObservedRun
 from rig.observation.placements import Placements, Rested
@@ -55,10 +56,11 @@ def _mean(
     where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"
     channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
     samples = recording.run.samples[name][inside(time_s, dwell.window)]
-    check_complete(samples, where, thresholds)
+    check_complete(recording.run.sensors[name], samples, where, thresholds)
     if channel.saturated(samples).any():
         raise Fault("saturation", f"in {where} the {quantity} is beyond the sensor's range", "Choose a wider range")
-    return even_mean(channel.values(samples), channel.resolution)
+    steps = steps_of(recording.run.samples[name], recording.run.sensors[name], quantity)
+    return even_mean(channel.values(samples), steps)
 
 
 def _attitude(recording: ObservedRun, name: str, window: Window) -> Array:

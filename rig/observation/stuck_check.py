@@ -14,18 +14,23 @@ from rig.observation.average import Average
 OF_A_SWEEP = 0.5  # of the slowest one's speed: so much no bias changes from rest to rest
 TURNED = 0.5  # of gravity, by which two attitudes in a row must differ to tell
 FELT = 0.05  # of what they differ by; readings in g, given as m/s², are twice that
+WITHOUT_NOISE = 0.01  # of that of the other axes
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Readings at rest are those of no turn. Raises Fault `stuck_sensor`."""
+    """Readings at rest are those of no turn. Raises Fault `stuck_sensor`; `stuck_axis` if one alone has no noise."""
     if len(rests) < 2:
         return
-    apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0).max()
-    if apart > OF_A_SWEEP * slowest_rad_s:
+    apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
+    axis = int(np.argmax(apart))
+    if apart[axis] > OF_A_SWEEP * slowest_rad_s:
+        noise = np.min([rest.noise_rad_s for rest in rests], axis=0)
+        alone = noise[axis] < WITHOUT_NOISE * np.delete(noise, axis).min()
+        which = f"the {'xyz'[axis]} axis of the gyroscope" if alone else "the gyroscope"
         raise Fault(
-            "stuck_sensor",
-            f"at rest the gyroscope reads {np.degrees(apart):.3g} °/s more in one rest than in another, as if "
+            "stuck_axis" if alone else "stuck_sensor",
+            f"at rest {which} reads {np.degrees(apart[axis]):.3g} °/s more in one rest than in another, as if "
             "it turned",
             REMEDY,
         )

@@ -28,6 +28,7 @@ LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and mo
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
+TURNED_RAD_S = 0.05  # RMS over a recording, of an axis that was turned
 NO_TURNING = 1e-12  # of the square of the fastest: a body that turns about one axis has only rounding about others
 SETTLED, UNDERWAY = 1e-3, 0.1  # standard deviations; an offset may turn back, standing still, while the drift goes on
 FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
@@ -78,8 +79,8 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     Raises Fault `not_finite`, `impossible_times`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`,
     `stuck_axis`, `time_base_not_found`.
     """
-    _check_samples(board_time_s, readings_rad_s)
     check_span(motion.time_s, "the states or attitudes")
+    _check_samples(board_time_s, readings_rad_s, motion)
     clock, known = _begun(board_time_s, readings_rad_s, motion)
     while True:
         # The clock so far says which samples to use; a choice that followed the fine one might never settle.
@@ -98,7 +99,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     return clock
 
 
-def _check_samples(board_time_s: Array, readings: Array) -> None:
+def _check_samples(board_time_s: Array, readings: Array, motion: KnownMotion) -> None:
     if len(board_time_s) < MIN_SAMPLES:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
     check_readings(board_time_s, readings)
@@ -109,12 +110,18 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
             f"the gyroscope reads {_triple(readings[0])} rad/s all the time, although the arm moves",
             "Check the sensor's supply and its bus wiring",
         )
-    if still.any():
+    if still.any() and _turns_every_axis(motion):
         raise Fault(
             "stuck_axis",
             f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, although the arm moves",
             "The sensor is broken or wrongly configured; replace it",
         )
+
+
+def _turns_every_axis(motion: KnownMotion) -> bool:
+    """Whether every axis of a sensor turned, however it sits: one that nothing turns may read the same all the time."""
+    rates = motion.rate(motion.time_s[motion.covered(motion.time_s)])
+    return bool(np.linalg.eigvalsh(rates.T @ rates).min() > TURNED_RAD_S**2 * len(rates))
 
 
 def check_readings(board_time_s: Array, readings: Array) -> None:

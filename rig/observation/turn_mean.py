@@ -14,10 +14,11 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.mean_weights import even_groups, mean_weights
+from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
 from rig.observation.coloured_noise import MEMORIES
 from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, waves, wide
-from rig.observation.mean import Mean, rounding_left
+from rig.observation.mean import Mean
 
 SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
 UNSEEN = LineSearch(slowest=5.0)
@@ -59,10 +60,8 @@ class Lines:
     rate: Array
 
 
-def turn_mean(readings: Array, resolution: float | Array, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) and its weights (n,), which are to make the mean of what turned as well.
-
-    resolution: the steps of the readings, one for all or of each axis.
+def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
+    """Return the mean of readings (n, 3) in these steps and its weights (n,), which are to make that of what turned.
 
     A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation.
     """
@@ -74,8 +73,9 @@ def turn_mean(readings: Array, resolution: float | Array, turn: SampledTurn) -> 
     columns = np.column_stack([steady, lines.rate, shaking, lines.seen])
     columns = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
-    left = readings - columns @ coefficients
-    noise = noise_of(left, int(rank), resolution, BRIEF if lines.unseen else MEMORIES)
+    smooth = columns @ coefficients
+    noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.unseen else MEMORIES)
+    rounding = rounding_left(readings, steps, smooth, noise.scatter)
     slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
     changed = np.zeros(3)
     if slow.any():
@@ -84,11 +84,12 @@ def turn_mean(readings: Array, resolution: float | Array, turn: SampledTurn) -> 
         changed = (weights - without) @ (readings - uneven @ fitted(uneven, readings))
     mean = Mean(
         mean=weights @ readings,
-        variance=noise.in_a_mean * float(weights @ weights) + changed**2 + rounding_left(noise.scatter, resolution),
+        variance=noise.in_a_mean * float(weights @ weights) + changed**2 + rounding,
         noise=np.sqrt(noise.scatter),
         samples=len(readings),
         freedom=noise.freedom,
         cycles=lines.cycles,
+        rounding=rounding,
     )
     return mean, weights
 

@@ -17,6 +17,7 @@ from rig.station.plain_text import INDENT, wrapped
 
 NEAR = 0.9  # of its limit, from where on a check that passed is named
 MOST_NEAR = 2
+CAUSES = ("stuck_axis", "repeated_readings")  # of which other checks fail: such readings are none of the motion
 ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six, on
 LEAST_WIDTH = 80  # columns: a narrower screen says the same in more lines
 
@@ -166,12 +167,12 @@ def _passed(result: ResultDocument) -> str:
 
 
 def _failed(result: ResultDocument, folder: Path | None) -> list[tuple[str, str]]:
-    """What failed and was measured, farthest beyond its limit first, and what that means with what to do.
+    """What failed and was measured, causes first, then farthest beyond its limit, and what that means with what to do.
 
     What was not measured comes last: mostly because something else had failed before.
     """
     failed = sorted((each for each in result.checks if not each.passed), key=_over, reverse=True)
-    failed.sort(key=lambda each: each.value is None)
+    failed.sort(key=lambda each: (each.value is None, each.means.what not in CAUSES))
     words = [what_failed(check, folder) for check in failed]
     return [
         (f"FAILED {_measured(check)}", "" if said is None else f": {said}")

@@ -9,6 +9,7 @@ from rig.data.result_types import WhenEntry
 
 DEG = math.degrees(1)
 AS_STATED = ", as stated"
+UNKNOWN = "a temperature that is not known"
 ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
 
 
@@ -19,7 +20,7 @@ def when_words(when: WhenEntry) -> str:
     until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
     over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
     if when.temperature_c is None:
-        return over
+        return f"at {UNKNOWN}, {over}"
     if when.temperature_range_c is None:
         return f"at {when.temperature_c:.1f} °C, as stated, {over}"
     low, high = (f"{each:.2f}" for each in when.temperature_range_c)
@@ -29,8 +30,10 @@ def when_words(when: WhenEntry) -> str:
 
 def warmth_words(when: WhenEntry | None) -> str:
     """What tells a temperature, in words; results of before, which do not say when, read it."""
+    if when is not None and when.temperature_c is None:
+        return "of which the item provided no temperature, and nobody stated one"
     if when is not None and when.temperature_stated:
-        return "as stated, for the item has no thermometer"
+        return "as stated, for the item provided no temperature"
     return "by the item's own thermometer, which is not calibrated"
 
 

@@ -52,7 +52,18 @@ class Warming:
     _looked_s: float = -np.inf
 
     def prepare(self) -> None:
-        """Refuse a board without a heater, before anything has moved. Raises Refused `no_heater`."""
+        """Refuse a sensor without a thermometer and a board without a heater, before anything has moved.
+
+        Raises Refused `no_thermometer`, `no_heater`.
+        """
+        for name in self.names:
+            sensor = self.acquisition.counts[name].sensor
+            if sensor.temperature_stated or not sensor.measures(TEMPERATURE):
+                raise Refused(
+                    "no_thermometer",
+                    f"{name} provides no temperature, and the procedure thermal calibrates over it",
+                    "Use a sensor with a thermometer, or another procedure",
+                )
         if self.heater is None:
             return
         try:

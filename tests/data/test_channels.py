@@ -131,13 +131,15 @@ def test_numbers_cut_toward_zero_are_twice_as_coarse_about_zero_alone() -> None:
     """And a mean of them is as uncertain as it errs, whatever an autopilot's offset has been added since."""
     milli, offset, rng = 1e-3, 0.03, np.random.default_rng(29)
     channel = Channel("rate", "counts", "<i4", 1e-8, step=2 * milli)
-    in_std = []
-    for true in rng.uniform(-6, 6, (300, 3)):
-        whole = np.trunc(true + 0.6 * rng.standard_normal((300, 3)))
-        readings = milli * (whole + 0.5 * np.sign(whole)) + offset
-        step = channel.resolution_of(readings)
-        assert np.all(step == np.where((whole == 0).any(axis=0) & (whole != 0).any(axis=0), 2 * milli, milli))
-        found = even_mean(readings, step)
+    in_std, trues = [], rng.uniform(-6, 6, (300, 3))
+    cut = np.trunc(trues[:, None] + 0.6 * rng.standard_normal((300, 300, 3)))
+    everything = milli * (cut + 0.5 * np.sign(cut)) + offset
+    steps = channel.steps(everything.reshape(-1, 3))
+    for true, whole, readings in zip(trues, cut, everything, strict=True):
+        wide = np.where((whole == 0).any(axis=0), 2 * milli, milli)
+        assert steps.widths(readings) == pytest.approx(wide)
+        found = even_mean(readings, steps)
         in_std.append((found.mean - offset - milli * true) / np.sqrt(found.variance))
     assert 0.7 < np.sqrt(np.mean(np.square(in_std))) < 1.3
-    assert np.all(channel.resolution_of(np.full((9, 3), offset)) == 2 * milli), "all the same"
+    same = np.full((9, 3), offset)
+    assert np.all(channel.steps(same).widths(same) == 2 * milli), "all the same tells nothing"

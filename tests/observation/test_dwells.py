@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.averaging import dwelling_of
 from rig.observation.mean import Mean
 from rig.observation.windows import Window
@@ -21,7 +22,7 @@ def dwelt(reckoning: int, seed: int) -> tuple[Mean, Array]:
     true = rng.normal(size=3)
     shaken = np.sin(2 * np.pi * rng.uniform(10, 18) * time_s[:, None] + rng.uniform(0, 6, 3))
     readings = true + NOISE_M_S2 * rng.normal(size=(300, 3)) + SHAKEN_M_S2 * shaken
-    return dwelling_of(settings).rested(readings, time_s, Window(0.0, LASTING_S), 1e-5)[0], true
+    return dwelling_of(settings).rested(readings, time_s, Window(0.0, LASTING_S), Steps(1e-5))[0], true
 
 
 @pytest.mark.parametrize(("reckoning", "scatter"), [(2, (0.15, 0.4)), (3, (0.0, 0.06))])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.coloured_noise import left_by_correlations, left_of
 from rig.observation.mean import even_mean, mean_at_rest
 from rig.observation.tapered_weights import freedom_at_zero, noise_at_zero, vibrates
@@ -56,11 +57,11 @@ def test_a_rest_in_which_the_arm_vibrates_tells_its_noise_from_few_frequencies()
 def test_white_readings_have_one_less_than_there_are_and_a_vibration_costs_most_of_them() -> None:
     rng, time_s = np.random.default_rng(3), np.arange(1428) / RATE_HZ
     quiet = rng.normal(size=(1428, 3))
-    alone, _ = mean_at_rest(quiet, time_s, Window(0.0, 6.0), 1e-6)
+    alone, _ = mean_at_rest(quiet, time_s, Window(0.0, 6.0), Steps(1e-6))
     np.testing.assert_array_equal(alone.freedom, 1427)
     shaking = np.column_stack([shaken(rng, 1428) for _ in range(3)])
     assert vibrates(shaking)
-    found, _ = mean_at_rest(shaking, time_s, Window(0.0, 6.0), 1e-6)
+    found, _ = mean_at_rest(shaking, time_s, Window(0.0, 6.0), Steps(1e-6))
     assert np.all(found.freedom < 100)
-    before = even_mean(quiet, 1e-6, left_by_correlations)
+    before = even_mean(quiet, Steps(1e-6), left_by_correlations)
     assert np.all(np.isinf(before.freedom)), "of recordings of before nobody counts them"

@@ -144,14 +144,18 @@ def test_what_is_not_in_a_file_is_said_with_what_is(tmp_path: Path) -> None:
         read_samples(tmp_path / "bag")
 
 
-def mcap(path: Path, *, not_measured: float = 0.0) -> Path:
-    """A bag in one MCAP file with a hundred readings, one of which has that value."""
+def mcap(path: Path, *, not_measured: float = 0.0, without_rate: int = 0) -> Path:
+    """A bag in one MCAP file with a hundred readings, one of which has that value; so many first hold no rate."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
     types, kind = store.types, "sensor_msgs/msg/Imu"
-    none, level = np.zeros(9), types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    none, no_rate, level = (
+        np.zeros(9),
+        np.array([-1.0, *[0.0] * 8]),
+        types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+    )
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         imu = bag.add_connection("/imu", kind, typestore=store)
         for number in range(100):
@@ -159,7 +163,7 @@ def mcap(path: Path, *, not_measured: float = 0.0) -> Path:
             header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="imu")
             z = not_measured if number == 40 else 0.1
             read = types["geometry_msgs/msg/Vector3"](x=0.1 * number, y=0.0, z=z)
-            message = types[kind](header, level, none, read, none, read, none)
+            message = types[kind](header, level, none, read, no_rate if number < without_rate else none, read, none)
             bag.write(imu, number * 10**9, store.serialize_cdr(message, kind))
     return path
 
@@ -183,6 +187,15 @@ def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: 
 def test_a_reading_that_was_not_measured_is_named_in_a_bag_too(tmp_path: Path) -> None:
     with pytest.raises(Refused, match=r"not_a_number: .*bag has 1 samples whose z_rad_s .*the first is sample 41"):
         read_samples(mcap(tmp_path / "bag", not_measured=float("nan")))
+
+
+def test_messages_of_a_bag_that_hold_no_rate_by_their_covariance_are_no_samples(tmp_path: Path) -> None:
+    samples = read_samples(mcap(tmp_path / "some", without_rate=30))
+    assert samples.readings[RATE][:, 0] == pytest.approx(0.1 * np.arange(30, 100)), "its driver was not ready before"
+    without = mcap(tmp_path / "all", without_rate=100)
+    assert [*read_samples(without).readings] == [ACCELERATION]
+    with pytest.raises(Refused, match=r"wrong_columns: .* holds no x_rad_s y_rad_s z_rad_s"):
+        read_samples(without, [RATE])
 
 
 def test_a_name_that_is_no_utf_8_is_recorded_as_it_is_shown(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ What the arm's encoders do not see lies within `uncertainty.*`, what the sensor 
 sheet: so p-values of checks that know as much, and no more, are uniform.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,12 +35,16 @@ OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Of sensors: what is recorded of one, and standard deviations of what it does."""
+    """Of sensors: what is recorded of one, and standard deviations of what it does.
+
+    `sent` makes of rates (n, 3) what a source sends of them, of one that rounds them otherwise than to counts.
+    """
 
     sensor: RecordedSensor
     noise_rad_s: float
     flicker_rad_s: float
     walk_rad_s_sqrt_s: float
+    sent: Callable[[Array], Array] = lambda rates: rates
 
 
 ADIS16465 = replace(
@@ -96,16 +101,18 @@ class Drawn:
     bias_rad_s: Array
 
 
-def drawn(seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None) -> Drawn:
-    """The movement is that of `setup`, if any, and it is as uneven as `ripple` says, or as is usual."""
+def drawn(
+    seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None, *, vibrates: bool = True
+) -> Drawn:
+    """The movement is that of `setup`, if any; it is as uneven as `ripple` says, or as is usual, or not at all."""
     rng = np.random.default_rng(seed)
     seen = rng.spawn(1)[0]
     setup = replace(
         Setup() if setup is None else setup,
         seed=seed,
         sample_rate_hz=kind.sensor.rate_hz,
-        vibration=float(rng.uniform(0.0, 0.05)),
-        seen_vibration_rad_s=float(seen.uniform(0.0, 0.002)),
+        vibration=vibrates * float(rng.uniform(0.0, 0.05)),
+        seen_vibration_rad_s=vibrates * float(seen.uniform(0.0, 0.002)),
         seen_vibration_hz=float(seen.uniform(8.0, 30.0)),
         boot_s=float(rng.uniform(-1e4, 0.0)),
         drift=float(rng.uniform(-5e-5, 5e-5)),
@@ -124,7 +131,7 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | No
     known = motion.settings.uncertainty
     assert known is not None
     board_s, time_s = sample_times(setup, motion)
-    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng, setup.encoders_err)
+    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng, setup.encoders_err, vibrates=vibrates)
     to_flange = flange_attitude(q_rad, arm)
     place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
     pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
@@ -150,7 +157,7 @@ def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
 def _counts(read: Array, kind: Kind) -> Array:
     full = kind.sensor.channel(RATE).full_scale_counts
     assert full is not None
-    counts: Array = np.clip(np.round(read / kind.sensor.channel(RATE).unit_per_count), -full, full)
+    counts: Array = np.clip(np.round(kind.sent(read) / kind.sensor.channel(RATE).unit_per_count), -full, full)
     return counts
 
 
@@ -160,6 +167,8 @@ def _beside_the_encoders(
     known: Uncertainty,
     rng: np.random.Generator,
     encoders_err: float,
+    *,
+    vibrates: bool = True,
 ) -> tuple[Array, Array, DenavitHartenberg]:
     """True angles and speeds, and how the arm is made; the encoders see neither."""
     q, qd = motion.joints(time_s)
@@ -191,7 +200,7 @@ def _beside_the_encoders(
         true += share[:, None] * (then - off)
         speed += ((share > 0) & (share < 1))[:, None] * (then - off) / OUTWARDS_S
         off = then
-    vibration, hertz = rng.uniform(0, 0.004), rng.uniform(8, 30)
+    vibration, hertz = vibrates * rng.uniform(0, 0.004), rng.uniform(8, 30)
     lines_hz = [hertz]
     if motion.unseen_hz:
         vibration, lines_hz = motion.unseen_rad_s, list(motion.unseen_hz)

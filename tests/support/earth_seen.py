@@ -15,6 +15,7 @@ from rig.analysis.vector_inputs import WAVE_SHARE
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import DEG_H
+from rig.estimation.rounding import Steps
 from rig.estimation.vector_fit import Seen
 from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
 from rig.motion.steps import Sweep
@@ -197,7 +198,7 @@ def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Ge
             noises.append(readings.mean(axis=0))
             variances.append(np.full(3, session.part.density**2 / (end - start)))
         else:
-            found = tapered_mean(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), 1e-12)
+            found = tapered_mean(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
             noises.append(found.mean)
             variances.append(found.variance)
             windows[place] += np.array([0.5, -0.5]) * flank_s(end - start)

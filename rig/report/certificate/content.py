@@ -177,12 +177,16 @@ class Certificate:
         return any(hasattr(entry, "attitude_error_rad") for each in self.held_still for entry in each.entries)
 
     @property
-    def temperature_stated(self) -> bool:
-        """Whether how warm the items were was stated, and read of none of them."""
+    def temperature_source(self) -> str:
+        """What tells how warm the items were; of results of before, which do not say when, their thermometers do."""
         found = [each.sensor.bias_at for each in self.gyroscopes]
         found += [getattr(entry, "found_at", None) for each in self.held_still for entry in each.entries]
-        told = [when for when in found if when is not None and when.temperature_c is not None]
-        return bool(told) and all(when.temperature_stated for when in told)
+        dated = [when for when in found if when is not None]
+        known = [when for when in dated if when.temperature_c is not None]
+        if dated and not known:
+            return "not known"
+        stated = bool(known) and all(when.temperature_stated for when in known)
+        return ("as stated" if stated else "the item's own thermometer") + "; not traceable"
 
     @property
     def blocks(self) -> tuple[Block, ...]:

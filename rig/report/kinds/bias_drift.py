@@ -46,7 +46,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         repeats=tuple(
             RepeatEntry(
                 time_s=float(drift.time_s[repeat]),
-                temperature_c=float(drift.temperature_c[repeat]),
+                temperature_c=_known(float(drift.temperature_c[repeat])),
                 held=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
                 anew=_anew(drift.anew[repeat]),
             )
@@ -76,6 +76,10 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         full_scale=sensor.channel(quantity).range,
         temperature_stated=sensor.temperature_stated,
     )
+
+
+def _known(temperature_c: float) -> float | None:
+    return None if np.isnan(temperature_c) else temperature_c
 
 
 def _anew(anew: Anew | Fault) -> BiasEntry | ErrorEntry:
@@ -109,6 +113,7 @@ def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followe
     entry = finding.entry
     if entry.part is None or entry.serial_number is None or entry.full_scale is None:
         return None
+    warm = [repeat.temperature_c for repeat in entry.repeats if repeat.temperature_c is not None]
     return Followed(
         finding.sensor,
         f"{finding.quantity} bias drift",
@@ -116,7 +121,7 @@ def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followe
         entry.serial_number,
         entry.full_scale,
         "bias_by_repeat",
-        float(np.mean([repeat.temperature_c for repeat in entry.repeats])),
+        float(np.mean(warm)) if warm else None,
     )
 
 
@@ -139,7 +144,7 @@ def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
         table.add_row(
             str(number),
             f"{repeat.time_s / 3600:.2f}",
-            f"{repeat.temperature_c:.1f}",
+            "" if repeat.temperature_c is None else f"{repeat.temperature_c:.1f}",
             *(f"{bias / size:+.4g}" for bias in repeat.held.bias),
             f"{max(np.multiply(known.factors, repeat.held.std)) / size:.2g}",
             moved.get(number, ""),

@@ -60,7 +60,7 @@ def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
     field_ut = entry.field_t / FIELD.bias.size
     yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; no limit judges it"
     if entry.found_at is not None:
-        yield f"scale and bias: {when_words(entry.found_at)}; its temperature was not measured"
+        yield f"scale and bias: {when_words(entry.found_at)}"
     yield from assumed_lines(entry.budget)
     yield from told_lines(entry.told_from)
     yield "iron and currents that turn with it are part of what is found"

@@ -1,0 +1,48 @@
+"""Whether an axis repeats one reading while the arm turns it: no healthy one does, however coarse its steps are."""
+
+import numpy as np
+
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.observation.observed_run import ObservedRun
+
+FEWEST = 25  # equal readings in a row, of which the motion is looked at
+LAG_S = 0.15  # at either end of them: a sensor's filter is late, and the clock's offset is known to milliseconds
+SMOOTHED_S = 0.1
+MOVED_STEPS, MOVED_RAD_S = 10.0, 0.02  # by which the rate along the axis must have changed, in the nominal mounting
+
+
+def longest_frozen(recording: ObservedRun, name: str) -> int:
+    """Return how many equal readings of one axis of a gyroscope followed each other, at most, while its rate changed.
+
+    The nominal mounting is good for this: an axis that leans, or a scale factor that is off, changes a change of rate
+    by a part of it.
+    """
+    stream = recording.stream(name)
+    counts = stream.sensor.channel(RATE).counts(stream.raw)
+    axes = np.array(stream.sensor.mounting)
+    least_rad_s = np.maximum(MOVED_STEPS * np.broadcast_to(stream.steps.unit, 3), MOVED_RAD_S)
+    longest = 0
+    for axis in range(3):
+        ends = np.append(np.flatnonzero(np.diff(counts[:, axis])), len(counts) - 1)
+        starts = np.append(0, ends[:-1] + 1)
+        for start, end in zip(starts, ends, strict=True):
+            if end - start + 1 > max(longest, FEWEST):
+                time_s = stream.time_s[start : end + 1]
+                inside = (time_s > time_s[0] + LAG_S) & (time_s < time_s[-1] - LAG_S)
+                if _changes(recording, time_s[inside], axes[axis]) > least_rad_s[axis]:
+                    longest = int(end - start + 1)
+    return longest
+
+
+def _changes(recording: ObservedRun, time_s: Array, axis: Array) -> float:
+    """Return how much the rate along an axis (3,) of the flange changes at such times (n,), rad/s.
+
+    Of means over `SMOOTHED_S`: the rate between two states is as noisy as their times are.
+    """
+    known = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
+    if len(known) < FEWEST:
+        return 0.0
+    blocks = max(int((known[-1] - known[0]) / SMOOTHED_S), 1)
+    rates = recording.motion.rate(known) @ axis
+    return float(np.ptp([block.mean() for block in np.array_split(rates, blocks)]))
