@@ -1,11 +1,13 @@
 """The section `lines` of a sensor: what stands in the lines that a device prints, one sample each."""
 
+import re
 from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from rig.config.section import Positive, Section
+from rig.config.stated_temperature import StatedTemperatureSection
 from rig.errors.quoting import quote
 
 GYROSCOPE, ACCELEROMETER, MAGNETOMETER = ("gx", "gy", "gz"), ("ax", "ay", "az"), ("mx", "my", "mz")
@@ -88,7 +90,7 @@ class LineFieldSection(Section):
 
 
 class LineTemperatureSection(Section):
-    """The column `temperature`, in °C: printed value × scale + offset; or what is known of it where there is none."""
+    """The column `temperature`, in °C: printed value × scale + offset; without it, what is stated."""
 
     scale: Scale = 1.0
     offset_c: float = Field(default=0.0, description="temperature at a printed 0")
@@ -97,7 +99,8 @@ class LineTemperatureSection(Section):
         default=None,
         ge=-40,
         le=85,
-        description="without a column `temperature`: how warm the sensor is, stated",
+        description="how warm the sensor is, stated where the device prints no temperature; without it U allows for "
+        "20 K of change",
     )
     stated_within_k: Positive = Field(
         default=5.0,
@@ -105,6 +108,13 @@ class LineTemperatureSection(Section):
         description="… and by how much that may change in the course of a run",
         json_schema_extra={"unit": "K"},
     )
+
+    @property
+    def stated(self) -> StatedTemperatureSection | None:
+        """What is stated, if anything is."""
+        if self.stated_c is None:
+            return None
+        return StatedTemperatureSection(stated_c=self.stated_c, stated_within_k=self.stated_within_k)
 
 
 class LineScalarSection(Section):
@@ -123,7 +133,7 @@ class LinesSection(Section):
     columns: tuple[str, ...] = Field(
         min_length=3,
         max_length=40,
-        description="what the numbers of a line are, from left to right; `-` is one that is not read",
+        description="what stands in a line, from left to right; `-` is a number or a text that is not read",
         json_schema_extra={
             "allowed": "`time`, `sequence`, `gx gy gz`, `ax ay az`, `mx my mz`, `temperature`, names in `scalars`, `-`"
         },
@@ -135,7 +145,8 @@ class LinesSection(Section):
         default="",
         max_length=40,
         pattern=PRINTABLE,
-        description="text at the start of every sample's line, such as `$IMU,`; other lines are skipped",
+        description="text at the start of every sample's line, such as `$IMU,`; other lines are skipped; `*` in it "
+        "stands for any digits, as in `I (*) imu: `",
         json_schema_extra={"allowed": "at most 40 plain characters"} | NOTHING,
     )
     keys: tuple[Annotated[str, Field(min_length=1, max_length=40, pattern=PRINTABLE)], ...] = Field(
@@ -224,20 +235,23 @@ class LinesSection(Section):
                 raise ValueError(f"give the column {column} and the section {key} both, or neither")
         if self.acceleration is not None and "ax" not in self.columns:
             raise ValueError("there is a section acceleration, but no columns ax ay az")
-        if ("temperature" in self.columns) == (self.temperature.stated_c is not None):
-            raise ValueError(
-                "it prints no temperature: state it as temperature: {stated_c: …}, a warm-up before the run keeps it"
-                if self.temperature.stated_c is None
-                else "it prints its temperature, so leave temperature.stated_c out"
-            )
         if self.clock == "device" and self.time is None:
             raise ValueError(
                 "the clock is the device's, but there is no column time: write clock: counted if the device samples by "
                 "a timer and prints a column sequence, else clock: arrival"
             )
+        if "*" in self.prefix and self.checksum != "none":
+            raise ValueError("digits that change, * in prefix, cannot be left out of a checksum: give one of the two")
         if self.clock == "counted" and "sequence" not in self.columns:
             raise ValueError("the clock is counted, but there is no column sequence")
         return self
+
+    @property
+    def prefix_pattern(self) -> re.Pattern[bytes] | None:
+        """What finds the prefix at the start of a line, of one with digits that change; None of any other."""
+        if "*" not in self.prefix:
+            return None
+        return re.compile(b"^" + rb"\d+".join(map(re.escape, self.prefix.encode().split(b"*"))), re.MULTILINE)
 
     @property
     def least_bytes(self) -> int:

@@ -7,6 +7,7 @@ from pydantic import Field, field_validator
 
 from rig.config.link_budget import BITS_PER_BYTE, MARGIN, capacity_bytes_per_s
 from rig.config.section import Section, checked_port
+from rig.config.stated_temperature import StatedTemperatureSection
 
 ImuMessage = Literal["HIGHRES_IMU", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3"]
 # Payload of the longest form in MAVLink 2 and the 12 bytes around it (mavlink.io, message definitions of `common`).
@@ -46,6 +47,9 @@ class MavlinkSection(Section):
         pattern=r"^[0-9a-f]{8,36}$",
         description="the autopilot's own number, as `rig check` shows it; another autopilot is refused",
         json_schema_extra={"allowed": "8 to 36 hexadecimal digits, small letters"},
+    )
+    temperature: StatedTemperatureSection | None = Field(
+        default=None, description="how warm the IMU is, of an autopilot that provides no temperature of it"
     )
 
     @field_validator("port")

@@ -1,6 +1,7 @@
 """Scales of readings that come as fractions: a sample holds whole numbers, far finer than what was sent. Pure."""
 
-from rig.data.channel import Channel, of_three_axes
+from rig.config.stated_temperature import StatedTemperatureSection
+from rig.data.channel import Channel, of_stated_temperature, of_three_axes
 from rig.data.quantity import Quantity
 
 FULL_SCALE_COUNTS = 1 << 30  # half of what 32 bits hold, and finer than a float of single precision near the end
@@ -11,3 +12,10 @@ FIELD_FULL_SCALE_T = 1e-3  # as far as samples of a magnetometer reach whose own
 def fine_axes(quantity: Quantity, end_of_scale: float) -> Channel:
     """The channel of three axes whose full scale is so many counts."""
     return of_three_axes(quantity, end_of_scale / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, end_of_scale)
+
+
+def thermometer_channels(provided: Channel | None, stated: StatedTemperatureSection | None) -> tuple[Channel, ...]:
+    """The channel of a temperature that the source provides, else of the one that is stated; none without both."""
+    if provided is not None:
+        return (provided,)
+    return () if stated is None else (of_stated_temperature(stated.stated_c, stated.stated_within_k),)

@@ -49,6 +49,36 @@ def test_the_usual_ways_to_print(section: dict[str, Any], line: bytes) -> None:
     assert values.tolist() == [[1.5, -2.0, 3e-05]] * 2
 
 
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("section", "line", "values"),
+    [
+        ({}, b"1.5,-2,3,", [1.5, -2, 3]),
+        ({"separator": "semicolon"}, b"1.5; -2; 3; ", [1.5, -2, 3]),
+        ({}, b"\x1b[0;32m1.5,-2,3\x1b[0m", [1.5, -2, 3]),
+        ({"prefix": "I (*) imu: "}, b"\x1b[0;32mI (40917) imu: 1.5,-2,3\x1b[0m", [1.5, -2, 3]),
+        ({"columns": ("-", "-", "gx", "gy", "gz")}, b"2026-11-28,12:31:07.5,1.5,-2,3,", [NAN, NAN, 1.5, -2, 3]),
+        ({"columns": ("-", "gx", "gy", "gz"), "separator": "tab"}, b"run 7\t1.5\t-2\t3", [NAN, 1.5, -2, 3]),
+        ({"columns": ("gx", "gy", "gz", "temperature")}, b"1.5,-2,3,nan", [1.5, -2, 3, NAN]),
+        ({"columns": ("gx", "gy", "gz", "temperature")}, b"1.5,-2,3,", [1.5, -2, 3, NAN]),
+        ({"columns": ("gx", "gy", "gz", "temperature")}, b"1.5,-2,3,,", [1.5, -2, 3, NAN]),
+        ({"columns": ("temperature", "gx", "gy", "gz")}, b"NULL,1.5,-2,3", [NAN, 1.5, -2, 3]),
+        (
+            {"columns": ("gx", "gy", "gz", "temperature"), "keys": ("gx:", "gy:", "gz:", "t:")},
+            b"gx:1.5 gy:-2 gz:3 t:null",
+            [1.5, -2, 3, NAN],
+        ),
+    ],
+)
+def test_what_stands_around_the_numbers_and_what_is_none_costs_no_sample(
+    section: dict[str, Any], line: bytes, values: list[float]
+) -> None:
+    found, _ = read(lines_section(**{**THREE, "temperature": None, **section}), (line + b"\r\n") * 2)
+    np.testing.assert_array_equal(found, [values] * 2)
+
+
 @pytest.mark.parametrize(
     ("section", "line"),
     [

@@ -120,6 +120,77 @@ def test_a_device_that_prints_no_temperature_has_one_that_is_stated() -> None:
     assert not describe("imu", section).temperature_stated
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("stated", [None, {"stated_c": 31.0}])
+def test_a_column_that_holds_no_temperature_is_none_or_the_stated_one(stated: Any) -> None:
+    section: dict[str, Any] = {"columns": (*SEVEN, "temperature"), "temperature": stated}
+    chunks = (printed(number).strip() + b",-127.00\r\n" for number in count())
+    taken = Taken()
+    with pty_printing(chunks) as (port, _), lines("imu", sensor_section(port, **section), taken) as source:
+        source.start()
+        samples = taken.wait(source, 20)
+        described = source.sensors["imu"]
+    assert described.measures(TEMPERATURE) is described.temperature_stated is (stated is not None)
+    assert samples.dtype == described.sample_dtype
+    assert described.channel(ACCELERATION).values(samples)[0] == pytest.approx(
+        np.array([0.5, -0.25, 1]) * 9.80665, abs=1e-6
+    )
+
+
+@pytest.mark.slow
+def test_what_is_blank_in_most_lines_is_recorded_when_it_is_there() -> None:
+    """A barometer that is read ten times a second beside a gyroscope that is a hundred times."""
+    section: dict[str, Any] = {"columns": (*SEVEN, "air"), "scalars": {"air": {"unit": "hPa"}}}
+    air = [b"", b"1013.2"]
+    chunks = (printed(number).strip() + b"," + air[number % 10 == 0] + b"\r\n" for number in count())
+    parts: dict[str, list[NDArray[Any]]] = {"imu": [], "imu_air": []}
+    taken = Taken()
+
+    def take(sensor: str, samples: NDArray[Any]) -> None:
+        parts[sensor].append(samples)
+        if sensor == "imu_air":
+            taken(sensor, samples)
+
+    with pty_printing(chunks) as (port, _), lines("imu", sensor_section(port, **section), take) as source:
+        source.start()
+        taken.wait(source, 3)
+        pressure = source.sensors["imu_air"].channel(PRESSURE)
+    of_the_air, of_the_imu = (np.concatenate(parts[name]) for name in ("imu_air", "imu"))
+    assert pressure.values(of_the_air) == pytest.approx(np.full(len(of_the_air), 101_320.0))
+    assert of_the_air["sequence"].tolist() == [*range(len(of_the_air))], "none is lost that was not there"
+    assert (np.diff(of_the_imu["sequence"].astype(int)) == 1).all() and len(of_the_imu) > len(of_the_air)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rate_hz", "text"),
+    [
+        (200.0, lambda time_s: b"%.2f" % time_s),
+        (200.0, lambda time_s: b"%.6f" % np.float32(time_s)),
+        (50.0, lambda time_s: b"%.1f" % time_s),
+    ],
+    ids=["two decimals", "single precision", "one decimal"],
+)
+def test_coarse_seconds_are_made_even_and_the_stated_rate_is_right(rate_hz: float, text: Any) -> None:
+    section: dict[str, Any] = {"time": {"unit": "s", "wrap": 0}}
+    times_s = (20_000.0 + number / rate_hz for number in count())
+    chunks = (text(time_s) + b",1.5,-2.25,3,0.5,-0.25,1\r\n" for time_s in times_s)
+    taken = Taken()
+    with (
+        pty_printing(chunks, 0.002) as (port, _),
+        lines(
+            "imu", sensor_section(port, rate_hz=rate_hz, **section), taken, patience=Patience(first_s=20.0)
+        ) as source,
+    ):
+        source.start()
+        samples = taken.wait(source, 600)
+        described = source.sensors["imu"]
+    assert (np.diff(samples["sequence"].astype(int)) == 1).all(), "none is lost"
+    off_s = 1e-6 * samples["board_time_us"] - np.arange(len(samples)) / rate_hz
+    assert described.stamp_std_s is not None and off_s.std() < 1.5 * described.stamp_std_s
+    assert (np.diff(samples["board_time_us"].astype(np.int64)) > 0).all()
+
+
 def test_a_look_says_what_comes() -> None:
     with pty_printing(chain([BOOT], stream())) as (port, _):
         told = [str(each) for each in look("imu", sensor_section(port))]

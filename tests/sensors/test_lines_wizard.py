@@ -164,6 +164,17 @@ FORMATS = {
     "micros that wrap at a byte of bits": Format(
         lambda r: text("%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", (1e6 * r["t"]) % 2**22, *deg(r), *g(r)), f"time {IMU}",
         {"time": {"unit": "us", "wrap": 2**22}} | DEG | G_UNIT),
+    "a separator behind the last, a date and a clock before": Format(
+        lambda r: text("2026-11-28,12:31:%05.2f,%d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f,", r["t"], 1e6 * r["t"], *deg(r),
+                       *g(r)),
+        f"- - time {IMU}", US | DEG | G_UNIT),
+    "ESP-IDF's log, in green": Format(
+        lambda r: text("\033[0;32mI (%d) imu: %d,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f\033[0m", 1e3 * r["t"], 1e6 * r["t"],
+                       *deg(r), *g(r)), f"time {IMU}",
+        US | {"prefix": "I (*) imu: "} | DEG | G_UNIT),
+    "seconds with two decimals": Format(
+        lambda r: text("%.2f,%.3f,%.3f,%.3f,%.4f,%.4f,%.4f", r["t"] - 0.005, *deg(r), *g(r)), f"time {IMU}",
+        {"time": {"unit": "s", "wrap": 0}} | DEG | G_UNIT, rate_hz=200),
     "an unknown scale, and a battery's voltage": Format(
         lambda r: text("%d,%d,%d,%d,%.3f,%.3f,%.3f,%.1f", 1e6 * r["t"], *counts(deg(r), 50.0), *si(r, "a"), 3.7),
         f"time {IMU} -", US | {"rate": {"unit": "?"}, "acceleration": {"unit": "m/s2"}},

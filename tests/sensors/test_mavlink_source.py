@@ -9,6 +9,7 @@ import pytest
 
 from rig.config.sensor_sections import SensorSection
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
+from rig.data.recorded_sensor import UNKNOWN_CHANGE_K
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.source import MavlinkSource, look, mavlink
@@ -70,6 +71,41 @@ def test_readings_are_raw_again_whatever_the_parameters(firmware: Any, imu: str)
     assert described.channel(TEMPERATURE).values(samples)[0] == pytest.approx(25 if imu == "HIGHRES_IMU" else 22)
     assert samples["sequence"].tolist() == list(range(len(samples)))
     assert np.diff(samples["board_time_us"].astype(np.int64)).mean() == pytest.approx(1e4, rel=0.02)
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("imu", "of_it"),
+    [
+        ("SCALED_IMU", {"provides_temperature": False}),
+        ("HIGHRES_IMU", {"provides_temperature": False}),
+        ("RAW_IMU", {"mavlink_version": 1}),
+    ],
+)
+@pytest.mark.parametrize("stated", [None, {"stated_c": 31.0, "stated_within_k": 4.0}])
+def test_a_temperature_that_is_not_provided_is_none_or_the_stated_one(imu: str, of_it: Any, stated: Any) -> None:
+    with autopilot_on_a_wire(**of_it) as wire:
+        sections = {"imu": section(wire.port, imu, temperature=stated)}
+        told = " ".join(map(str, look(sections)))
+        with Listening(sections) as heard:
+            samples = heard.hear(20)
+            described = heard.source.sensors["imu"]
+    assert samples.dtype == described.sample_dtype
+    if stated is None:
+        assert not described.measures(TEMPERATURE) and described.unseen_change_k == UNKNOWN_CHANGE_K
+        assert "provides no temperature" in told
+    else:
+        assert described.temperature_stated and described.unseen_change_k == 4.0
+        assert described.channel(TEMPERATURE).values(samples)[-1] == 31.0 and "31 °C is stated" in told
+
+
+@pytest.mark.slow
+def test_px4_reads_its_barometer_now_and_then_and_its_temperature_stands_meanwhile() -> None:
+    with autopilot_on_a_wire("px4") as wire, Listening({"imu": section(wire.port, rate_hz=100)}) as heard:
+        samples = heard.hear(60)
+        described = heard.source.sensors["imu"]
+    assert described.channel(TEMPERATURE).values(samples) == pytest.approx(np.full(len(samples), 25.0))
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ PERFECT = SimulatedSensorSection(
 def section(port: str, imu: str = "HIGHRES_IMU", **changes: Any) -> SensorSection:
     """A configured IMU of the autopilot at `port`."""
     line = {"port": port, "baud": changes.pop("baud", 921600), "imu": imu, "uid": changes.pop("uid", None)}
+    line["temperature"] = changes.pop("temperature", None)
     sensor = {"part": "mavlink", "serial_number": "FC-1", "mavlink": line, "acceleration": {"range_g": 16}, **changes}
     return SensorSection.model_validate(sensor)
 
@@ -51,11 +52,14 @@ class AutopilotOnAWire:
         armed: bool = False,
         simulated: SimulatedSensorSection = PERFECT,
         clock_ppm: float = 0.0,
+        provides_temperature: bool = True,
+        mavlink_version: int = 2,
     ) -> None:
         self.parameters = Parameters(firmware, imus, left, file)
         self._firmware, self._motion_at, self._imus = firmware, motion_at, imus
         self._on_for_s, self._armed = on_for_s, armed
         self._simulated, self._clock_ppm = simulated, clock_ppm
+        self._provides_temperature, self._mavlink_version = provides_temperature, mavlink_version
         self.autopilot: SimulatedAutopilot | None = None
         self.wire = DeviceOnAWire(lambda: self.autopilot, TICK_S, pace, dead=dead)
         self.line, self.port = self.wire.line, self.wire.port
@@ -82,6 +86,8 @@ class AutopilotOnAWire:
             clock_ppm=self._clock_ppm,
             on_for_s=self._on_for_s,
             armed=self._armed,
+            provides_temperature=self._provides_temperature,
+            mavlink_version=self._mavlink_version,
             seed=3,
             time_s=self.time_s,
         )

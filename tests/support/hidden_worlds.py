@@ -167,6 +167,38 @@ def autopilot(seed: int) -> dict[str, Any]:
     return changed
 
 
+def by_message(message: str, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
+    """An autopilot's IMU of so much noise before its filter, read by such a message, on an arm that may not vibrate.
+
+    Of three seeds one is an autopilot that provides no temperature.
+    """
+    document = autopilot(2 * seed)  # ArduPilot's, which has every message
+    sensor = document["world"]["sensors"]["imu1"]
+    sensor["noise_rad_s"] = noise_rad_s
+    sensor["autopilot"]["provides_temperature"] = seed % 3 != 0
+    document["sensors"]["imu1"]["mavlink"]["imu"] = message
+    return _shaking(document, vibrates=vibrates)
+
+
+def with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int) -> dict[str, Any]:
+    """A device that prints degrees per second with so many digits, which the section says for every other seed."""
+    document = prints_lines(3 * seed)
+    document["world"]["sensors"]["imu"]["noise_rad_s"] = noise_rad_s
+    printed = document["sensors"]["imu"]["lines"]
+    document["world"]["sensors"]["imu"]["lines"]["prints"] = {
+        **printed,
+        "rate": {"unit": "deg/s", "decimals": decimals},
+    }
+    printed["rate"] = {"unit": "deg/s", "decimals": decimals if seed % 2 else None}
+    return _shaking(document, vibrates=vibrates)
+
+
+def _shaking(document: dict[str, Any], *, vibrates: bool) -> dict[str, Any]:
+    still = dict.fromkeys(("vibration_fraction", "vibration_rms_rad_s", "vibration_seen_rms_rad_s"), 0.0)
+    shaken: dict[str, Any] = document if vibrates else merge(document, {"world": {"arm": still}})
+    return shaken
+
+
 def prints_lines(seed: int) -> dict[str, Any]:
     """A device that prints lines, by its own time, by a number that it counts, or by both; some of them are lost."""
     rng = np.random.default_rng(seed)
@@ -398,9 +430,14 @@ def first_seed(family: str) -> int:
 
 def recorded(family: str, seed: int, folder: Path) -> None:
     """`rig run` in `folder`, which keeps its configuration, its run folder and what it said."""
+    host = f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}"
+    run_in(at_address(FAMILIES[family](seed), host), folder)
+
+
+def run_in(document: Mapping[str, Any], folder: Path) -> None:
+    """`rig run` of a configuration in `folder`, as of `recorded`."""
     folder.mkdir(parents=True)
     config = folder / "config.yaml"
-    document = at_address(FAMILIES[family](seed), f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}")
     config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(folder / "run")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)

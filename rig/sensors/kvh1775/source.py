@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from math import radians
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 
 from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.channel import of_thermometer, stamped
-from rig.data.quantity import ACCELERATION, FIELD, RATE
+from rig.data.not_provided import POSSIBLE_C, Absent
+from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
+from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
@@ -21,10 +24,14 @@ from rig.sensors.own_port import closed_on_failure
 from rig.sensors.scales import DEGREES_PER_COUNT, FIELD_FULL_SCALE_T, FULL_SCALE_COUNTS, fine_axes
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
+from rig.sensors.thermometer import Thermometer
 
-GYROSCOPE_VALID, ACCELEROMETER_VALID = 0x07, 0x70
+# ICD 56-0298 Rev. B, section 5: bits 0 to 2 of a message's status say that the axes of the gyroscope are valid, bits 4
+# to 6 those of the accelerometer. Nothing says of temperature and field whether they are.
+NOT_PROVIDED: Mapping[str, Absent] = MappingProxyType(
+    {"rate": Absent(bits=0x07), "force": Absent(bits=0x70), "temperature": Absent(within=POSSIBLE_C)}
+)
 INVALID_S = 1.0  # of messages in a row that say of themselves they are wrong
-_UNKNOWN = 1 << 40  # temperature that nothing has told yet
 
 
 class Kvh1775Source:
@@ -39,9 +46,8 @@ class Kvh1775Source:
         line = _line_of(section)
         self._wanted = wanted_of(section)
         self._described = describe(name, section)
-        self._valid = GYROSCOPE_VALID | (ACCELEROMETER_VALID if section.acceleration is not None else 0)
         self._invalid_in_a_row = 0
-        self._temperature_counts = _UNKNOWN
+        self._thermometer = Thermometer(f"sensors.{name}: the KVH 1775 on {line.port}", section.rate_hz)
         self._first: int | None = None  # number of the first message that became a sample
         self._field_name, self._field = field_name(name), describe_field(name, section)
         self._field_reader = FieldReader(FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS)
@@ -85,18 +91,18 @@ class Kvh1775Source:
             fields = self._field_reader.feed(messages, numbers, times_us, host_time_s)
             if len(fields):
                 self._on_samples(self._field_name, fields)
-        temperature_counts = self._temperatures(messages)
-        valid = (messages["status"] & self._valid) == self._valid
-        valid &= np.isfinite(messages["rotation"]).all(axis=1) & np.isfinite(messages["acceleration_g"]).all(axis=1)
+        temperatures_c, described = self._thermometer.read(self._temperatures_c(messages)), self._described
+        valid = NOT_PROVIDED["rate"].provided(messages["rotation"], messages["status"])
+        if described.measures(ACCELERATION):
+            valid &= NOT_PROVIDED["force"].provided(messages["acceleration_g"], messages["status"])
         self._watch(messages, valid)
-        valid &= temperature_counts != _UNKNOWN
+        valid &= np.isfinite(temperatures_c)
         if not valid.any():
             return
-        described = self._described
         if self._first is None:
             self._first = int(numbers[valid][0])
         samples = stamped(described.sample_dtype, numbers[valid] - self._first, times_us[valid], host_time_s)
-        samples["temperature_counts"] = temperature_counts[valid]
+        described.channel(TEMPERATURE).fill(samples, temperatures_c[valid])
         rate_rad_s = messages["rotation"][valid].astype(np.float64)
         if self._wanted.rotation == "delta":
             rate_rad_s *= self._wanted.rate_hz  # its own seconds, in which it counts its intervals
@@ -117,17 +123,13 @@ class Kvh1775Source:
                 "Wait until it is warm, look at its built-in test with `rig kvh info`; if it stays, ask its maker",
             )
 
-    def _temperatures(self, messages: NDArray[Any]) -> NDArray[np.int64]:
-        """(n,) hundredths of a degree; format C says them in every fourth message, and `_UNKNOWN` before the first."""
-        if self._wanted.message != "C":
-            found: NDArray[np.int64] = messages["temperature"].astype(np.int64)
-            return found
-        said = messages["sequence"] % 4 == 0
-        hundredths = np.rint(messages["fourth"].astype(np.float64) / DEGREES_PER_COUNT).astype(np.int64)
-        newest = np.maximum.accumulate(np.where(said, np.arange(len(said)), -1))
-        held: NDArray[np.int64] = np.where(newest >= 0, hundredths[newest], self._temperature_counts)
-        self._temperature_counts = int(held[-1])
-        return held
+    def _temperatures_c(self, messages: NDArray[Any]) -> Array:
+        """(n,) °C, NaN in messages that hold none: format C says it in every fourth."""
+        if self._wanted.message == "C":
+            celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
+        else:
+            celsius = messages["temperature"] * DEGREES_PER_COUNT
+        return np.where(NOT_PROVIDED["temperature"].provided(celsius), celsius, np.nan)
 
 
 def wanted_of(section: SensorSection) -> Wanted:

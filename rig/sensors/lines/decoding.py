@@ -1,9 +1,12 @@
 """Lines of text to arrays of numbers, in blocks of bytes as they come. Pure.
 
 A line is a sample when it holds as many numbers as there are columns, with the right things between them, and its
-checksum is right if there is one. Everything else is counted as what it is.
+checksum is right if there is one. A separator may stand behind the last, codes for colours around the line, any text in
+a column that is not read, and nothing, or a word that means it, in one that is: see `rig.sensors.lines.fields`.
+Everything else is counted as what it is.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 
 from rig.config.lines_section import SEPARATORS, LinesSection
 from rig.estimation.arrays import Array
+from rig.sensors.lines.fields import FieldReader
 from rig.sensors.lines.numbers import numbers_at
 
 LONGEST_LINE = 2000  # bytes; what has no end for so long is no line
@@ -23,6 +27,7 @@ _OTHER, _NUMBER, _SEPARATOR, _SPACE, _END, _KEY = range(6)
 _KEYS = 0x80  # bytes from here on stand for the keys while a line is looked at; no key has one
 _NEWLINE, _STAR, _BLANK = (ord(each) for each in "\n* ")
 _AROUND_KEYS = b",;{}[]()\"'|&"
+COLOURS = re.compile(rb"\x1b\[[0-9;]*[A-Za-z]")  # ECMA-48, control sequences, as terminals have them for colours
 _HEX = np.full(256, 255, np.uint8)
 for _place, _digit in enumerate("0123456789abcdef"):
     _HEX[[ord(_digit), ord(_digit.upper())]] = _place
@@ -32,6 +37,7 @@ for _place, _digit in enumerate("0123456789abcdef"):
 class Decoded:
     """What bytes held: `values` (n, columns) of the samples, as printed, and how many lines were none.
 
+    A value that the device does not provide is NaN, and so is the text of a column that is not read.
     `before` (m,) says of each line that was no sample, and no comment, how many samples of these stood before it;
     `why` is how the first of them begins.
     """
@@ -47,13 +53,18 @@ class LineReader:
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = len(section.columns)
-        self._prefix, self._comment = section.prefix.encode(), section.comment.encode()
+        # Digits that change from line to line, for which a * stands, are made the same.
+        self._changing = section.prefix_pattern
+        self._prefix, self._comment = section.prefix.replace("*", "0").encode(), section.comment.encode()
         self._keys = _markers(section.keys)
         self._summed = section.checksum == "nmea"
         self._separator = b"" if section.keys else SEPARATORS[section.separator].strip(b" ")
         self._classes = _classes(self._separator, keyed=bool(section.keys))
+        self._fields = FieldReader(section)
         self._rest = b""
         self._begun = False
+        self._timed = "time" in section.columns
+        self.time_decimals = 0  # digits behind the point of the time, as far as they were seen
         self.unprintable = 0  # bytes that no text has
         self.bytes_seen = 0
 
@@ -65,7 +76,11 @@ class LineReader:
         self._rest = data[end:]
         if len(self._rest) > LONGEST_LINE:  # what is left of it ends as a line that is none
             data, end, self._rest = self._rest + b"\n", len(self._rest) + 1, b""
-        data = data[:end]
+        data = COLOURS.sub(b"", data[:end])
+        end = len(data)
+        if self._changing is not None:
+            data = self._changing.sub(self._prefix, data)
+            end = len(data)
         if not self._begun and end:
             self._begun, data = True, data[data.find(b"\n") + 1 :]
         if not data:
@@ -95,12 +110,24 @@ class LineReader:
             places = line_starts[good][:, None] + np.arange(len(self._prefix))
             text[places] = _BLANK
         right = self._sums(raw, text, line_starts, line_ends) if self._summed else np.ones_like(good)
+        prefixed, bare = good & right, text
         if self._keys:
             text = self._keys_marked(text)
         classes = self._classes[text]
         good &= _hold_nothing_else(classes, line_starts, line_ends)
-        values = self._values(text, classes, (line_starts, line_ends), good, right)
+        numbers = self._values(text, classes, (line_starts, line_ends), good, right)
         taken = good & right
+        values = np.full((len(taken), self._columns), np.nan)
+        values[taken] = numbers
+        for line in np.flatnonzero(prefixed & ~taken):
+            read = self._fields.read(bare[line_starts[line] : line_ends[line]].tobytes())
+            if read is not None:
+                values[line], taken[line] = read, True
+        values = values[taken]
+        if self._timed and len(values):
+            line = int(np.argmax(taken))
+            digits = self._fields.decimals(bare[line_starts[line] : line_ends[line]].tobytes(), "time")
+            self.time_decimals = max(self.time_decimals, digits)
         before = np.cumsum(taken, dtype=np.int64)[~taken]
         why = b""
         if len(before):

@@ -16,7 +16,8 @@ from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.decoding import Decoded, LineReader
-from rig.sensors.lines.stamping import Stamper
+from rig.sensors.lines.stamping import Stamper, is_coarse
+from rig.sensors.lines.time_steps import step_of_time_s
 from rig.sensors.own_port import Faults, OwnPort, closed_on_failure, opened
 from rig.sensors.silence import USUAL, Patience
 
@@ -26,6 +27,7 @@ UNPRINTABLE = 0.05  # share of bytes from which on the speed of the line is wron
 DAMAGED = 0.5  # share of lines that are no samples from which on a stream is no use
 DAMAGED_LINES = 200  # that are looked at for that
 RATE_TOLERANCE = 0.03
+ROUNDED = 2.0  # steps of its time, by which both ends of what was looked at may be off
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
 # Values (n, columns) as printed, their numbers (n,) from 0, their times (n,) in µs, and when they were read.
@@ -101,10 +103,18 @@ class LinesDevice:
         """The values (n, columns) that were read while the device was looked at."""
         return np.concatenate(self._seen)
 
+    @property
+    def time_step_s(self) -> float:
+        """The steps, s, in which the device prints its time; 0 of one that prints none."""
+        if self._section.time is None or not self._seen:
+            return 0.0
+        printed = self.seen[:, self._section.columns.index("time")]
+        return step_of_time_s(printed, self._lines.time_decimals, self._section.time.unit)
+
     def start(self) -> None:
         """Start to hand everything to `on_values`, from the next line on."""
         with self.own_port.news:
-            self._stamper = Stamper(self._section, self._rate_hz, self.where)
+            self._stamper = Stamper(self._section, self._rate_hz, self.where, self.time_step_s)
             self._skipped = 0
             self.own_port.stream(2 / self._rate_hz)
 
@@ -115,12 +125,11 @@ class LinesDevice:
     # -- what comes at all -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
         """The rate of its samples by its own time, NaN where it has none. Raises as the constructor does."""
-        enough = LOOK_SAMPLES if self._section.time is not None else 3
-        came = self.own_port.wait(lambda: self.counts.samples >= enough or self._lasted(), timeout_s)
+        came = self.own_port.wait(self._has_seen_enough, timeout_s)
         if not came and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
         rate_hz = self._measured_hz()
-        if abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE:
+        if abs(rate_hz / self._rate_hz - 1) > max(RATE_TOLERANCE, self._rate_error):
             raise SensorError(
                 "lines_other_rate",
                 f"{self.where} sends {rate_hz:.4g} samples a second, sensors.{self._sensor}.rate_hz is "
@@ -130,9 +139,20 @@ class LinesDevice:
             )
         return rate_hz
 
-    def _lasted(self) -> bool:
-        """Whether so few samples are enough of a slow device."""
-        return self.counts.samples >= 5 and self._span_s() >= LOOK_S
+    def _has_seen_enough(self) -> bool:
+        """Whether the rate can be judged: few samples are enough of a slow device, coarse times ask for more."""
+        if self._section.time is None:
+            return self.counts.samples >= 3
+        long = self.counts.samples >= 5 and self._span_s() >= LOOK_S
+        return (long or self.counts.samples >= LOOK_SAMPLES) and self._rate_error <= RATE_TOLERANCE
+
+    @property
+    def _rate_error(self) -> float:
+        """Relative error that coarse times leave in the rate; 0 of fine ones."""
+        step_s, span_s = self.time_step_s, self._span_s()
+        if not is_coarse(step_s, self._rate_hz):
+            return 0.0
+        return ROUNDED * step_s / span_s if span_s > 0 else float("inf")
 
     def _span_s(self) -> float:
         if self._section.time is None or not self._seen:
@@ -148,7 +168,7 @@ class LinesDevice:
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")
-        span_s, count = self._span_s(), len(self.seen) - 1
+        span_s, count, step_s = self._span_s(), len(self.seen) - 1, self.time_step_s
         unit_s = UNITS[time_section.unit].size
         printed = self.seen[:, self._section.columns.index("time")]
         typical_s = float(np.median(np.diff(printed))) * unit_s
@@ -158,7 +178,7 @@ class LinesDevice:
                 f"{self.where} prints the same time {printed[0]:.15g} again and again",
                 "See which column is the time, and in which unit: docs/how-to/lines.md",
             )
-        coarse = time_section.unit != "s" and typical_s < 50 * unit_s
+        coarse = typical_s < 50 * step_s
         return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s
 
     def _why_no_sample(self, timeout_s: float) -> SensorError:

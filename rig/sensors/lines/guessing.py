@@ -68,11 +68,13 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
     named = _named(shape.names)
     for place, name in named.items():
         found.columns[place] = name
+    texts = [place for place in range(count) if np.isnan(shape.values[:, place]).any()]
+    found.told += [f"column {place + 1} holds no number in every line" for place in texts]
     _find_time(shape, found)
     _find_triads(shape, found, shape.arrived_s < still_until_s)
     _find_temperature(shape, found, shape.arrived_s < still_until_s)
     for place, name in enumerate(found.columns):
-        if name == "-":
+        if name == "-" and place not in texts:
             found.untold.append(f"what column {place + 1} is: it is not read")
     for name, unit in found.units.items():
         places = [found.columns.index(name + axis) for axis in "xyz"]
@@ -104,12 +106,11 @@ def _find_time(shape: Shape, guess: Guess) -> None:
     guess.rate_hz = (len(shape.values) - 1) / lasted_s
     for place in range(shape.values.shape[1]):
         column, name = shape.values[:, place], guess.columns[place]
-        if name not in ("-", "time", "sequence") or not _goes_on(column):
+        if name not in ("-", "time", "sequence") or np.isnan(column).any() or not _goes_on(column):
             continue
         steps = np.diff(column)
-        forward = steps[steps > 0]
-        by_ones = np.mean(forward == 1) > 0.9
-        unit = _unit_of_time(forward, lasted_s / (len(column) - 1))
+        by_ones = np.mean(steps == 1) > 0.9
+        unit = _unit_of_time(steps[steps >= 0], lasted_s / (len(column) - 1))
         ambiguous = by_ones and unit is not None
         if name == "-" and ambiguous:
             guess.columns[place], guess.time = "time", {"unit": "?", "wrap": 2**32}
@@ -137,14 +138,15 @@ def _tell_time(guess: Guess, place: int, column: Array, unit: str) -> None:
         guess.told.append("the time did not wrap while it was looked at: 2^32 is taken, as of an Arduino")
     guess.time = {"unit": unit, "wrap": 2**32 if seen is None else seen}
     steps = np.diff(column)
-    rate_hz = TIMES[unit] / float(np.mean(steps[steps > 0]))
+    rate_hz = TIMES[unit] / float(np.mean(steps[steps >= 0]))
     guess.rate_hz = rate_hz
     guess.told.append(f"column {place + 1} is the time in {unit}: it goes on as the computer's clock does")
 
 
 def _goes_on(column: Array) -> bool:
+    """Whether it never goes back but where it begins anew; a coarse time may stand for several lines."""
     steps = np.diff(column)
-    backwards = int(np.count_nonzero(steps <= 0))
+    backwards = int(np.count_nonzero(steps < 0))
     return bool(backwards <= max(2, 0.02 * len(steps)) and steps.max() > 0 and np.all(column >= 0))
 
 
@@ -166,7 +168,7 @@ def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
     """Three columns after one another that nobody named: by their sizes at rest and while it is turned."""
     for start in range(shape.values.shape[1] - 2):
         places = slice(start, start + 3)
-        if guess.columns[places] != ["-"] * 3:
+        if guess.columns[places] != ["-"] * 3 or np.isnan(shape.values[:, places]).any():
             continue
         kind = _kind(shape.values[:, places], still)
         if kind is not None and kind + "x" not in guess.columns:

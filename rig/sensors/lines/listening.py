@@ -55,7 +55,7 @@ def _speed(port: str, tell: Callable[[str], None]) -> int:
     for baud in USUAL:
         heard = _heard(port, baud)
         anything = anything or bool(heard)
-        like_text = sum(32 <= each < 127 or each in b"\r\n\t" for each in heard)
+        like_text = sum(32 <= each < 127 or each in b"\r\n\t\x1b" for each in heard)
         if len(heard) > 20 and like_text > LIKE_TEXT * len(heard) and (b"\n" in heard or b"\r" in heard):
             tell(f"{port} speaks at {baud} Bd")
             return baud

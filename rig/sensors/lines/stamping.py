@@ -1,5 +1,6 @@
 """Which sample is which, and when it was taken: by the device's time, by counting, or by when a line arrived. Pure."""
 
+from copy import copy
 from dataclasses import dataclass, field
 from math import exp
 
@@ -18,16 +19,23 @@ ARRIVAL_GAP_S = 0.1  # that a line may be late before one counts as lost
 _RESTARTED = "Check its supply and cable, and that its program prints nothing else between; then run again"
 
 
+def is_coarse(step_s: float, rate_hz: float) -> bool:
+    """Whether steps of a printed time are no small part of the interval between samples."""
+    return step_s * rate_hz > COARSE
+
+
 @dataclass(slots=True)
 class Stamper:
     """Numbers and times of one stream's samples, in µs of its clock; `lost` are those that never came.
 
-    What cannot be is left out and counted as `odd`: a time or a number that goes back, or more than 2 s ahead.
+    What cannot be is left out and counted as `odd`: a time or a number that goes back, or more than 2 s ahead. The time
+    is printed in steps of `step_s`: coarse ones are made even.
     """
 
     section: LinesSection
     rate_hz: float
     where: str  # the device as messages name it
+    step_s: float = 0.0
     lost: int = 0
     odd: int = 0
     _number: int = -1
@@ -62,9 +70,12 @@ class Stamper:
             steps = self._late(steps, host_time_s)
         if began:
             steps[0], passed_s[0] = 1, 0.0
+        told_s = self._time_s + np.cumsum(passed_s)
+        if self._is_coarse and "sequence" not in self.section.columns:
+            steps = self._steps_of_coarse(told_s)
         self.lost += int(steps.sum()) - len(steps)
         numbers = self._number + np.cumsum(steps)
-        times_s = self._times_s(numbers, self._time_s + np.cumsum(passed_s), host_time_s)
+        times_s = self._times_s(numbers, told_s, host_time_s)
         self._number, self._time_s = int(numbers[-1]), self._time_s + float(passed_s.sum())
         self._remember(values[-1])
         stamps = np.rint(times_s * 1e6).astype(np.int64)
@@ -142,8 +153,22 @@ class Stamper:
     @property
     def _is_coarse(self) -> bool:
         """Whether the device's time is printed in steps that are no small part of the interval between samples."""
-        time = self.section.time
-        return time is not None and time.unit != "s" and UNITS[time.unit].size * self.rate_hz > COARSE
+        return self.section.time is not None and is_coarse(self.step_s, self.rate_hz)
+
+    def _steps_of_coarse(self, told_s: Array) -> NDArray[np.int64]:
+        """Samples (n,) that passed before each, by coarse times (n,): one each, but where a time is too far ahead.
+
+        What is lost within a step of the time cannot be seen.
+        """
+        even = Evened(self.rate_hz) if self._even is None else copy(self._even)
+        steps = np.ones(len(told_s), np.int64)
+        for place, time_s in enumerate(told_s):
+            if even.begun:
+                late = (time_s - even.ahead_s(1)) * self.rate_hz
+                steps[place] += round(late) if late > self.step_s * self.rate_hz + 0.5 else 0
+            number = even.number + int(steps[place])
+            even.evened(np.array([number]), float(time_s))
+        return steps
 
     def _jump(self, row: Array) -> str:
         columns = self.section.columns
@@ -183,12 +208,17 @@ class Evened:
     """A clock that follows told times slowly, by how many samples have passed: a loop of second order."""
 
     rate_hz: float
+    number: int = -1
     _period_s: float = field(default=0.0)
     _time_s: float = 0.0
-    _number: int = -1
 
     def __post_init__(self) -> None:
         self._period_s = 1.0 / self.rate_hz
+
+    @property
+    def begun(self) -> bool:
+        """Whether it knows the time of a sample."""
+        return self.number >= 0
 
     def ahead_s(self, steps: int) -> float:
         """When the sample after so many steps would be."""
@@ -196,16 +226,16 @@ class Evened:
 
     def evened(self, numbers: NDArray[np.int64], told_s: float) -> Array:
         """Times (n,) of samples (n,), of which the last was told to be at `told_s`."""
-        last, before, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self._number
-        if self._number < 0:
-            self._number, self._time_s = last, told_s
+        last, before, count = int(numbers[-1]), self._time_s, int(numbers[-1]) - self.number
+        if not self.begun:
+            self.number, self._time_s = last, told_s
             return np.asarray(told_s - (last - numbers) * self._period_s, np.float64)
         wrong_s = told_s - self.ahead_s(count)
         share = 1 - exp(-count * self._period_s / SMOOTHED_S)
         self._time_s = max(self.ahead_s(count) + share * wrong_s, before + 1e-6 * count)
         self._period_s = max(self._period_s + share**2 / 4 * wrong_s / count, 1e-6)
-        found: Array = before + (self._time_s - before) * (numbers - self._number) / count
-        self._number = last
+        found: Array = before + (self._time_s - before) * (numbers - self.number) / count
+        self.number = last
         return found
 
     def evened_each(self, numbers: NDArray[np.int64], told_s: Array) -> Array:

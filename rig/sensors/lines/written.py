@@ -30,8 +30,6 @@ def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu")
     for kind, key in (("g", "rate"), ("a", "acceleration"), ("m", "field")):
         if kind in guess.units:
             lines[key] = _mapped(guess.units[kind])
-    if "temperature" not in guess.columns:
-        lines["temperature"] = "{stated_c: 22}  # it prints none: how warm it is"
     gap = f'"{GAP}"'
     rows = [
         "sensors:",
@@ -45,6 +43,8 @@ def section(shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu")
         rows.append(f"    acceleration: {{range_g: {gap}}}  # … and the accelerometer; without this it is not read")
     rows += ["    serial:", f"      port: {port}", f"      baud: {baud}", "    lines:"]
     rows += [f"      {key}: {value}" for key, value in lines.items()]
+    if "temperature" not in guess.columns:
+        rows.append("      # temperature: {stated_c: …}  it prints none: state how warm it is, or U allows for much")
     return "\n".join(rows) + "\n"
 
 

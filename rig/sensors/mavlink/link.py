@@ -151,6 +151,11 @@ class Link:
                 "Choose another message with mavlink.imu: not every firmware has all of them",
             )
 
+    def request(self, message: str) -> None:
+        """Have a message sent once, if the autopilot can do that."""
+        number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
+        self._send(self._command_message(REQUEST_MESSAGE, number, 0.0))
+
     def identify(self) -> None:
         """Ask for its version and its own number, which some do not tell."""
         for wait_s in self._patience.attempts()[:2]:

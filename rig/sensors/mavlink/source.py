@@ -12,39 +12,65 @@ from numpy.typing import NDArray
 from rig.config.mavlink_section import MavlinkSection
 from rig.config.sensor_sections import SensorSection
 from rig.data.channel import Channel, of_thermometer, stamped
-from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
+from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
+from rig.data.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals
 from rig.sensors.mavlink.counting import ImuCounter
 from rig.sensors.mavlink.link import Link
-from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Reading, is_cut, reading_of
+from rig.sensors.mavlink.readings import CUT_STEPS, INT16_MAX, MILLI, UNIT_US, Field, Reading, is_cut, reading_of
 from rig.sensors.mavlink.writing import unfinished
 from rig.sensors.own_port import closed_on_failure
-from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes
+from rig.sensors.scales import DEGREES_PER_COUNT, fine_axes, thermometer_channels
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
+from rig.sensors.thermometer import Thermometer
 
 RATE_LOOK = 40  # messages by which the rate is judged
 RATE_WAIT_S = 20.0
 RATE_TOLERANCE = 0.05
+ASKED_FOR, ASKED_S = 10, 2.0  # messages that a look asks for one by one, and how long it waits for them
 WIDEST = 0.98  # of what 16 bits hold, where undoing a correction may have shifted the end of the scale
 
 
 class _Imu:
-    """One configured IMU of the stream: its correction, its numbers, the intervals of its first messages."""
+    """One configured IMU of the stream: its correction, its numbers, the intervals of its first messages.
+
+    `without_reading` counts the messages that hold no new rate, or no new force where that is recorded.
+    """
 
     def __init__(self, name: str, section: SensorSection) -> None:
         self.name, self.section, self.line = name, section, line_of(section)
         self.described = describe(name, section)
         self.correction = Correction()
         self.counter = ImuCounter(name, 1e6 / section.rate_hz, UNIT_US[self.line.imu])
+        self.thermometer = Thermometer(f"sensors.{name}: the autopilot at {self.line.port}", section.rate_hz)
         self.intervals_us: list[int] = []
+        self.without_reading = 0
+        self._needed: frozenset[Field] = frozenset(("rate", "force") if self._has_force else ("rate",))
+
+    @property
+    def _has_force(self) -> bool:
+        return self.section.acceleration is not None
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether enough messages came to judge them."""
+        return max(len(self.intervals_us), self.without_reading) >= RATE_LOOK
+
+    def settle(self) -> None:
+        """Describe the samples by what the first messages have provided."""
+        self.described = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
     def take(self, message: Any, *, whole: bool) -> tuple[int, int, Reading] | None:
         """Number, time and reading; None of a copy. `whole`: none was lost since the message before."""
         reading = reading_of(message)
+        if not self.thermometer.provides:
+            self.thermometer.last_c = reading.temperature_c
+        if not self._needed <= reading.provided:
+            self.without_reading += 1
+            return None
         before_us, first = self.counter.time_us, self.counter.number < 0
         if not self.counter.count(reading.time):
             return None
@@ -56,8 +82,9 @@ class _Imu:
         """Samples of the readings, numbered from the number `first`."""
         numbers, times_us, readings = zip(*taken, strict=True)
         samples = stamped(self.described.sample_dtype, np.array(numbers) - first, np.array(times_us), host_time_s)
-        # Not filled like the others: `round` raises for what is no number, and a made-up temperature would be believed.
-        samples["temperature_counts"] = [round(each.temperature_c / DEGREES_PER_COUNT) for each in readings]
+        if self.thermometer.provides and self.described.measures(TEMPERATURE):
+            temperatures_c = self.thermometer.read(np.array([each.temperature_c for each in readings]))
+            self.described.channel(TEMPERATURE).fill(samples, temperatures_c)
         rates = self.correction.raw_rate(np.array([each.rate_rad_s for each in readings]))
         self.described.channel(RATE).fill(samples, rates)
         if self.described.measures(ACCELERATION):
@@ -87,6 +114,8 @@ class MavlinkSource:
             for message, imu in self._imus.items():
                 self.link.ask_for(message, imu.counter.interval_us)
             self._see_rates()
+            for imu in self._imus.values():
+                imu.settle()
 
     @property
     def corrected(self) -> Mapping[str, str]:
@@ -119,9 +148,16 @@ class MavlinkSource:
 
     def _see_rates(self) -> None:
         imus = self._imus.values()
-        self.link.own_port.wait(lambda: all(len(imu.intervals_us) >= RATE_LOOK for imu in imus), RATE_WAIT_S)
+        self.link.own_port.wait(lambda: all(imu.looked_at for imu in imus), RATE_WAIT_S)
         for imu in imus:
             asked_hz, intervals_us = imu.section.rate_hz, imu.intervals_us[1:]
+            if imu.without_reading > imu.counter.number:
+                raise SensorError(
+                    "autopilot_no_reading",
+                    f"sensors.{imu.name}: by its field fields_updated {imu.line.imu} held no new reading in "
+                    f"{imu.without_reading} of {imu.without_reading + max(imu.counter.number, 0)} messages",
+                    "Lower rate_hz, or choose another message with mavlink.imu",
+                )
             came_hz = 1e6 * len(intervals_us) / sum(intervals_us) if intervals_us else 0.0
             if abs(came_hz / asked_hz - 1.0) > RATE_TOLERANCE:
                 raise SensorError(
@@ -174,12 +210,13 @@ def judged(link: Link, name: str, section: SensorSection) -> tuple[Mapping[str, 
     return found, problems
 
 
-def describe(name: str, section: SensorSection) -> RecordedSensor:
-    """What a reader of its samples must know."""
+def describe(name: str, section: SensorSection, *, provides_temperature: bool = True) -> RecordedSensor:
+    """What a reader of its samples must know; without a connection a temperature counts as provided."""
     cut = is_cut(line_of(section).imu)
+    stated = line_of(section).temperature
     channels = [
         _channel(RATE, radians(section.range_deg_s), MILLI if cut else None),
-        of_thermometer(DEGREES_PER_COUNT, 0.0),
+        *thermometer_channels(of_thermometer(DEGREES_PER_COUNT, 0.0) if provides_temperature else None, stated),
     ]
     if section.acceleration is not None:
         step = MILLI * STANDARD_GRAVITY_M_S2 if cut else None
@@ -198,7 +235,12 @@ def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
     """What there is and what is wrong with it; nothing is changed. Raises SensorError as `Link`."""
     (first, section), *_ = sections.items()
     line = line_of(section)
-    with closing(Link(first, line.port, line.baud)) as link:
+    heard: list[Any] = []
+
+    def hear(messages: list[tuple[Any, bool]], _: float) -> None:
+        heard.extend(message for message, _ in messages)
+
+    with closing(Link(first, line.port, line.baud, hear)) as link:
         link.identify()
         yield f"{link.known.words}, at {line.port}"
         yield from unfinished(link)
@@ -207,9 +249,29 @@ def look(sections: Mapping[str, SensorSection]) -> Iterator[str | SensorError]:
             found, problems = judged(link, name, each)
             yield from problems
             if not problems:
+                yield from _of_the_temperature(name, each, link, heard)
                 undone = [f"{each}: {found[each]:g}" for each in names.needed if each in found]
                 yield f"{name}: {line_of(each).imu}; undone: {', '.join(undone)}"
                 yield f"{name}: the low-pass delays rates by {1e3 * delay_s(names, found):.1f} ms"
+
+
+def _of_the_temperature(name: str, section: SensorSection, link: Link, heard: list[Any]) -> Iterator[str]:
+    """How the temperature is known, unless the first messages that it is asked for provide one."""
+    line = line_of(section)
+    link.wanted = (line.imu,)
+    for _ in range(ASKED_FOR):
+        link.request(line.imu)
+    came = link.own_port.wait(lambda: sum(each.get_type() == line.imu for each in heard) >= ASKED_FOR, ASKED_S)
+    link.wanted = ()  # nothing was changed that is to be as before
+    readings = [reading_of(each) for each in heard if each.get_type() == line.imu]
+    if not came or any("temperature" in reading.provided for reading in readings):
+        return
+    stated = line.temperature
+    yield f"{name}: {line.imu} provides no temperature" + (
+        f": {stated.stated_c:g} °C is stated, within {stated.stated_within_k:g} K"
+        if stated is not None
+        else f", and none is stated: U allows for a change of {UNKNOWN_CHANGE_K:g} K (mavlink.temperature.stated_c)"
+    )
 
 
 def line_of(section: SensorSection) -> MavlinkSection:

@@ -1,0 +1,17 @@
+"""What the user states of the temperature of a sensor that provides none."""
+
+from pydantic import Field
+
+from rig.config.section import Positive, Section
+
+
+class StatedTemperatureSection(Section):
+    """How warm the sensor is, where its source provides no temperature; if nothing is stated, U allows for 20 K."""
+
+    stated_c: float = Field(ge=-40, le=85, description="how warm the sensor is")
+    stated_within_k: Positive = Field(
+        default=5.0,
+        le=60,
+        description="… and by how much that may change in the course of a run",
+        json_schema_extra={"unit": "K"},
+    )

@@ -1,0 +1,46 @@
+"""The temperatures of one stream, some of which the source may not provide."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.sensors.errors import SensorError
+
+LONGEST_WITHOUT_S = 10.0  # for which the last temperature stands for those that are not provided
+
+
+@dataclass(slots=True)
+class Thermometer:
+    """The thermometer of a sensor that sends `rate_hz` samples a second; messages name it as `where` says.
+
+    `last_c` is the last temperature that the source provided, NaN before the first.
+    """
+
+    where: str
+    rate_hz: float
+    last_c: float = float("nan")
+    _missing: int = 0
+
+    @property
+    def provides(self) -> bool:
+        """Whether the source has ever provided a temperature."""
+        return bool(np.isfinite(self.last_c))
+
+    def read(self, temperatures_c: Array) -> Array:
+        """Return temperatures (n,), each that is NaN replaced by the last one before it, NaN before the first.
+
+        Raises SensorError `temperature_lost` if the source has provided none for `LONGEST_WITHOUT_S`.
+        """
+        given = np.flatnonzero(np.isfinite(temperatures_c))
+        self._missing = len(temperatures_c) - 1 - int(given[-1]) if len(given) else self._missing + len(temperatures_c)
+        if self._missing > LONGEST_WITHOUT_S * self.rate_hz:
+            raise SensorError(
+                "temperature_lost",
+                f"{self.where} has provided no temperature for {LONGEST_WITHOUT_S:g} s",
+                "Check its thermometer; if it has none, state the temperature in the configuration",
+            )
+        newest = np.maximum.accumulate(np.where(np.isfinite(temperatures_c), np.arange(len(temperatures_c)), -1))
+        read: Array = np.where(newest >= 0, temperatures_c[newest], self.last_c)
+        self.last_c = float(read[-1]) if len(read) else self.last_c
+        return read
