@@ -18,7 +18,7 @@ from rig.estimation.accelerometer_model import PARAMETERS, Dwells, Movement, pre
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.reference_model import REFERENCE
-from rig.estimation.sweep_harmonics import FirstHarmonic
+from rig.estimation.sweep_harmonics import FirstHarmonic, evenly_turning
 from rig.motion.geometry import WRIST_1, DenavitHartenberg
 from rig.motion.steps import Dwell, Sweep
 from rig.observation.swept_acceleration import SweptAcceleration, of_turn
@@ -102,7 +102,7 @@ def _swept(at: Timed[Sweep], arm: DenavitHartenberg, noise_m_s2_sqrt_hz: float) 
         freedom=0,
         residuals_m_s2=np.zeros((0, 3)),
         vibration_m_s2=np.zeros(3),
-        turning_rad2_s2=np.array([[turn.speed_rad_s**2, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+        turning_rad2_s2=evenly_turning(turn.speed_rad_s),
     )
     return of_turn(at.step, turn, harmonic)
 

@@ -11,7 +11,8 @@ a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ 
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
 A joint turns unevenly. The weights that make mean, cosine and sine of the readings make those of ω² and of α as the
-encoders have them (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r).
+encoders have them (`Sweeps.turning_rad2_s2`), and c is each of these times (a aᵀ − 1) (p + r) and a × (p + r). What the
+lag changes in an uneven turn is that ω² and α are those of τ before, and that gravity turned by (ω − ω₀) τ less.
 
 ψ = ω τ is what the joint turns while the accelerometer lags behind the clock of its time stamps: with opposite signs
 for opposite directions. Where a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. What the
@@ -60,7 +61,8 @@ class Sweeps:
     - `attitudes` (M, 3, 3): flange to base where the angle is counted from.
     - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
     - `stations` (M,): a number for each joint and pose; sweeps of one station, both ways, share the arm's errors.
-    - `turning_rad2_s2` (M, 2, 3): mean, cosine and sine of the rate's square and of the angular acceleration.
+    - `turning_rad2_s2` (M, 6, 3): mean, cosine and sine of how the joint turned: see
+      `rig.estimation.sweep_harmonics.FirstHarmonic`.
     """
 
     harmonics_m_s2: Array
@@ -83,7 +85,7 @@ NO_SWEEPS = Sweeps(
     covariances_m2_s4=np.zeros((0, 9, 9)),
     axes_flange=np.zeros((0, 3)),
     speeds_rad_s=np.zeros(0),
-    turning_rad2_s2=np.zeros((0, 2, 3)),
+    turning_rad2_s2=np.zeros((0, 6, 3)),
     attitudes=np.zeros((0, 3, 3)),
     arms_m=np.zeros((0, 3)),
     stations=np.zeros(0, dtype=np.intp),
@@ -155,8 +157,9 @@ def predicted(theta: Array, movement: Movement) -> Array:
 
 def felt(theta: Array, movement: Movement) -> Array:
     """s (K, 3), what is felt in dwells and sweeps."""
-    s: Array = of_gravity(theta[DELAY], movement) @ theta[REFERENCE] + of_lever(movement) @ theta[LEVER]
-    return s + of_arms(movement)
+    gravity, lever = of_gravity(theta[DELAY], movement), of_lever(theta[DELAY], movement)
+    s: Array = gravity @ theta[REFERENCE] + lever @ theta[LEVER]
+    return s + of_arms(theta[DELAY], movement)
 
 
 def of_gravity(delay_s: float, movement: Movement) -> Array:
@@ -168,24 +171,59 @@ def of_gravity(delay_s: float, movement: Movement) -> Array:
     phase = sweeps.speeds_rad_s * delay_s
     cos, sin = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
     waves = np.stack([along, cos * across + sin * turned, sin * across - cos * turned], axis=1) @ to_flange[:, None]
+    waves = waves + delay_s * _turned_unevenly(waves, sweeps)
     return np.concatenate([np.swapaxes(movement.dwells.attitudes, -1, -2), waves.reshape(-1, 3, 3)])
 
 
-def of_lever(movement: Movement) -> Array:
+def _turned_unevenly(waves: Array, sweeps: Sweeps) -> Array:
+    """Return (M, 3, …) what a second of lag changes in waves (M, 3, …) of the angle, beside a turn at the mean rate."""
+    by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
+    cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
+    changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
+    return changed
+
+
+def of_lever(delay_s: float, movement: Movement) -> Array:
     """(K, 3, 3) what takes the lever arm to the acceleration of turning: at constant speed in a sweep's mean alone."""
+    sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
+    turning = sweeps.turning_rad2_s2
+    phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
+    return _around_axes(turning[:, now] - phase * turning[:, change], movement)
+
+
+def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
+    """(K, 3, 3) what takes a lever arm to its acceleration by ω² and α (M, 2, 3) in sweeps."""
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
-    squares, accelerations = np.moveaxis(movement.sweeps.turning_rad2_s2, 1, 0)[..., None, None]
+    squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]
     waves = squares * centripetal[:, None] + accelerations * euler[:, None]
     return np.concatenate([np.zeros((len(movement.dwells.readings_m_s2), 3, 3)), waves.reshape(-1, 3, 3)])
 
 
-def of_arms(movement: Movement) -> Array:
+def of_arms(delay_s: float, movement: Movement) -> Array:
     """(K, 3) acceleration by which the flange itself turns, m/s²."""
-    still = np.zeros((len(movement.dwells.readings_m_s2), 3))
-    arms = np.concatenate([still, np.repeat(movement.sweeps.arms_m, 3, axis=0)])[..., None]
-    acceleration: Array = (of_lever(movement) @ arms)[..., 0]
+    acceleration: Array = (of_lever(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
     return acceleration
+
+
+def _arms(lever_m: Array, movement: Movement) -> Array:
+    """(K, 3, 1) from the axis of each sweep to the sensor; zero in dwells."""
+    still = np.zeros((len(movement.dwells.readings_m_s2), 3))
+    return np.concatenate([still, np.repeat(movement.sweeps.arms_m + lever_m, 3, axis=0)])[..., None]
+
+
+def _by_delay(theta: Array, movement: Movement) -> Array:
+    """Return (K, 3) the derivative of what is felt by the delay."""
+    sweeps = movement.sweeps
+    evenly = replace(movement, sweeps=replace(sweeps, turning_rad2_s2=np.zeros_like(sweeps.turning_rad2_s2)))
+    waves = _waves(of_gravity(theta[DELAY], evenly) @ theta[REFERENCE], movement)
+    speeds = sweeps.speeds_rad_s[:, None]
+    even = np.stack([np.zeros_like(waves[:, 0]), -speeds * waves[:, 2], speeds * waves[:, 1]], axis=1)
+    uneven = _turned_unevenly(waves, sweeps) + theta[DELAY] * _turned_unevenly(even, sweeps)
+    later = -speeds[..., None] * sweeps.turning_rad2_s2[:, 2:4]
+    changes: Array = (_around_axes(later, movement) @ _arms(theta[LEVER], movement))[..., 0]
+    changes[len(movement.dwells.readings_m_s2) :] += (even + uneven).reshape(-1, 3)
+    return changes
 
 
 def jacobian(theta: Array, movement: Movement) -> Array:
@@ -196,14 +234,9 @@ def jacobian(theta: Array, movement: Movement) -> Array:
     for axis in range(3):
         columns[:, axis, 3 * axis : 3 * axis + 3] = s + theta[SECOND] * square
         columns[:, axis, BIAS.start + axis] = movement.constant()
-    by_delay = np.zeros_like(s)
-    waves = _waves(gravity @ theta[REFERENCE], movement)
-    later = by_delay[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, 3)
-    later[:, 1] = -movement.sweeps.speeds_rad_s[:, None] * waves[:, 2]
-    later[:, 2] = movement.sweeps.speeds_rad_s[:, None] * waves[:, 1]
     columns[..., REFERENCE] = _read(gravity, s, theta, movement)
-    columns[..., LEVER] = _read(of_lever(movement), s, theta, movement)
-    columns[..., DELAY] = _read(by_delay[..., None], s, theta, movement)[..., 0]
+    columns[..., LEVER] = _read(of_lever(theta[DELAY], movement), s, theta, movement)
+    columns[..., DELAY] = _read(_by_delay(theta, movement)[..., None], s, theta, movement)[..., 0]
     columns[..., SECOND] = matrix(theta) * square[:, None, :]
     return columns.reshape(-1, PARAMETERS)
 

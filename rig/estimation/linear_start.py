@@ -25,7 +25,7 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
     Raises Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """
     theta = _linear(movement, movement.readings(), norm, up)
-    return _linear(movement, movement.readings() - of_arms(movement) @ matrix(theta).T, norm, up)
+    return _linear(movement, movement.readings() - of_arms(0.0, movement) @ matrix(theta).T, norm, up)
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
@@ -35,7 +35,7 @@ def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Arra
         x[:, axis, 3 * axis : 3 * axis + 3] = readings
         x[:, axis, BIAS.start + axis] = -movement.constant()
     x[..., REFERENCE] = -of_gravity(0.0, movement)
-    x[..., LEVER] = -of_lever(movement)
+    x[..., LEVER] = -of_lever(0.0, movement)
     swept = len(movement.sweeps.speeds_rad_s) > 0
     x = x.reshape(3 * len(readings), -1)[:, : LEVER.stop if swept else LEVER.start]
     sizes = np.repeat([_rms(x[:, block]) for block in (F, REFERENCE, BIAS, LEVER)], [9, 3, 3, 3])[: x.shape[1]]

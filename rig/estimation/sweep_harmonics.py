@@ -34,8 +34,9 @@ class FirstHarmonic:
 
     `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample, by so
     many degrees of `freedom`; `residuals_m_s2` (n, 3) are samples less what was fitted. `vibration_m_s2` (3,) is the
-    RMS of what was taken out as the servo's or a swing. `turning_rad2_s2` (2, 3): mean, cosine and sine, by the very
-    same weights, of the rate's square and of the angular acceleration.
+    RMS of what was taken out as the servo's or a swing. `turning_rad2_s2` (6, 3): mean, cosine and sine, by the very
+    same weights, of the rate's square ω² and the angular acceleration α, of how each of them changes per radian of the
+    mean turning, and of ω₀ (ω − ω₀) cos θ and sin θ, where ω₀ is the mean rate: a filter's lag shows these four.
     """
 
     harmonic_m_s2: Array
@@ -95,8 +96,15 @@ def first_harmonic(
         freedom=count - int(unknown),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(shaking**2, axis=0)),
-        turning_rad2_s2=np.stack([(mean_speed + uneven.rate) ** 2, uneven.acceleration]) @ gain.T,
+        turning_rad2_s2=_turning(uneven, angle, mean_speed) @ gain.T,
     )
+
+
+def evenly_turning(speed_rad_s: float) -> Array:
+    """(6, 3) `FirstHarmonic.turning_rad2_s2` of a joint that turns evenly."""
+    turning = np.zeros((6, 3))
+    turning[0, 0] = speed_rad_s**2
+    return turning
 
 
 def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
@@ -155,13 +163,14 @@ def _waves(angle_rad: Array, count: int) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Uneven:
-    """The joint's `rate` (n,) less its mean and `acceleration` (n,), and that of them which comes fast.
+    """The joint's `rate` (n,) less its mean, `acceleration` (n,) and `jerk` (n,), and what of them comes fast.
 
     `fast` (4, n): the rate and its first three derivatives, without what changes once to four times in a turn.
     """
 
     rate: Array
     acceleration: Array
+    jerk: Array
     fast: Array
 
 
@@ -179,7 +188,24 @@ def _uneven(time_s: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> _Unev
     changes = [fast]
     for _ in range(3):
         changes.append(mean_speed_rad_s * _changed(changes[-1]))
-    return _Uneven(waves @ excess, waves @ (mean_speed_rad_s * _changed(excess)), np.array(changes) @ waves.T)
+    accelerated = mean_speed_rad_s * _changed(excess)
+    jerked = mean_speed_rad_s * _changed(accelerated)
+    return _Uneven(waves @ excess, waves @ accelerated, waves @ jerked, np.array(changes) @ waves.T)
+
+
+def _turning(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:
+    """(6, n) what `FirstHarmonic.turning_rad2_s2` holds of it."""
+    rate = mean_speed_rad_s + uneven.rate
+    return np.stack(
+        [
+            rate**2,
+            uneven.acceleration,
+            2 * rate * uneven.acceleration / mean_speed_rad_s,
+            uneven.jerk / mean_speed_rad_s,
+            mean_speed_rad_s * uneven.rate * np.cos(angle_rad),
+            mean_speed_rad_s * uneven.rate * np.sin(angle_rad),
+        ]
+    )
 
 
 def _of_vibration(uneven: _Uneven, angle_rad: Array, mean_speed_rad_s: float) -> Array:

@@ -15,6 +15,7 @@ from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.estimation.accelerometer_model import Dwells, Sweeps
 from rig.estimation.arrays import Array
+from rig.estimation.sweep_harmonics import evenly_turning
 from rig.motion.geometry import flange_arm, flange_axes, flange_pose
 from rig.motion.steps import Sweep
 from rig.plans.six_sweeps import plan_six_observation
@@ -110,7 +111,7 @@ def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...
         covariances_m2_s4=covariances,
         axes_flange=flange_axes(joints)[places],
         speeds_rad_s=np.array([signed_speed(sweep) for sweep in sweeps]),
-        turning_rad2_s2=np.array([[[sweep.speed_rad_s**2, 0.0, 0.0], [0.0, 0.0, 0.0]] for sweep in sweeps]),
+        turning_rad2_s2=np.array([evenly_turning(sweep.speed_rad_s) for sweep in sweeps]),
         attitudes=poses[:, :3, :3],
         arms_m=np.array([flange_arm(q, sweep.joint) for q, sweep in zip(joints, sweeps, strict=True)]),
         stations=np.unique(np.round(joints, 3), axis=0, return_inverse=True)[1],
