@@ -34,6 +34,9 @@ SINGLE = 21  # bits that a number in single precision sets as often as not; its 
 FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
 VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
+SETTLING = (
+    5  # readings at the beginning of a window, in which a low-pass filter may still follow the arm's start or stop
+)
 LEAST_TO_SKEW = 0.7  # steps of noise: less falls on so few numbers that a mean between two of them makes it skewed
 BETWEEN_COUNTS = 1.5  # counts: readings that are farther apart are not a converter's
 
@@ -150,11 +153,11 @@ def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
 def _spikes(windows: Sequence[Window], step_counts: Array) -> tuple[float, int]:
     """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such.
 
-    The noise is half a step at least.
+    The noise is half a step at least. The first readings are left out: the filter of a quiet sensor has not settled.
     """
     half = step_counts / 2
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
-    offs = [window.residual_counts - np.median(window.residual_counts, axis=0) for window in windows]
+    offs = [(window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING:] for window in windows]
     noises = [np.maximum(1.4826 * np.median(np.abs(off), axis=0), half) for off in offs]
     telling = [noise for off, noise in zip(offs, noises, strict=True) if len(off) >= FEWEST_OF_NOISE]
     least = np.min(telling or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
