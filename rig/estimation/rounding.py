@@ -105,7 +105,7 @@ def rounding_left(readings: Array, steps: Steps, smooth: Array, scatter: Array) 
     units = steps.units
     coarse, left = np.flatnonzero((units > 0) & (scatter <= (LARGE_NOISE * units) ** 2)), np.zeros(3)
     widths = steps.widths(readings) if len(coarse) else units
-    for axis in coarse:
+    for axis in coarse.tolist():
         shares = np.sort(_shares(readings[:, axis], units[axis]))
         if shares[:-2].sum() < OCCUPIED:
             # Between two numbers, half-way is where readings change from one to the other: a mean of p times one and

@@ -16,14 +16,14 @@ FEWEST = 5  # readings, of which most feel nothing
 
 def without_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
     """Return which of the readings (n, 3) at rest no knock has made."""
-    kept = np.ones(len(readings), dtype=np.bool_)
+    kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
     if len(readings) < FEWEST:
         return kept
     off = np.abs(readings - np.median(readings, axis=0))
     deviation = NORMAL * np.median(off, axis=0)
     farthest = np.maximum(KNOCK * deviation, COUNTS * quantity.steady)
     farthest = np.maximum(farthest, COARSE * steps_of(readings))
-    kept = ~(off > farthest).any(axis=1)
+    kept = ~np.any(off > farthest, axis=1)
     return kept if np.count_nonzero(~kept) <= MOST * len(kept) else np.ones(len(kept), dtype=np.bool_)
 
 

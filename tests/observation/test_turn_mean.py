@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
+from rig.estimation.rounding import Steps
 from rig.observation.lines import BEATS, turning
 from rig.observation.mean import Mean
 from rig.observation.turn_mean import SampledTurn, turn_mean
@@ -34,7 +35,7 @@ def sampled(ripple: Ripple, seed: int, *, complete: bool = True, encoders_true: 
     share: Array = (np.arange(count) + rng.uniform()) / (RATE_HZ / TURN_HZ)
     size = SPEED_RAD_S * ripple.fraction * np.sqrt(2 / len(ripple.orders))
     phases = rng.uniform(0, 2 * np.pi, len(ripple.orders))
-    uneven = size * np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases).sum(axis=1)
+    uneven: Array = size * np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases).sum(axis=1)
     seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
     rates = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
     unseen = np.zeros((count, 3))
@@ -65,7 +66,7 @@ def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(orders: tuple[i
     ripple = Ripple(orders, fraction, unseen_rad_s=1e-3, unseen_hz=(1.7,), seen_rad_s=1e-3, seen_hz=0.9)
     for seed in range(4):
         case = sampled(ripple, seed)
-        found, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+        found, weights = turn_mean(case.readings, Steps(STEP_RAD_S), case.turn)
         assert np.abs(error(found, weights, case.turn)).max() < 4.5
         assert weights.sum() == pytest.approx(1.0)
 
@@ -78,7 +79,7 @@ def test_errors_are_as_large_as_is_stated_by_whatever_the_arm_ripples(thorough: 
     for seed in range(1000 if thorough else 60):
         ripple = drawn_ripple(np.random.default_rng([seed, 47]), TURN_HZ, [RATE_HZ])
         case = sampled(ripple, seed)
-        mean, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+        mean, weights = turn_mean(case.readings, Steps(STEP_RAD_S), case.turn)
         found.append(error(mean, weights, case.turn))
     off = np.array(found)
     print(f"{len(off)} turns: RMS {np.sqrt(np.mean(off**2)):.3f}, largest {np.abs(off).max():.1f}")
@@ -91,5 +92,5 @@ def test_where_nothing_vibrates_unseen_the_mean_rate_is_that_of_a_turn(*, comple
     """2π/T: exactly where the rate is taken out, and to the samples' ends of the turn where it turns evenly."""
     ripple = Ripple((6, 11), 0.0 if complete else 0.05, unseen_rad_s=0.0, unseen_hz=(2.0,), seen_rad_s=0.0, seen_hz=1.0)
     case = sampled(ripple, 1, complete=complete)
-    _, weights = turn_mean(case.readings, STEP_RAD_S, case.turn)
+    _, weights = turn_mean(case.readings, Steps(STEP_RAD_S), case.turn)
     assert float(weights @ case.turn.rates_rad_s @ AXIS) == pytest.approx(SPEED_RAD_S, rel=1e-12)

@@ -13,6 +13,7 @@ import pytest
 from selenium.webdriver import Chrome, ChromeOptions, Keys
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.remote_connection import RemoteConnection
 
 from support.paths import ROOT
 from support.waiting import PATIENCE_S
@@ -72,7 +73,8 @@ def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[C
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = Chrome(options=options, service=Service(DRIVER))
-    driver.command_executor.client_config.timeout = int(PATIENCE_S)
+    if isinstance(driver.command_executor, RemoteConnection):
+        driver.command_executor.client_config.timeout = int(PATIENCE_S)
     driver.set_page_load_timeout(PATIENCE_S)
     driver.set_script_timeout(PATIENCE_S)
     try:

@@ -119,7 +119,7 @@ class LineReader:
         taken = good & right
         values = np.full((len(taken), self._columns), np.nan)
         values[taken] = numbers
-        for line in np.flatnonzero(prefixed & ~taken):
+        for line in np.flatnonzero(prefixed & ~taken).tolist():
             read = self._fields.read(bare[line_starts[line] : line_ends[line]].tobytes())
             if read is not None:
                 values[line], taken[line] = read, True
