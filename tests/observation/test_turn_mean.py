@@ -32,10 +32,10 @@ def sampled(ripple: Ripple, seed: int, *, complete: bool = True, encoders_true: 
     """Readings of a turn that begins and ends anywhere between two samples."""
     rng = np.random.default_rng(seed)
     count = int(RATE_HZ / TURN_HZ)
-    share: Array = (np.arange(count) + rng.uniform()) / (RATE_HZ / TURN_HZ)
+    share = (np.arange(count, dtype=np.float64) + rng.uniform()) / (RATE_HZ / TURN_HZ)
     size = SPEED_RAD_S * ripple.fraction * np.sqrt(2 / len(ripple.orders))
     phases = rng.uniform(0, 2 * np.pi, len(ripple.orders))
-    uneven: Array = size * np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases).sum(axis=1)
+    uneven = size * np.sum(np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases), axis=1)
     seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
     rates = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
     unseen = np.zeros((count, 3))
