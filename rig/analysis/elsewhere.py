@@ -87,8 +87,8 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     return _with_notes(found, read)
 
 
-def _with_notes(found: OfSensor, read: ReadElsewhere) -> OfSensor:
-    return replace(found, notes=(*notes_on_reading(read, _samples(read).sampling), *found.notes))
+def _with_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
+    return replace(sensor, notes=(*notes_on_reading(read, _samples(read).sampling), *sensor.notes))
 
 
 def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:

@@ -18,14 +18,14 @@ from rig.observation.sampling import Sampling
 
 
 def omitted_in_attitudes(
-    placed: PlacedReadings, found: Mapping[Quantity, Result | OfKind | Fault]
+    placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind | Fault]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
     """Yield what was left out of readings in attitudes, by the quantity that it is missing from, None of all."""
     yield from ((None, each) for each in placed.omitted)
-    rates = found.get(RATE)
+    rates = results.get(RATE)
     if isinstance(rates, InIncrements | InAttitudes):
         yield from ((RATE, each) for each in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
-    solved = [each for each, result in found.items() if each != RATE and not isinstance(result, Fault)]
+    solved = [each for each, result in results.items() if each != RATE and not isinstance(result, Fault)]
     if isinstance(placed.placements, Placements) and solved:
         yield from ((solved[0], each) for each in (*placed.unsampled, *placed.placements.omitted))
 

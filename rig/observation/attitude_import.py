@@ -187,7 +187,7 @@ def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
     )
 
 
-def _whole(said: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
+def _whole(rows: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
     """The rows whose samples are there.
 
     Raises Fault `lost_samples` where there is none, or where more of the long ones lack samples than have them all: a
@@ -197,8 +197,8 @@ def _whole(said: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np
     long = expected >= MIN_SAMPLES
     if not whole.any() or 2 * int((long & ~whole).sum()) > int(long.sum()):
         row = int(np.argmin(whole))
-        where = f"attitude {said.numbers[row]}"
-        check_complete(int(counts[row]), float(expected[row]), said.windows[row], where, least=1)
+        where = f"attitude {rows.numbers[row]}"
+        check_complete(int(counts[row]), float(expected[row]), rows.windows[row], where, least=1)
     return np.flatnonzero(whole)
 
 

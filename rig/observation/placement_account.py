@@ -29,7 +29,7 @@ class AttitudeRows:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Of readings at `time_s` (n,) which `rows` (N,) are placements: in which `rest` (N,), −1 in none.
+    """Which `rows` (N,) of a reference are placements of readings at `time_s` (n,): in which `rest` (N,), −1 in none.
 
     `cuts` (N,) are the samples of each that are at rest. `dwells` (N,) are the rows that are long enough to say that
     the body lay still in them; in the others it may move.
@@ -99,7 +99,7 @@ class Account:
         return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
 
     def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
-        """Those of some rows in which the body moves, if there are any."""
+        """Yield the rows among these in which the body moves, if there are any."""
         left_out = np.flatnonzero((self.rest < 0) & rows)
         if len(left_out):
             first = int(left_out[0])
