@@ -29,6 +29,7 @@ from rig.observation.windows import Window
 
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
 KNOT_S = 0.004  # between the knots of the rate: a faster ripple than it can follow would look like a slower one
+SPARSE_S = 0.025  # samples that are farther apart meet a ripple of the servo anywhere
 PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
 
@@ -144,8 +145,7 @@ class ArmMotion:
 
         The mean from half-way to the sample before to half-way to the next; of samples far apart the rate there.
         """
-        step_s = float(np.median(np.diff(time_s)))
-        return self.mean_rates(time_s, step_s) if step_s <= MAX_STATE_STEP_S else self.rate(time_s)
+        return self.rate(time_s) if is_sparse(time_s) else self.mean_rates(time_s, float(np.median(np.diff(time_s))))
 
     def mean_rate(self, start_s: float, end_s: float) -> Array:
         """(3,) rad/s: the flange's mean rate from one time to another."""
@@ -188,6 +188,11 @@ class ArmMotion:
     def _q_rad(self, window: Window) -> Array:
         q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]
         return q_rad
+
+
+def is_sparse(time_s: Array) -> bool:
+    """Return whether samples at times (n,) are so far apart that the arm's mean rates between them are not theirs."""
+    return float(np.median(np.diff(time_s))) > SPARSE_S
 
 
 def motion_of(run: RunData, turned: Array | None = None) -> ArmMotion:

@@ -23,7 +23,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
-from rig.observation.arm_motion import ArmMotion
+from rig.observation.arm_motion import ArmMotion, is_sparse
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
 from rig.observation.averaging import Averaging, averaging_of
 from rig.observation.lines import BEATS, turning
@@ -257,7 +257,7 @@ def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArra
         passing=waves,
         beats=turn.beats,
         encoders_true=not turn.uneven,
-        complete=bool(covered.all()),
+        complete=bool(covered.all()) and not is_sparse(time_s),
     )
 
 

@@ -33,7 +33,7 @@ class SampledTurn:
     encoders have it. uneven_rad_s (n,): of that what is along the axis, less its mean over the turn by both ends.
     passing (n, k): columns of what comes once, twice and so on in a turn, of an arc less their means. beats: those of
     its lines, see `Revolution`. encoders_true: whether the encoders tell the turning within a turn, and not over whole
-    turns alone. complete: whether no sample is missing for long.
+    turns alone. complete: whether samples follow each other closely, and none is missing for long.
     """
 
     share: Array

@@ -58,3 +58,12 @@ def test_of_an_arm_that_turns_evenly_the_speed_is_that_of_a_turn_whatever_was_ta
     """
     for each in revolutions(synthetic_run(QUIET)):
         assert each.speed_rad_s == pytest.approx(2 * np.pi / each.average.duration_s, rel=2e-6)
+
+
+@pytest.mark.parametrize("sample_rate_hz", [25.0, 50.0])
+def test_noise_of_the_encoders_between_samples_that_are_far_apart_is_in_no_speed(sample_rate_hz: float) -> None:
+    """It makes no more than what is stated of a turn, where the rates at the samples' times would be off by 4e-4."""
+    setup = replace(QUIET, vibration=0.05, sample_rate_hz=sample_rate_hz, state_rate_hz=125.0, encoder_step_rad=1e-4)
+    for each in revolutions(synthetic_run(setup)):
+        off = each.speed_rad_s * each.average.duration_s / (2 * np.pi) - 1
+        assert abs(off) < 4 * max(each.speed_std_rad_s / each.speed_rad_s, 2e-5)
