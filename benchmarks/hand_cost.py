@@ -32,7 +32,7 @@ SOLVING = 20_000  # no block so many unless it ends a move
 
 def build(folder: Path) -> Path:
     """The program, with the compiler and the flags of the firmware's Makefile."""
-    show = ["make", "-s", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
+    show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
     command = subprocess.run(show, check=True, capture_output=True, text=True).stdout.split()
     elf = folder / "hand.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}", f"-Wl,-Tbss={STATE:#x}"]

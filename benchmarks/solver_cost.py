@@ -138,7 +138,7 @@ class Core:
 
 def build(folder: Path, *defines: str) -> Path:
     """Both solvers with the compiler and the flags of the firmware's Makefile."""
-    show = ["make", "-s", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
+    show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
     command = subprocess.run(show, check=True, capture_output=True, text=True).stdout.split()
     elf = folder / f"solvers{len(defines)}.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}"]

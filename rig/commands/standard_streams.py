@@ -5,8 +5,6 @@ import sys
 from pathlib import Path
 from typing import Any, TextIO
 
-from rig.errors.quoting import printable
-
 
 class _Unbroken:
     """A text stream whose loss ends nothing: what it refuses is thrown away, and all that follows.
@@ -58,9 +56,11 @@ def tell_where_the_result_is(result: Path) -> None:
 
     So the loss does not change what a run ends with.
     """
+    from rig.station.plain_text import say
+
     if (lost := output_lost()) is not None:
         why = f"stdout has not taken what was to be printed ({lost.strerror or lost})"
-        print(f"rig: output_lost: {why}. The result is whole: {printable(str(result))}", file=sys.stderr)
+        say(f"rig: output_lost: {why}. The result is whole: {result}", sys.stderr)
 
 
 def keep_streams_usable() -> None:

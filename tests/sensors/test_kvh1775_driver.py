@@ -267,7 +267,7 @@ def test_bit_errors_cost_messages_and_nothing_else() -> None:
 
 
 def test_readings_it_calls_invalid_are_no_samples_and_end_the_stream_when_they_stay() -> None:
-    # With microseconds, as a busy computer keeps the instrument itself waiting: no sequence number tells such a silence.
+    # With microseconds: a busy computer keeps the instrument waiting, and no sequence number tells such a silence.
     with kvh_on_a_wire(pace=4) as wire, streaming(wire, message="B") as (source, collected):
         collected.wait(source, 20)
         wire.order(lambda kvh: setattr(kvh.faults, "status", 0x75))
