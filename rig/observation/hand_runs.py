@@ -16,13 +16,12 @@ from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of, nearest_face
+from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of, joined, nearest_face
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT, check_readings
 
-LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
 BETWEEN_S = 10.0  # of nothing between two recordings of a session, whose boards' clocks do not tell it
 MICROSECOND_S = 1e-6 * (1 + NOMINAL_DRIFT)  # of the board's counter, by its crystal
 ITS_OWN_CLOCK = "the sensor's own clock, as stated: uncertainty.crystal_ppm"
@@ -88,7 +87,7 @@ class NotCounted:
             if any(rest.start_s < end_s and start_s < rest.end_s for start_s, end_s in self.rests):
                 continue
             if rests:
-                moves.append(_joined(through))
+                moves.append(joined(through))
                 through.clear()
             rests.append(rest)
         return replace(session, rests=tuple(rests), moves=tuple(moves))
@@ -104,19 +103,6 @@ def _middle(part: Rest | Move) -> float:
 
 def _within(part: Rest | Move, spans: Sequence[tuple[float, float]]) -> bool:
     return any(start_s <= _middle(part) <= end_s for start_s, end_s in spans)
-
-
-def _joined(moves: Sequence[Move]) -> Move:
-    """Moves one after the other, with the pauses between them, as one; of a long one nothing is known well enough."""
-    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
-    return Move(
-        moves[0].start_s,
-        moves[-1].end_s,
-        max(each.peak_rad_s for each in moves),
-        any(each.lost for each in moves),
-        any(each.clipped for each in moves),
-        long or any(each.left_out for each in moves),
-    )
 
 
 def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:

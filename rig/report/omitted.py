@@ -19,7 +19,7 @@ def omitted(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:
     }
     for name, result in outcome.results.items():
         if result.by_hand is not None:
-            found.setdefault(name, []).extend(_moves(result.by_hand))
+            found.setdefault(name, []).extend([*_rests(result.by_hand), *_moves(result.by_hand)])
     return {name: tuple(each) for name, each in found.items() if each}
 
 
@@ -43,6 +43,19 @@ def _words(entry: OmittedEntry) -> str:
     return f"{entry.count} of {entry.total} {entry.what}, {entry.reason}; the first {entry.first}"
 
 
+def _rests(solution: HandSolution) -> Iterator[OmittedEntry]:
+    if solution.crept:
+        start_s, end_s = solution.crept[0]
+        yield OmittedEntry(
+            quantity=None,
+            what="rests",
+            count=len(solution.crept),
+            total=len(solution.rests) + len(solution.crept),
+            reason="bias_jumped: the body crept, for the gyroscope read otherwise than before and after",
+            first=f"from {start_s:.1f} to {end_s:.1f} s",
+        )
+
+
 def _moves(solution: HandSolution) -> Iterator[OmittedEntry]:
     left_out = [number for number, move in enumerate(solution.moves, 1) if move.kind == LEFT_OUT]
     if left_out:
@@ -51,6 +64,6 @@ def _moves(solution: HandSolution) -> Iterator[OmittedEntry]:
             what="moves",
             count=len(left_out),
             total=len(solution.moves),
-            reason="; ".join(solution.turned.warnings) or "taken back",
+            reason="; ".join(solution.turned.warnings) or ("too long" if solution.crept else "taken back"),
             first=f"move {left_out[0]}",
         )

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from support.handled_body import TWELVE, handle, write
+from rig.observation.handled import handled
+from support.handled_body import TWELVE, creeping, handle, write
 from support.real import unpacked
 
 CLOCK = ("--turns", "--clock-ppm", "50")
@@ -48,6 +49,19 @@ def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest
     assert "By hand: the item was turned on a flat table" in words and "recordings of real hands" in words
     assert main(["solve", str(folder), "--all"]) == 0
     assert "by hand: 13 rests, 12 flips, 0 turns" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.slow
+def test_a_rest_that_creeps_is_counted_with_its_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recorded = handle(TWELVE, 1)
+    rest = handled(recorded.time_s, recorded.rates, recorded.acceleration).rests[5]
+    crept = creeping(recorded, rest.start_s - 0.1, rest.end_s + 0.1, np.radians([0.1, -0.1, 0.05]))
+    assert main(["solve", str(write(tmp_path / "samples.csv", crept)), *CLOCK]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "left out: 1 of 13 rests, bias_jumped: the body crept" in words
+    told = re.search(r"the first from (\S+) to (\S+) s", words)
+    assert told is not None
+    assert [float(each) for each in told.groups()] == pytest.approx([rest.start_s, rest.end_s], abs=0.3)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.hand_runs import NotCounted
 from rig.observation.handled import Segmenter, handled
 from rig.world.hand.habits import Action, Face, Flip, Kind, Mistake, Turn
-from support.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, handle
+from support.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 
 TOLD = Told(20.0, first_face="+z")
 SESSION = (*TWELVE, Turn(1), Flip("+x"), Turn(1), Flip("+y"), Turn(1))
@@ -229,6 +229,45 @@ def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
 def test_one_that_makes_the_uncertainty_larger_is_warned_of(kind: Kind, at: int, size: float, said: str) -> None:
     warned = solved(handle(mistaken(kind, at, size), 0)).turned.warnings
     assert any(said in each for each in warned), warned
+
+
+# About which axis a rest creeps, how long rests are, and whether there is an accelerometer.
+CREEPS = {
+    "about the vertical": ("vertical", 1.2, True),
+    "about a slanting axis, without a level": ("slanting", 1.2, False),
+    "about a slanting axis, for long": ("slanting", 6.0, True),
+    "about a slanting axis, for so long that the move through it tells nothing": ("slanting", 12.0, True),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize(("axis", "rest_s", "level"), CREEPS.values(), ids=CREEPS)
+def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: float, level: bool) -> None:
+    recorded = handle(SESSION, 8, rest_s=rest_s)
+    rest = handled(recorded.time_s, recorded.rates, recorded.acceleration).rests[6]
+    assert rest.acceleration_m_s2 is not None
+    about = rest.acceleration_m_s2 if axis == "vertical" else np.cross(rest.acceleration_m_s2, [0.3, 0.5, 0.8])
+    slowly = np.radians(0.15) * about / np.linalg.norm(about)
+    crept = creeping(recorded, rest.start_s - 0.1, rest.end_s + 0.1, slowly)
+    found = solved(crept, level=level)
+    assert [start_s for start_s, _ in found.crept] == [pytest.approx(rest.start_s, abs=0.3)]
+    assert len(found.rests) == 17
+    assert (np.abs(found.scale - recorded.truth[:3]) < found.budget.expanded[:3]).all()
+    assert (np.abs(found.bias_rad_s - recorded.truth[3:]) < 1.3 * found.budget.expanded[3:]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0, 2, 9, 16])
+def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int) -> None:
+    recorded = handle(SESSION, 3)
+    session = handled(recorded.time_s, recorded.rates, recorded.acceleration)
+    jumped = recorded.time_s > session.moves[after].end_s - 0.15
+    step = np.radians(0.15) * np.array([0.6, -0.8, 0.0])
+    with pytest.raises(RigError) as refusal:
+        solved(replace(recorded, rates=recorded.rates + step * jumped[:, None]))
+    assert refusal.value.problem.name == "bias_jumped"
+    assert f"ended at {session.rests[after + 1].start_s:.1f} s" in refusal.value.problem.what
 
 
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:

@@ -1,7 +1,7 @@
 """Recordings of a sensor on a box that the simulated hand turns: readings as CSV, and the truth beside them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +78,16 @@ def handle(
     stamped = time_s * (1 + 1e-6 * part.clock_ppm * rng.uniform(-1, 1))
     kept = ~felt.lost
     return Recorded(stamped[kept], rates[kept], force[kept], matrix, bias + walk[-1] + felt.gyro_bias_rad_s[-1])
+
+
+def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Array) -> Recorded:
+    """The recording of a body that turned slowly (3,) where it lay; the hand turns it back as it takes it up."""
+    rates = recorded.rates.copy()
+    there = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
+    after = (recorded.time_s > end_s) & (recorded.time_s <= end_s + 0.15)
+    rates[there] += turning_rad_s
+    rates[after] -= turning_rad_s * there.sum() / after.sum()
+    return replace(recorded, rates=rates)
 
 
 def bent(rates: Array, nonlinearity: float, seed: int) -> Array:

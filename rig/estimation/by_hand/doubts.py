@@ -17,7 +17,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.fit import Fit, resized, sized_anew, solved, white
 from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, LEANING, MOVE, TABLE, WALK, Factor
-from rig.estimation.by_hand.session import LARGEST, STATED, Sizes
+from rig.estimation.by_hand.session import LARGEST, STATED, Rest, Sizes
 
 A_ROW = 4.0  # of chi square: what leaves out more has to explain more
 BY_MUCH = 16.0  # of chi square beyond that: 1 in 10^5
@@ -171,11 +171,7 @@ def named(fit: Fit, doubt: Doubt) -> Fault:
             "See that no reading is lost, and that time stamps are those of the readings; make the move again",
         )
     if doubt.name == "bias_jumped":
-        return Fault(
-            "bias_jumped",
-            f"the gyroscope's bias was another after the move that ended at {rests[doubt.at + 1].start_s:.1f} s",
-            "Handle it gently: a fall or a knock does that; begin anew",
-        )
+        return _jumped(doubt.at, rests)
     if doubt.name == "table_moved":
         return Fault("table_moved", f"from {at_s:.1f} s on the table leans otherwise", "Begin anew, and leave it alone")
     return Fault(
@@ -183,6 +179,20 @@ def named(fit: Fit, doubt: Doubt) -> Fault:
         f"at {at_s:.1f} s the body did not lie flat on its face, as it does at the other rests",
         "Look for what lies under it, and lay it down again",
     )
+
+
+def _jumped(at: int, rests: Sequence[Rest]) -> Fault:
+    """The Fault that the bias is another after the move `at`; of a rest at an end, a creep looks like it."""
+    after_s = rests[at + 1].start_s
+    what = f"the gyroscope's bias was another after the move that ended at {after_s:.1f} s"
+    if at == len(rests) - 2:
+        what += ", or the body crept in the last rest, which comes then"
+        return Fault(
+            "bias_jumped", what, "Let it lie for another rest, which tells them apart; after a fall begin anew"
+        )
+    if at == 0:
+        what += f", or the body crept in the first rest, until {rests[0].end_s:.1f} s"
+    return Fault("bias_jumped", what, "Handle it gently: a fall or a knock does that; begin anew")
 
 
 def _beyond(fit: Fit) -> Fault | None:

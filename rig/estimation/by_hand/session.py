@@ -1,6 +1,8 @@
 """What a session by hand consists of: rests, and the moves from each rest to the next."""
 
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 BOX_RAD = float(np.radians(0.2))
+LONGEST_S = 10.0  # of a move with a pause in it, which the bias and the tilt of the pause are in
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -49,7 +52,10 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Handled:
-    """All readings (n, 3) at times (n,), rests (N,), the N − 1 moves between, and when the body was held in the air."""
+    """All readings (n, 3) at times (n,), rests (N,), the N − 1 moves between, and when the body was held in the air.
+
+    `crept`: when it crept where it lay, which is no rest of the session.
+    """
 
     time_s: Array
     rates: Array
@@ -57,6 +63,7 @@ class Handled:
     rests: tuple[Rest, ...]
     moves: tuple[Move, ...]
     held: tuple[tuple[float, float], ...] = ()
+    crept: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +114,33 @@ class Faced:
     faces: tuple[str | None, ...]
     up: Array
     turns: tuple[int, ...] = field(default=())
+
+
+def without_crept(session: Handled, rows: Collection[int]) -> Handled:
+    """Return the session without the rests `rows`, in which the body crept: pauses of the moves through them."""
+    kept = [row for row in range(len(session.rests)) if row not in rows]
+    return replace(
+        session,
+        rests=tuple(session.rests[row] for row in kept),
+        moves=tuple(joined(session.moves[first:last]) for first, last in pairwise(kept)),
+        crept=tuple((session.rests[row].start_s, session.rests[row].end_s) for row in sorted(rows)),
+    )
+
+
+def joined(moves: Sequence[Move]) -> Move:
+    """Return moves one after the other, with the pauses between them, as one.
+
+    A long one is left out, for not enough is known of its pauses.
+    """
+    long = len(moves) > 1 and moves[-1].end_s - moves[0].start_s > LONGEST_S
+    return Move(
+        moves[0].start_s,
+        moves[-1].end_s,
+        max(each.peak_rad_s for each in moves),
+        any(each.lost for each in moves),
+        any(each.clipped for each in moves),
+        long or any(each.left_out for each in moves),
+    )
 
 
 def axis_of(face: str) -> Array:

@@ -12,10 +12,11 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand.axes import check_axes
+from rig.estimation.by_hand.creep import crept
 from rig.estimation.by_hand.doubts import doubted, hidden
 from rig.estimation.by_hand.fit import SEEN, Fit, fit, white
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
-from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told
+from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told, without_crept
 from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
@@ -63,6 +64,7 @@ class HandSolution:
 
     - `turned` is the solution as that of told turns is; its budget is `budget`.
     - `sizes` are what was found of the hand, what was stated and what is refused, by name.
+    - `crept` is when the body crept at what were to be rests, which are left out.
     - `expanded_scale` (3,) is U (k = 2) by this session and its clock alone; the budget has real hands beside.
     """
 
@@ -73,6 +75,7 @@ class HandSolution:
     chi_square: float
     freedom: float
     expanded_scale: Array
+    crept: tuple[tuple[float, float], ...] = ()
 
     @property
     def budget(self) -> Budget:
@@ -113,6 +116,9 @@ def solve_by_hand(session: Handled, told: Told) -> HandSolution:
     found: Fit | None = None
     try:
         found = fit(session, told)
+        if rows := crept(found):
+            session = without_crept(session, rows)
+            found = fit(session, told)
         fault = _too_little(found) or doubted(found)
     except Fault as error:
         fault = error if all(move.tells for move in session.moves) else too_few(session, None)
@@ -171,6 +177,7 @@ def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
         chi_square=fit.chi_square,
         freedom=fit.freedom,
         expanded_scale=2 * np.sqrt(np.diag(of_session)[:3]),
+        crept=fit.session.crept,
     )
 
 
@@ -206,6 +213,8 @@ def too_few(session: Handled, expanded: Array | None) -> Fault:
             "Lay it down and let go, for a second, after every move",
         )
     so_far = "" if expanded is None else f"; the scale is known to {100 * expanded.max():.1g} %"
+    if session.crept:
+        so_far += f"; {len(session.crept)} more are left out, for the body crept from {session.crept[0][0]:.1f} s on"
     return Fault(
         "too_few_moves",
         f"there are {len(session.rests)} rests and {sum(move.tells for move in session.moves)} moves{so_far}",
