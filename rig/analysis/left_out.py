@@ -40,7 +40,7 @@ def notes_on_reading(read: ReadElsewhere, sampling: Sampling | None) -> Iterator
     if read.origin_s:
         yield f"times count from {read.origin_s} s of the files' clock"
     if read.other_rows:
-        yield f"{read.other_rows} rows of the samples are blank here, and belong to other sensors"
+        yield f"{read.other_rows} rows of the samples hold none of these readings, and are left out"
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:

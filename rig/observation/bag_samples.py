@@ -16,7 +16,7 @@ from rig.data.reading_process import Part
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import listing, quote, shorten
-from rig.observation.table_parts import in_blocks
+from rig.observation.table_parts import LEFT_OUT, in_blocks
 
 IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
 POSES = (
@@ -47,7 +47,7 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
     """Yield, `in_blocks`, the readings of the topic `inside` a bag, or of the only one with an Imu.
 
     The columns are those of a CSV file, times are from the beginning of the bag on, and rows in the order of the bag.
-    Messages that hold no rate are left out, and accelerations if some of the others hold none.
+    Messages that hold no rate are left out and counted, and accelerations are left out if some of the others hold none.
     Raise Refused `missing_extra`, `bag_topic`, and of a damaged bag whatever its parser ends in.
     """
     with _opened(path) as reader:
@@ -57,7 +57,8 @@ def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
             yield from in_blocks(fields, [TIME, *FIELD.columns])
             return
         columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
-        yield from in_blocks(_inertial(_stamped(reader, chosen), columns), columns)
+        counts = {LEFT_OUT: 0}
+        yield from in_blocks(_inertial(_stamped(reader, chosen), columns, counts), columns, counts)
 
 
 def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
@@ -68,10 +69,13 @@ def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
         yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in turned), [TIME, *QUATERNION])
 
 
-def _inertial(messages: Iterator[tuple[float, Any]], columns: list[str | None]) -> Iterator[tuple[float, ...]]:
+def _inertial(
+    messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, int]
+) -> Iterator[tuple[float, ...]]:
     """Yield the time, rate and acceleration of `sensor_msgs/Imu`; name None in `columns` what they do not hold.
 
-    Those without a rate are kept until one with a rate comes. Raise Refused `bag_topic` if none holds anything.
+    Count in `counts` the messages that are left out. Those without a rate are kept until one with a rate comes. Raise
+    Refused `bag_topic` if none holds anything.
     """
     forces: list[tuple[float, ...]] = []
     has_rates, all_forces = False, True
@@ -80,10 +84,13 @@ def _inertial(messages: Iterator[tuple[float, Any]], columns: list[str | None]) 
         has_force = float(message.linear_acceleration_covariance[0]) != NOT_PROVIDED
         if float(message.angular_velocity_covariance[0]) != NOT_PROVIDED:
             has_rates, all_forces = True, all_forces and has_force
+            counts[LEFT_OUT] += len(forces)
             forces.clear()
             yield row
         elif has_force and not has_rates:
             forces.append(row)
+        else:
+            counts[LEFT_OUT] += 1
     if not has_rates and not forces:
         raise Refused(
             "bag_topic",

@@ -72,12 +72,13 @@ def read_sample_table(
     """
     found = readings_in(path)
     if found is not None:
+        columns, others = found
         for quantity in needed:
-            if quantity.columns[0] not in found:
+            if quantity.columns[0] not in columns:
                 raise Refused(
                     "wrong_columns", f"{path} holds no {' '.join(quantity.columns)}", "Name a recording that holds them"
                 )
-        return SampleTable(found)
+        return SampleTable(columns, others=others)
     table = read_table(path, samples_header(needed), SAMPLES_MB, mapped)
     there = [each for each in quantities().values() if each.columns[0] in table.columns]
     read = {quantity: _read(path, table, quantity) for quantity in there}

@@ -17,7 +17,7 @@ from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.observation.bag_samples import bag_of, is_bag
-from rig.observation.table_parts import read_columns_apart
+from rig.observation.table_parts import columns_of, left_out_of, parts_read_apart
 from rig.observation.ulog_samples import is_ulog
 
 INSIDE = "::"
@@ -59,8 +59,8 @@ def whole(path: Path) -> Path:
     return Path(str(path).partition(INSIDE)[0])
 
 
-def readings_in(path: Path) -> Columns | None:
-    """The readings of a file that is no CSV, in the order of time; None of one that may be.
+def readings_in(path: Path) -> tuple[Columns, int] | None:
+    """The readings of a file that is no CSV, in the order of time, how many rows hold none; None of one that may be.
 
     Raises Refused as its reader does, `no_file`, `file_too_costly`, `temporary_folder_full`.
     """
@@ -77,7 +77,7 @@ def attitudes_in(path: Path) -> Columns | None:
     found = _format(path)
     if found is None:
         return None
-    columns = {} if found.attitudes is None else _read(found, found.attitudes, path)
+    columns = {} if found.attitudes is None else _read(found, found.attitudes, path)[0]
     if not columns:
         raise Refused(
             "no_attitudes",
@@ -105,17 +105,18 @@ def entry_of(path: Path) -> FileEntry:
     return FileEntry(name=printable(name), sha256=found.hexdigest())  # a name may be no UTF-8, which no document takes
 
 
-def _read(form: Format, reader: str, path: Path) -> dict[str, Array]:
-    """Return the columns, in the order of time. Raise Refused as `readings_in`."""
+def _read(form: Format, reader: str, path: Path) -> tuple[dict[str, Array], int]:
+    """Return the columns, in the order of time, and how many rows hold none. Raise Refused as `readings_in`."""
     source = form.reads(whole(path))
-    columns = read_columns_apart(
+    parts = parts_read_apart(
         reader, source, {"inside": _inside(path)}, else_=f"is no {form.called} that can be read", remedy=form.remedy
     )
+    columns = columns_of(parts)
     time_s = columns[TIME]
     if (np.diff(time_s) < 0).any():
         order = np.argsort(time_s, kind="stable")
         columns = {name: column[order] for name, column in columns.items()}
-    return columns
+    return columns, left_out_of(parts)
 
 
 def _format(path: Path) -> Format | None:

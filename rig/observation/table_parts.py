@@ -15,10 +15,16 @@ from rig.estimation.arrays import Array
 BLOCK_ROWS = 16_384
 
 
-def in_blocks(rows: Iterable[Sequence[float]], columns: Sequence[str | None]) -> Iterator[Part]:
+LEFT_OUT = "left_out"  # how many more rows of the file hold none of the columns
+
+
+def in_blocks(
+    rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, int] | None = None
+) -> Iterator[Part]:
     """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
 
-    The names are looked at when all rows are through: None is a column that is left out.
+    The names are looked at when all rows are through: None is a column that is left out. So are `counts`, which may
+    say how many rows were `LEFT_OUT`.
     """
     values, width = array("d"), len(columns)
     for row in rows:
@@ -27,7 +33,7 @@ def in_blocks(rows: Iterable[Sequence[float]], columns: Sequence[str | None]) ->
             yield np.array(values).reshape(-1, width)
             del values[:]
     yield np.array(values).reshape(-1, width)
-    yield {"columns": list(columns)}
+    yield {"columns": list(columns), **(counts or {})}
 
 
 def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
@@ -41,11 +47,9 @@ def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
     }
 
 
-def read_columns_apart(
-    reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str
-) -> dict[str, Array]:
-    """Return the columns that a `reader` yields `in_blocks` of a file. Raise as `parts_read_apart`."""
-    return columns_of(parts_read_apart(reader, path, arguments, else_=else_, remedy=remedy))
+def left_out_of(parts: Sequence[Part]) -> int:
+    """Return how many rows of the file such parts leave out."""
+    return int(cast("dict[str, Any]", parts[-1]).get(LEFT_OUT, 0))
 
 
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:

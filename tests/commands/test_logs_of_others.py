@@ -129,7 +129,7 @@ def test_rows_of_other_sensors_are_left_alone(tmp_path: Path, capsys: pytest.Cap
     found = solved(capsys, *others(tmp_path, "t,gx,gy,gz,p", mixed))
     assert (off_and_u(found)[0] < 1.6).all()
     assert found["notes"]["imu"] == [
-        f"{len(mixed) - len(rows)} rows of the samples are blank here, and belong to other sensors"
+        f"{len(mixed) - len(rows)} rows of the samples hold none of these readings, and are left out"
     ]
 
 

@@ -14,7 +14,7 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.settings import Elsewhere, Site
 from rig.errors import Refused
 from rig.observation.attitude_import import read_attitudes
-from rig.observation.csv_samples import read_samples
+from rig.observation.csv_samples import read_sample_table, read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.from_files import Files, recorded_in_files
 from rig.observation.sample_files import entry_of
@@ -192,7 +192,9 @@ def test_a_reading_that_was_not_measured_is_named_in_a_bag_too(tmp_path: Path) -
 def test_messages_of_a_bag_that_hold_no_rate_by_their_covariance_are_no_samples(tmp_path: Path) -> None:
     samples = read_samples(mcap(tmp_path / "some", without_rate=30))
     assert samples.readings[RATE][:, 0] == pytest.approx(0.1 * np.arange(30, 100)), "its driver was not ready before"
+    assert read_sample_table(tmp_path / "some").others == 30, "they are counted"
     without = mcap(tmp_path / "all", without_rate=100)
+    assert read_sample_table(without).others == 0
     assert [*read_samples(without).readings] == [ACCELERATION]
     with pytest.raises(Refused, match=r"wrong_columns: .* holds no x_rad_s y_rad_s z_rad_s"):
         read_samples(without, [RATE])
