@@ -118,7 +118,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
         _check_has_rates(readings)
         clock = estimate_time_base(time_s, readings[RATE], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates))
         time_s = clock.controller_time_s(time_s)
-        said = said.of(np.flatnonzero((said.rows_s[:, 0] >= time_s[0]) & (said.rows_s[:, 1] <= time_s[-1])))
+        said = said.of(np.flatnonzero(_within(said.rows_s, time_s)))
     if not said.windows:
         raise clocks_apart(time_s, windows)
     check_overlap(time_s, said.windows)
@@ -126,7 +126,9 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     check_scattered(sampling)
     expected = sampling.expected(time_s, said.rows_s)
     counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
-    sampled = said.of(np.flatnonzero((counts > 0) & (counts >= MOSTLY * expected - 1)))
+    mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
+    sampled = said.of(np.flatnonzero(mostly))
+    covered = said.of(np.flatnonzero(mostly | _within(said.rows_s, time_s)))
     whole = said.of(_whole(said, counts, expected))
     rate = readings.get(RATE)
     rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
@@ -137,9 +139,9 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
         None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
         None if set(readings) == {RATE} else or_fault(place),  # a gyroscope needs none
         clock,
-        tuple(_omitted(given, said, "the recording does not cover them")),
-        tuple(_omitted(said, whole, "lost_samples: samples are missing in them")),
-        tuple(_omitted(said, sampled, "lost_samples: half of their samples or more are missing")),
+        tuple(_omitted(given, covered, "not covered by the recording")),
+        tuple(_omitted(covered, whole, "lost_samples: samples are missing in them")),
+        tuple(_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
     )
 
 
@@ -163,6 +165,12 @@ class _Said:
     def of(self, rows: NDArray[np.intp]) -> "_Said":
         rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
         return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+
+
+def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
+    """Return which of the rows (N, 2) lie within a recording at `time_s` (n,)."""
+    within: NDArray[np.bool_] = (rows_s[:, 0] >= time_s[0]) & (rows_s[:, 1] <= time_s[-1])
+    return within
 
 
 def _omitted(given: _Said, kept: _Said, reason: str) -> Iterator[Omitted]:

@@ -59,6 +59,20 @@ def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
     assert [line.name for line in budget_of(sound, swept(1, 1.0)).contributors] == ["noise"]
 
 
+def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> None:
+    samples, rows = read_samples(EXAMPLES / "swinging_samples.csv"), read_attitudes(EXAMPLES / "swinging_attitudes.csv")
+    ends_s = float(rows["end_s"][479])
+    kept = samples.time_s <= ends_s
+    cut = replace(
+        samples, time_s=samples.time_s[kept], readings={each: of[kept] for each, of in samples.readings.items()}
+    )
+    placed = placed_by(cut, rows)
+    assert [str(each) for each in placed.omitted] == [
+        f"120 of 600 rows, not covered by the recording; the first row 481, from {ends_s:.10g} s"
+    ]
+    assert placed.incomplete == ()
+
+
 def constant(samples: Samples, quantity: object, value: float) -> Samples:
     """The z axis of a sensor has one value throughout."""
     readings = {each: column.copy() for each, column in samples.readings.items()}
