@@ -16,7 +16,7 @@ from rig.analysis.increments import InIncrements
 from rig.analysis.installed_kinds import KindFound, OfKind
 from rig.analysis.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
 from rig.analysis.over_temperature import files_to_reference, with_rate_polynomials
-from rig.analysis.sweeps_agree import check_agree, contradiction, counted
+from rig.analysis.sweeps_agree import check_agree, contradiction, counted, rows_left
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings
@@ -186,7 +186,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
         noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, whole / more**2)
         if more == 1 or not isinstance(solution, VectorSolution):
             return Budget((noise,))
-        beyond, left = whole - noise.covariance, float(solution.residuals_rad_s.size - 12)
+        beyond, left = whole - noise.covariance, float(max(rows_left(data), 1))
         return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, left, beyond)))
     known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
     known |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)

@@ -14,6 +14,7 @@ BEYOND_NOISE = 6.0  # standard deviations of its mean
 TOLD = 0.05  # of a row that the others tell at least: else nothing can contradict it
 SAME_AXIS = 0.9  # cosine of two rows' axes, either way
 CHANCE = 4.5  # standard deviations that one of some dozens of means may be off by chance
+BY_CHANCE = 0.01  # of sound files leave as much in all, of all their means
 
 
 def check_agree(solution: VectorSolution, data: ExternalData) -> None:
@@ -52,17 +53,30 @@ def _named(worst: int, data: ExternalData) -> str:
 def contradiction(solution: VectorSolution, data: ExternalData) -> float:
     """How many times its noise the worst of the means contradicts the others by; 1 where chance may explain it.
 
-    Not their mean square: one wrong row among twelve is hidden in that, and is all that two sweeps of an axis tell.
+    Not their mean square, which only tells whether it is chance: one wrong row among twelve is hidden in that, and is
+    all that two sweeps of an axis tell.
     """
     if data.at_reference:
         return 1.0
+    from scipy.special import chdtri
+
     _, variances, design = _equations(data)
-    worst = 1.0
+    worst, chi_square, freedom = 1.0, 0.0, 3 * rows_left(data)
     for left, variance in zip(solution.residuals_rad_s.T, variances.T, strict=True):
         weighted = design / np.sqrt(variance)[:, None]
         told = 1 - np.einsum("ij,ji->i", weighted, np.linalg.pinv(weighted))
         worst = max(worst, float((np.abs(left) / np.sqrt(variance * np.maximum(told, TOLD))).max()))
-    return worst if worst > CHANCE else 1.0
+        chi_square += float(np.sum(left**2 / variance))
+    chance = freedom <= 0 or chi_square <= float(chdtri(freedom, BY_CHANCE))
+    return 1.0 if chance and worst <= CHANCE else worst
+
+
+def rows_left(data: ExternalData) -> int:
+    """How many rows are more than the solution takes: the degrees of freedom of what they contradict each other by.
+
+    A row whose rate, or end, is wrong is wrong once, though it tells three equations.
+    """
+    return len(data.sweeps) + len(data.rests) - 4
 
 
 def counted(solution: VectorSolution, data: ExternalData) -> VectorSolution:

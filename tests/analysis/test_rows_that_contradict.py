@@ -12,8 +12,10 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.settings import Elsewhere, Site
 from rig.errors import Fault, Refused
 from rig.observation.attitude_import import placed_by, read_attitudes
-from rig.observation.csv_import import ExternalData, averaged, read_sweeps
+from rig.observation.csv_import import ExternalData, average, averaged, read_sweeps
 from rig.observation.csv_samples import Samples, read_samples
+from support.loggers import MATRIX
+from support.loggers import SCALE as OF_MATRIX
 from support.paths import DOCS
 
 EXAMPLES = DOCS / "examples"
@@ -57,6 +59,23 @@ def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
     assert [line.name for line in budget.contributors] == ["noise", "sweeps"]
     assert sum(line.covariance for line in budget.contributors) == pytest.approx(contradicting.covariance)
     assert [line.name for line in budget_of(sound, swept(1, 1.0)).contributors] == ["noise"]
+
+
+def test_where_few_rows_are_left_student_s_t_makes_the_uncertainty_as_large_as_it_is() -> None:
+    """Four sweeps and a rest whose table is off by 0.3 %: one row is more than the solution takes."""
+    noise_rad_s, speed_rad_s, row_s = 5e-4, np.pi / 2, 5.0
+    axes = np.array([*np.eye(3), [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    speeds, starts_s, within = np.array([speed_rad_s] * 4 + [0.0]), row_s * np.arange(5), []
+    time_s = np.arange(round(5 * row_s * 100)) / 100
+    rates = (speeds[:, None] * axes)[(time_s // row_s).astype(int)] @ MATRIX.T
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        samples = np.column_stack([time_s, rates + noise_rad_s * rng.normal(size=rates.shape)])
+        stated = speeds * (1 + 3e-3 * rng.normal(size=5))
+        data = average(samples, np.column_stack([starts_s + 0.3, starts_s + 4.3, stated]), axes)
+        found = solve_swept(data, None)
+        within.append(np.abs(found.scale - OF_MATRIX) < budget_of(found, data).expanded[:3])
+    assert np.mean(within) > 0.9
 
 
 def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> None:
