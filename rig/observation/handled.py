@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled, Move, Rest
-from rig.observation.rests import find_rests
+from rig.observation.rests import ROUNDING, find_rests
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
 
@@ -87,7 +87,7 @@ def _held(time_s: Array, rates: Array, rests: tuple[Rest, ...]) -> tuple[tuple[f
     """When the body was in one place and did not lie: it turned too little for a move, and too much for a rest."""
     if not rests:
         return ()
-    width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s)))
+    width = max(2, int(np.ceil(PAUSE_S / find_sampling(time_s).interval_s - ROUNDING)))
     count = len(time_s) // width
     bias = np.median([rest.mean_rad_s for rest in rests], axis=0)
     blocks = (rates[: count * width] - bias).reshape(count, width, 3)

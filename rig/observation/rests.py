@@ -24,6 +24,7 @@ from rig.observation.steadiness import BEYOND
 from rig.observation.windows import Window
 
 BLOCK_S, FEWEST = 0.25, 5  # samples of a block
+ROUNDING = 1e-6  # of a number of intervals that may be whole but for the arithmetic
 QUIETEST, AS_QUIET = 0.1, 3.0  # share of the blocks that tell the noise; times as much is at rest as well
 COUNTS = 0.2  # of what is steady: so much may always scatter, where the noise is below the resolution
 TOGGLES = 0.5  # of a step of the readings: so much they scatter between two values
@@ -49,7 +50,7 @@ def find_rests(
     if len(time_s) < 2 * FEWEST:
         return ()
     interval_s = find_sampling(time_s).interval_s
-    width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s)))
+    width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s - ROUNDING)))
     count = len(time_s) // width
     if count < 2:
         return ()
