@@ -14,15 +14,20 @@ from rig.analysis.cut_recording import Window as Read
 from rig.analysis.suspicion import Statistic
 from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
+from rig.estimation.mean_weights import even_groups, mean_weights
 from rig.estimation.rounding import Steps
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Stream, between
+from rig.observation.beside_lines import BRIEF, noise_of
 from rig.observation.field import dwelt_field
+from rig.observation.lines import LineSearch, find_lines, fitted, waves
 from rig.observation.mean import mean_at_rest
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window
 
 FEWEST_IN_HALF = 20  # readings: fewer do not tell how their mean scatters
+SLOW_LINES = LineSearch(stands_out=30.0, slowest=2.5, beats=0)
+TAPERED = 8.0  # cycles in a dwell: of faster lines nothing is left in the tapered mean of a half
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +112,27 @@ def knocked(dwells: Sequence[Dwelt], flicker_counts: float, rate: float, steps: 
 def _apart(dwell: Dwelt, flicker_counts: float, steps: Steps) -> float:
     halves = Window(dwell.window.start_s, dwell.middle_s), Window(dwell.middle_s, dwell.window.end_s)
     early, means = dwell.time_s < dwell.middle_s, []
+    share = (dwell.time_s - dwell.window.start_s) / (dwell.window.end_s - dwell.window.start_s)
+    readings = dwell.counts.astype(np.float64)
+    cycles = find_lines(readings - readings.mean(axis=0), SLOW_LINES, share=share)
+    if (cycles < TAPERED).any():
+        return _apart_beside(waves(cycles, share, SLOW_LINES.beats), readings, early, flicker_counts, steps)
     for half, inside in zip(halves, (early, ~early), strict=True):
-        means.append(mean_at_rest(dwell.counts[inside].astype(np.float64), dwell.time_s[inside], half, steps)[0])
+        means.append(mean_at_rest(readings[inside], dwell.time_s[inside], half, steps)[0])
     first, last = means
     return float(np.sum((last.mean - first.mean) ** 2 / (first.variance + last.variance + 2 * flicker_counts**2)))
+
+
+def _apart_beside(
+    lines: Array, readings: Array, early: NDArray[np.bool_], flicker_counts: float, steps: Steps
+) -> float:
+    """Return what `_apart` does of readings (n, 3) in which slow `lines` (n, k) swing."""
+    halves = even_groups(np.where(early, 0, 1), 2)
+    first, last = mean_weights(halves, lines)
+    columns = np.column_stack([halves, lines])
+    noise = noise_of(readings - columns @ fitted(columns, readings), columns.shape[1], steps, BRIEF)
+    variance = noise.in_a_mean * float(np.sum((last - first) ** 2))
+    return float(np.sum(((last - first) @ readings) ** 2 / (variance + 2 * flicker_counts**2)))
 
 
 def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:
