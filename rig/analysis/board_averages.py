@@ -17,6 +17,7 @@ from rig.observation.average import Stream
 from rig.observation.lines import fitted, turning, waves
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
+from rig.observation.turn_mean import lagging
 
 NAME = "board_average"
 NEXT_S = 1e-7  # rounding of a sample's time
@@ -56,13 +57,18 @@ def _compared(
 def _apart(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
     """Return how far the board's average is from what the computer's makes of its window, in standard deviations."""
     zero, average, seen = stream.clock.zero_rate_rad_s, turn.average, observed.observation
-    by_rate = np.outer(average.mean_rad_s - zero, turn.axis_flange) / turn.speed_rad_s
+    axis = turn.axis_flange
+    across = np.array(stream.sensor.mounting) @ (
+        np.eye(3) - np.outer(axis, axis)
+    )  # F is near enough for what sways there
+    by_rate = np.outer(average.mean_rad_s - zero, axis) / turn.speed_rad_s + across
     own = np.searchsorted(stream.time_s, [average.start_s, average.end_s])
     boards = np.searchsorted(stream.board_time_s, np.array([seen.start_us, seen.end_us]) * 1e-6 - NEXT_S)
     first, last = int(min(own[0], boards[0])), int(max(own[1], boards[1]))
     of_turn, of_board = slice(*(own - first).tolist()), slice(*(boards - first).tolist())
     time_s = stream.time_s[first:last]
-    passing, rates = _passing(time_s, turn), recording.motion.sampled_rates(time_s)
+    rates = recording.motion.sampled_rates(time_s)
+    passing = _passing(time_s, turn, rates @ axis)
     left = (stream.readings_rad_s[first:last] - zero - rates @ by_rate.T)[of_turn]
     columns = np.column_stack([np.ones(len(left)), passing[of_turn]])
     kept = passing[of_board].mean(axis=0) @ fitted(columns, left)[1:]
@@ -70,12 +76,17 @@ def _apart(recording: ObservedRun, stream: Stream, turn: Observation, observed: 
     return float(np.max(np.abs(apart) / average.mean_std_rad_s))
 
 
-def _passing(time_s: Array, turn: Observation) -> Array:
-    """(n, k) what the computer's mean is free of at times (n,): what comes once and twice in a turn, and its lines."""
+def _passing(time_s: Array, turn: Observation, along_rad_s: Array) -> Array:
+    """(n, k) what the computer's mean is free of at times (n,), where the arm's rate along the axis is known (n,).
+
+    What comes once and twice in a turn, its lines, and what a sensor that lags reads of a slow ripple.
+    """
     average = turn.average
     share = (time_s - average.start_s) / average.duration_s
     angle_rad = 2 * np.pi if turn.angle_rad is None else turn.angle_rad
     of_turn = turning(angle_rad * share, 2 * turn.beats)
     if turn.arc_rad is not None:
         of_turn -= turning(angle_rad * np.linspace(0.0, 1.0, len(share)), 2 * turn.beats).mean(axis=0)
-    return np.column_stack([of_turn, waves(average.lines_hz * average.duration_s, share, turn.beats)])
+    lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
+    columns = np.column_stack([np.ones(len(share)), of_turn, lines])
+    return np.column_stack([of_turn, lines, lagging(along_rad_s, columns, share)])

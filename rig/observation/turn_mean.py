@@ -17,7 +17,7 @@ from rig.estimation.mean_weights import even_groups, mean_weights
 from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
 from rig.observation.coloured_noise import MEMORIES
-from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, waves, wide
+from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, turning, waves, wide
 from rig.observation.mean import Mean
 
 SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
@@ -50,8 +50,10 @@ class Lines:
     """Lines that are taken out of a mean: `cycles` (k,) of each in the turn, the last `unseen` ones by no encoder.
 
     What the encoders see of a slow ripple needs no line: it is `seen` (n, m) as one column, beside how it changes and
-    what else they tell, their noise above all. Columns (n, 0 or 1) of the `rate` are taken out of few samples, and of
-    those with a gap between: they do not meet a ripple evenly.
+    what else they tell, their noise above all. A column (n, 0 or 1) of the `rate` is taken out. Of few samples, and of
+    those with a gap between, it is the rate, for they do not meet a ripple evenly. Else it is how the slow ripple
+    changes, which a sensor reads as well as it lags: even weights leave nothing of that, those that are free of slow
+    lines do.
     """
 
     cycles: Array
@@ -63,7 +65,8 @@ class Lines:
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
     """Return the mean of readings (n, 3) in these steps and its weights (n,), which are to make that of what turned.
 
-    A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation.
+    A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation, or what one of
+    its size does.
     """
     ones = even_groups(np.zeros(len(readings), dtype=np.intp), 1)
     steady = np.column_stack([ones, turn.passing])
@@ -79,12 +82,15 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
     changed = np.zeros(3)
     if slow.any():
-        without = mean_weights(ones, np.column_stack([turn.passing, shaking[:, ~slow]]))[0]
-        uneven = np.column_stack([ones, turn.uneven_rad_s])
-        changed = (weights - without) @ (readings - uneven @ fitted(uneven, readings))
+        beside = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
+        without = mean_weights(ones, beside)[0]
+        even = _beside(np.column_stack([ones, turn.uneven_rad_s]), readings)
+        left = _beside(np.column_stack([ones, beside, lines.seen]), readings)
+        by_size = _by_size(shaking[:, slow], weights - without, left)
+        changed = np.maximum(((weights - without) @ even) ** 2, by_size)
     mean = Mean(
         mean=weights @ readings,
-        variance=noise.in_a_mean * float(weights @ weights) + changed**2 + rounding,
+        variance=noise.in_a_mean * float(weights @ weights) + changed + rounding,
         noise=np.sqrt(noise.scatter),
         samples=len(readings),
         freedom=noise.freedom,
@@ -92,6 +98,25 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
         rounding=rounding,
     )
     return mean, weights
+
+
+def _by_size(slow: Array, weights: Array, left: Array) -> Array:
+    """Return (3,) the variance that slow columns (n, k) in what is left of readings (n, 3) make by weights (n,).
+
+    By their size alone: a line may come with any phase, and that of one turn may change a mean by little where the line
+    is large.
+    """
+    powers = (fitted(slow, left) ** 2).reshape(-1, 2, 3).sum(axis=1)
+    kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
+    variance: Array = kept @ powers / 2
+    return variance
+
+
+def _beside(columns: Array, values: Array) -> Array:
+    """Return what columns (n, k) of any size leave of values (n, m)."""
+    unit = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    left: Array = values - unit @ fitted(unit, values)
+    return left
 
 
 def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
@@ -107,8 +132,7 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
         known = np.column_stack([steady, uneven])
         cycles = find_lines(readings - known @ fitted(known, readings), LineSearch(beats=turn.beats), share=turn.share)
         return Lines(cycles, len(cycles), none, uneven)
-    along = uneven - steady @ fitted(steady, uneven)
-    left = readings - steady @ fitted(steady, readings)
+    along, left = (each - steady @ fitted(steady, each) for each in (uneven, readings))
     if not turn.encoders_true:
         cycles = find_lines(left, LineSearch(beats=turn.beats), share=turn.share)
         return Lines(cycles, len(cycles), along, none)
@@ -116,11 +140,28 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     ripple = find_lines(along, heard, share=turn.share)
     columns = waves(ripple, turn.share, SEEN.beats)
     sizes = fitted(columns, along)
-    slow = np.repeat(ripple < SLOW, wide(SEEN.beats))
-    smooth = (columns[:, slow] @ sizes[slow])[:, 0]
-    seen = np.column_stack([smooth, np.gradient(smooth), along - columns @ sizes])
-    known = np.column_stack([steady, seen])
-    known = known / (np.linalg.norm(known, axis=0) + np.finfo(np.float64).tiny)
-    fast = ripple[ripple >= SLOW]
-    cycles = find_lines(readings - known @ fitted(known, readings), UNSEEN, fast, turn.share)
-    return Lines(cycles, len(cycles) - len(fast), seen, none)
+    fast = np.repeat(ripple >= SLOW, wide(SEEN.beats))
+    slow = along - columns[:, fast] @ sizes[fast]
+    smooth = slow_part(slow, turn.share)
+    late = np.gradient(smooth, axis=0)
+    seen = np.column_stack([smooth, late, slow - smooth])
+    left = _beside(np.column_stack([steady, seen]), readings)
+    heard_too = ripple[ripple >= SLOW]
+    cycles = find_lines(left, UNSEEN, heard_too, turn.share)
+    return Lines(cycles, len(cycles) - len(heard_too), seen, late)
+
+
+def lagging(along: Array, columns: Array, share: Array) -> Array:
+    """Return (n, 1) what a sensor that lags reads of the slow part of a rate `along` (n,), beside columns (n, k)."""
+    beside = along[:, None] - columns @ fitted(columns, along[:, None])
+    return np.asarray(np.gradient(slow_part(beside, share), axis=0), dtype=np.float64)
+
+
+def slow_part(rates: Array, share: Array) -> Array:
+    """Return what of rates (n, m) comes less often than `SLOW` times in a turn, of which a share (n,) was over.
+
+    Waves of half a turn tell it, for a vibration does not end with the turn.
+    """
+    halves = turning(np.pi * share, int(2 * SLOW))
+    slow: Array = halves @ fitted(halves, rates)
+    return slow

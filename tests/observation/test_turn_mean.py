@@ -28,21 +28,29 @@ class Sampled:
     turn: SampledTurn
 
 
-def sampled(ripple: Ripple, seed: int, *, complete: bool = True, encoders_true: bool = True) -> Sampled:
-    """Readings of a turn that begins and ends anywhere between two samples."""
+def sampled(
+    ripple: Ripple, seed: int, *, complete: bool = True, encoders_true: bool = True, lag_s: float = 0.0
+) -> Sampled:
+    """Readings of a turn that begins and ends anywhere between two samples, by a sensor that lags."""
     rng = np.random.default_rng(seed)
     count = int(RATE_HZ / TURN_HZ)
     share = (np.arange(count, dtype=np.float64) + rng.uniform()) / (RATE_HZ / TURN_HZ)
     size = SPEED_RAD_S * ripple.fraction * np.sqrt(2 / len(ripple.orders))
     phases = rng.uniform(0, 2 * np.pi, len(ripple.orders))
-    uneven = size * np.sum(np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases), axis=1)
-    seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
-    rates = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
+    phases_seen = rng.uniform(0, 6, 3)
+
+    def rates_at(share: Array) -> Array:
+        uneven = size * np.sum(np.cos(2 * np.pi * np.outer(share, ripple.orders) + phases), axis=1)
+        seen = np.cos(2 * np.pi * ripple.seen_hz / TURN_HZ * share[:, None] + phases_seen)
+        found: Array = np.outer(SPEED_RAD_S + uneven, AXIS) + np.sqrt(2) * ripple.seen_rad_s * seen
+        return found
+
+    rates, late = rates_at(share), rates_at(share - lag_s * TURN_HZ)
     unseen = np.zeros((count, 3))
     for hertz in ripple.unseen_hz:
         wave = np.cos(2 * np.pi * hertz / TURN_HZ * share[:, None] + rng.uniform(0, 6, 3))
         unseen += ripple.unseen_rad_s * np.sqrt(2 / len(ripple.unseen_hz)) * wave
-    readings = SCALE * (rates + unseen) + BIAS_RAD_S + NOISE_RAD_S * rng.standard_normal((count, 3))
+    readings = SCALE * (late + unseen) + BIAS_RAD_S + NOISE_RAD_S * rng.standard_normal((count, 3))
     turn = SampledTurn(
         share=share,
         rates_rad_s=rates,
@@ -61,11 +69,14 @@ def error(found: Mean, weights: Array, turn: SampledTurn) -> Array:
     return off
 
 
+@pytest.mark.parametrize("lag_s", [0.0, 0.004])
 @pytest.mark.parametrize(("orders", "fraction"), SLOW_BESIDE_FAST)
-def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(orders: tuple[int, ...], fraction: float) -> None:
+def test_a_slow_ripple_beside_faster_ones_is_in_both_means_alike(
+    orders: tuple[int, ...], fraction: float, lag_s: float
+) -> None:
     ripple = Ripple(orders, fraction, unseen_rad_s=1e-3, unseen_hz=(1.7,), seen_rad_s=1e-3, seen_hz=0.9)
     for seed in range(4):
-        case = sampled(ripple, seed)
+        case = sampled(ripple, seed, lag_s=lag_s)
         found, weights = turn_mean(case.readings, Steps(STEP_RAD_S), case.turn)
         assert np.abs(error(found, weights, case.turn)).max() < 4.5
         assert weights.sum() == pytest.approx(1.0)
