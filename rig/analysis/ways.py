@@ -19,11 +19,13 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.rounding import rounding_left
 from rig.estimation.vector_fit import Explained
-from rig.motion.geometry import flange_pose
+from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.known_motion import MIN_RATE_RAD_S
+from rig.observation.lines import fitted
 from rig.observation.observed_run import ObservedRun
+from rig.observation.tapered_weights import noise_at_zero
 from rig.observation.windows import rested, swept
 
 BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
@@ -36,14 +38,16 @@ LOST = 0.01  # of the samples, at most, by a rate that a part keeps so well
 GAP = 1.5  # of the interval between samples: one is missing, and with it so much of the way
 STEPS = 48
 WRISTS = 3  # whose ways count, the last joints
+LOW = 0.0  # of the data rate: no more low frequencies than the fewest, for a servo's vibration is near
 
 
 def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
     """The pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
 
-    Their noise is that of the other pieces, for as long as they last, and what a vibration leaves of which the rests
-    beside either end tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and
-    slower on it.)
+    Their noise is that of the other pieces, for as long as they last, or their own where that is more, and what a
+    vibration leaves of which the rests beside either end tell. (No lines are sought on a way: it is short, and the
+    servo's own vibration grows faster and slower on it. Where it passes the data rate it stands still in the samples,
+    and their mean is off by it.)
     """
     found = [
         (way, stream, since_s, each.run.settings, site)
@@ -56,13 +60,14 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         return pieces
     of_noise = pieces.variances_rad2_s2 - np.square(pieces.roundings_rad_s)
     density = np.median(of_noise * np.diff(pieces.times_s), axis=0)
-    means, rates, attitudes, pulls, roundings = [], [], [], [], []
+    means, rates, attitudes, pulls, roundings, scatters = [], [], [], [], [], []
     for way, stream, _, settings, site in found:
         inside = between(stream, way.start_s, way.end_s)
         readings = stream.readings_rad_s[inside]
         moving = way.motion.rate(stream.time_s[inside]) @ explained.solution.matrix.T
         roundings.append(rounding_left(readings, stream.steps, moving, stream.steps.variance))
         attitude = way.motion.attitude(way.start_s, way.end_s)
+        scatters.append(_scatter(readings, stream.time_s[inside], way.motion, site.down_m_s2))
         means.append(readings.mean(axis=0))
         rates.append(way.motion.mean_rate(way.start_s, way.end_s) + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
@@ -70,14 +75,13 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, *_ in found])
     lasting_s, count = np.diff(times_s), len(found)
     swing_rad2 = _swings(pieces, name, recordings, times_s)
+    noise = np.maximum(density / lasting_s, scatters)
     return replace(
         pieces,
         sweep=np.concatenate([pieces.sweep, REST - 1 - np.arange(count)]),
         place=np.concatenate([pieces.place, np.zeros(count)]),
         means_rad_s=np.concatenate([pieces.means_rad_s, means]),
-        variances_rad2_s2=np.concatenate(
-            [pieces.variances_rad2_s2, density / lasting_s + swing_rad2 / lasting_s**2 + roundings]
-        ),
+        variances_rad2_s2=np.concatenate([pieces.variances_rad2_s2, noise + swing_rad2 / lasting_s**2 + roundings]),
         roundings_rad_s=np.concatenate(
             [np.broadcast_to(pieces.roundings_rad_s, pieces.means_rad_s.shape), np.sqrt(roundings)]
         ),
@@ -88,6 +92,20 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         times_s=np.concatenate([pieces.times_s, times_s]),
         stretches=(*pieces.stretches, *(way for way, *_ in found)),
     )
+
+
+def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
+    """Return (3,) the variance of the mean of readings (n, 3) on a way, by what neither the arm nor gravity explains.
+
+    A sensor that lags reads how the rate changes. A ripple that is faster than readings and states come looks like
+    noise, at low frequencies too.
+    """
+    rates = motion.sampled_rates(time_s)
+    felt = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
+    columns = np.column_stack([np.ones(len(rates)), rates, np.gradient(rates, axis=0), felt])
+    columns = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    variance: Array = noise_at_zero(readings - columns @ fitted(columns, readings), LOW) / len(readings)
+    return variance
 
 
 def _swings(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], times_s: Array) -> Array:

@@ -41,12 +41,13 @@ def weights(time_s: Array, start_s: float, end_s: float) -> Array:
     return shares
 
 
-def noise_at_zero(readings: Array) -> Array:
+def noise_at_zero(readings: Array, low: float = LOW) -> Array:
     """(3,) the variance per reading (n, 3) that counts in a long mean: the spectrum near zero, without its lines.
 
-    The median over low frequencies, which lines do not move, over that of χ² of two degrees of freedom.
+    The median over low frequencies, which lines do not move, over that of χ² of two degrees of freedom. They are so,
+    up to a share `low` of the data rate, but for the fewest that tell it.
     """
-    powers = np.abs(np.fft.rfft(shaped(readings), axis=0)[MAIN_LOBE : _highest(len(readings))]) ** 2
+    powers = np.abs(np.fft.rfft(shaped(readings), axis=0)[MAIN_LOBE : _highest(len(readings), low)]) ** 2
     found: Array = np.median(powers, axis=0) / np.log(2)
     return found
 
@@ -74,6 +75,6 @@ def freedom_at_zero(count: int) -> float:
     return float(2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS)
 
 
-def _highest(count: int) -> int:
+def _highest(count: int, low: float = LOW) -> int:
     """The bin at which low frequencies end."""
-    return max(round(LOW * count), MAIN_LOBE + FEWEST_BINS)
+    return max(round(low * count), MAIN_LOBE + FEWEST_BINS)
