@@ -58,9 +58,7 @@ def _apart(recording: ObservedRun, stream: Stream, turn: Observation, observed: 
     """Return how far the board's average is from what the computer's makes of its window, in standard deviations."""
     zero, average, seen = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange
-    across = np.array(stream.sensor.mounting) @ (
-        np.eye(3) - np.outer(axis, axis)
-    )  # F is near enough for what sways there
+    across = np.array(stream.sensor.mounting) @ (np.eye(3) - np.outer(axis, axis))  # what sways there is small
     by_rate = np.outer(average.mean_rad_s - zero, axis) / turn.speed_rad_s + across
     own = np.searchsorted(stream.time_s, [average.start_s, average.end_s])
     boards = np.searchsorted(stream.board_time_s, np.array([seen.start_us, seen.end_us]) * 1e-6 - NEXT_S)

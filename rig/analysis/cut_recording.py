@@ -220,10 +220,10 @@ def _cut_turn(
     rate = motion.sampled_rates(times_s)[parted.used]
     share = (parted.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
-    if len(share) >= FEWEST:  # as where its mean was made
+    if len(share) >= FEWEST:  # as where its mean was made, but for what filters show: parts tell too few columns apart
         passing = turning(2 * np.pi * share, 2 * turn.beats)
         steady = np.column_stack([np.ones(len(share)), passing, lines])
-        lines = np.column_stack([lines, lagging(rate @ axis, steady, share)])
+        lines = np.column_stack([lines, lagging(rate @ axis, steady, share)[:, :1]])
     weights = mean_weights(parted.groups, lines)
     vibration = np.column_stack([rate @ axis, motion.rate(parted.time_s, 1) @ axis])
     residual, vibration = (each - parted.groups @ (parted.averages @ each) for each in (readings, vibration))

@@ -50,7 +50,7 @@ class Lines:
     """Lines that are taken out of a mean: `cycles` (k,) of each in the turn, the last `unseen` ones by no encoder.
 
     What the encoders see of a slow ripple needs no line: it is `seen` (n, m) as one column, beside how it changes and
-    what else they tell, their noise above all. A column (n, 0 or 1) of the `rate` is taken out. Of few samples, and of
+    what else they tell, their noise above all. Columns (n, 0 to 2) of the `rate` are taken out. Of few samples, and of
     those with a gap between, it is the rate, for they do not meet a ripple evenly. Else it is how the slow ripple
     changes, which a sensor reads as well as it lags: even weights leave nothing of that, those that are free of slow
     lines do.
@@ -143,7 +143,7 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     fast = np.repeat(ripple >= SLOW, wide(SEEN.beats))
     slow = along - columns[:, fast] @ sizes[fast]
     smooth = slow_part(slow, turn.share)
-    late = np.gradient(smooth, axis=0)
+    late = _changes(smooth)
     seen = np.column_stack([smooth, late, slow - smooth])
     left = _beside(np.column_stack([steady, seen]), readings)
     heard_too = ripple[ripple >= SLOW]
@@ -152,9 +152,15 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
 
 
 def lagging(along: Array, columns: Array, share: Array) -> Array:
-    """Return (n, 1) what a sensor that lags reads of the slow part of a rate `along` (n,), beside columns (n, k)."""
+    """Return (n, 2) what a sensor that lags reads of the slow part of a rate `along` (n,), beside columns (n, k)."""
     beside = along[:, None] - columns @ fitted(columns, along[:, None])
-    return np.asarray(np.gradient(slow_part(beside, share), axis=0), dtype=np.float64)
+    return _changes(slow_part(beside, share))
+
+
+def _changes(slow: Array) -> Array:
+    """(n, 2) how a rate (n, 1) changes, which a lag shows, and how that does, which a filter shows."""
+    change = np.gradient(slow, axis=0)
+    return np.column_stack([change, np.gradient(change, axis=0)])
 
 
 def slow_part(rates: Array, share: Array) -> Array:
