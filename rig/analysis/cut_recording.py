@@ -20,13 +20,11 @@ from rig.estimation.rounding import Steps, rounding_left
 from rig.estimation.vector_fit import Explained
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
-from rig.observation.beside_lines import FEWEST
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, LineSearch, find_lines, fitted, swings, turning, waves
+from rig.observation.lines import NONE, LineSearch, find_lines, fitted, swings, waves
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered_weights import noise_at_zero
-from rig.observation.turn_mean import lagging
 
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
@@ -220,10 +218,6 @@ def _cut_turn(
     rate = motion.sampled_rates(times_s)[parted.used]
     share = (parted.time_s - average.start_s) / average.duration_s
     lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
-    if len(share) >= FEWEST:  # as where its mean was made, but for what filters show: parts tell too few columns apart
-        passing = turning(2 * np.pi * share, 2 * turn.beats)
-        steady = np.column_stack([np.ones(len(share)), passing, lines])
-        lines = np.column_stack([lines, lagging(rate @ axis, steady, share)[:, :1]])
     weights = mean_weights(parted.groups, lines)
     vibration = np.column_stack([rate @ axis, motion.rate(parted.time_s, 1) @ axis])
     residual, vibration = (each - parted.groups @ (parted.averages @ each) for each in (readings, vibration))

@@ -145,7 +145,7 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     smooth = slow_part(slow, turn.share)
     late = _changes(smooth)
     seen = np.column_stack([smooth, late, slow - smooth])
-    left = _beside(np.column_stack([steady, seen]), readings)
+    left = _beside(np.column_stack([steady, seen, columns[:, fast]]), readings)
     heard_too = ripple[ripple >= SLOW]
     cycles = find_lines(left, UNSEEN, heard_too, turn.share)
     return Lines(cycles, len(cycles) - len(heard_too), seen, late)
