@@ -6,6 +6,7 @@ The firmware's hand.c, hand_motion.c and hand_solver.c are compiled with its com
 of a simulated hand on an emulated Cortex-M4F. Counts are instructions, not time.
 """
 
+import os
 import struct
 import subprocess
 import sys
@@ -32,8 +33,9 @@ SOLVING = 20_000  # no block so many unless it ends a move
 
 def build(folder: Path) -> Path:
     """The program, with the compiler and the flags of the firmware's Makefile."""
+    own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
     show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
-    command = subprocess.run(show, check=True, capture_output=True, text=True).stdout.split()
+    command = subprocess.run(show, check=True, capture_output=True, text=True, env=own).stdout.split()
     elf = folder / "hand.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}", f"-Wl,-Tbss={STATE:#x}"]
     subprocess.run([*command, *link, *map(str, SOURCES), "-o", str(elf)], check=True, cwd=FIRMWARE)

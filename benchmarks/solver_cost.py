@@ -11,6 +11,7 @@ scale and in bias, are within twice those of the closed form: single precision b
 any number of observations; the last row is for six only, with every loop written out as the closed form's are.
 """
 
+import os
 import struct
 import subprocess
 import tempfile
@@ -138,8 +139,9 @@ class Core:
 
 def build(folder: Path, *defines: str) -> Path:
     """Both solvers with the compiler and the flags of the firmware's Makefile."""
+    own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
     show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
-    command = subprocess.run(show, check=True, capture_output=True, text=True).stdout.split()
+    command = subprocess.run(show, check=True, capture_output=True, text=True, env=own).stdout.split()
     elf = folder / f"solvers{len(defines)}.elf"
     link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}"]
     subprocess.run([*command, *defines, *link, *map(str, SOURCES), "-o", str(elf)], check=True, cwd=FIRMWARE)

@@ -122,15 +122,20 @@ def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
     for heading, rows in blocks.items():
         table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
         table += [(f"{INDENT}{label}", _with_largest(three)) for label, three in rows]
-    name = max(len(label) for label, _ in table)
     number = max(len(cell) for _, cells in table for cell in cells)
     columns = max(len(cells) for _, cells in table)
+    name = max(len(label) for label, _ in table)
+    if name + (number + 1) * columns > width:  # the longest headings stand alone, where that is enough
+        name = max(len(label) for label, _ in table if label.startswith(INDENT))
     gap = next((gap for gap in (3, 2, 1) if name + (number + gap) * columns <= width), 2)
     number += gap
     wide = name + number * columns <= width
     for label, cells in table:
         numbers = "".join(f"{cell:>{number}}" for cell in cells)
-        yield from [f"{label:{name}}{numbers}"] if wide else [label, f"{INDENT}{numbers}"]
+        if wide and len(label) <= name:
+            yield f"{label:{name}}{numbers}"
+        else:
+            yield from (label, f"{'':{name}}{numbers}" if wide else f"{INDENT}{numbers}")
 
 
 def _heading(item: _Item) -> str:

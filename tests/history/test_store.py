@@ -32,6 +32,7 @@ from support.paths import DEMO, FIXTURES, ROOT
 from support.stated import moved_parameters
 
 OLD = ROOT / "tests" / "fixtures" / "history"
+THEN = ROOT / "tests" / "fixtures" / "history_result"  # what these have rows of
 
 
 ISSUED = Issued(
@@ -188,7 +189,7 @@ def test_a_history_of_an_old_version_is_migrated_with_equal_numbers(version: int
         assert len(before_that) == (version >= 3) and now == (ISSUED,)
         assert list(history.broken()) == []
     assert after == before and len(before["parameter"]) == 20
-    for stated, kept in zip(followed(read_result(FIXTURES / "verified")), found, strict=True):
+    for stated, kept in zip(followed(read_result(THEN)), found, strict=True):
         assert kept.parameters.keys() == {each.name for each in stated.parameters}
         assert moved_parameters(stated.parameters, kept.parameters.values()) == []
     with open_history(str(tmp_path / "new.sqlite")) as new, new.engine.connect() as connection:
