@@ -78,7 +78,6 @@ FAULT, INTERRUPTED = Fault.exit_status, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0, 1, 2, 3, 4 or 130)."""
     """Entry point of `rig`; returns the exit status docs/architecture.md promises (0 to 5, or 130)."""
     keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
     words = list(sys.argv[1:] if arguments is None else arguments)
