@@ -86,5 +86,7 @@ def _passing(time_s: Array, turn: Observation, along_rad_s: Array) -> Array:
     if turn.arc_rad is not None:
         of_turn -= turning(angle_rad * np.linspace(0.0, 1.0, len(share)), 2 * turn.beats).mean(axis=0)
     lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
+    if turn.arc_rad is not None:
+        return np.column_stack([of_turn, lines])
     columns = np.column_stack([np.ones(len(share)), of_turn, lines])
     return np.column_stack([of_turn, lines, lagging(along_rad_s, columns, share)])

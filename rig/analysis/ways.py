@@ -23,7 +23,7 @@ from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.known_motion import MIN_RATE_RAD_S
-from rig.observation.lines import fitted
+from rig.observation.lines import fitted, unit_columns
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered_weights import noise_at_zero
 from rig.observation.windows import rested, swept
@@ -102,8 +102,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
     """
     rates = motion.sampled_rates(time_s)
     felt = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
-    columns = np.column_stack([np.ones(len(rates)), rates, np.gradient(rates, axis=0), felt])
-    columns = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    columns = unit_columns(np.column_stack([np.ones(len(rates)), rates, np.gradient(rates, axis=0), felt]))
     variance: Array = noise_at_zero(readings - columns @ fitted(columns, readings), LOW) / len(readings)
     return variance
 

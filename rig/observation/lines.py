@@ -22,6 +22,7 @@ BEATS = 1  # as a sensor that makes a turn feels what shakes in the room
 SAMPLES_EACH = 5  # are needed to find what one column has in them
 NEARER = 1.02  # times as much must a line explain whose beat stands out, to be taken for that
 LEAST_GAP = 1.5  # steps between samples, of which some are missing then
+ROUNDING = 1e-12  # of the longest column: shorter ones hold what arithmetic leaves
 NONE: Array = np.zeros(0)
 
 
@@ -93,6 +94,15 @@ def turning(turned_rad: Array, most: int) -> Array:
     """(n, 2 most) cosine and sine of what comes once, twice, up to `most` times in a turn, at its angles (n,)."""
     each = [wave(times * turned_rad) for times in range(1, most + 1) for wave in (np.cos, np.sin)]
     return np.reshape(each, (2 * most, len(turned_rad))).T
+
+
+def unit_columns(columns: Array) -> Array:
+    """Return columns (n, k), of whatever units, with a length of one each; those that are rounding alone are zero.
+
+    Scaled up, rounding would make columns of noise that differ from one processor to another.
+    """
+    sizes = np.linalg.norm(columns, axis=0)
+    return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)
 
 
 def fitted(columns: Array, values: Array) -> Array:

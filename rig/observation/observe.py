@@ -257,6 +257,7 @@ def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArra
         passing=waves,
         beats=turn.beats,
         encoders_true=not turn.uneven,
+        closed=turn.closed,
         complete=bool(covered.all()) and not is_sparse(time_s),
     )
 

@@ -17,7 +17,7 @@ from rig.estimation.mean_weights import even_groups, mean_weights
 from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
 from rig.observation.coloured_noise import MEMORIES
-from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, turning, waves, wide
+from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, turning, unit_columns, waves, wide
 from rig.observation.mean import Mean
 
 SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
@@ -33,7 +33,8 @@ class SampledTurn:
     encoders have it. uneven_rad_s (n,): of that what is along the axis, less its mean over the turn by both ends.
     passing (n, k): columns of what comes once, twice and so on in a turn, of an arc less their means. beats: those of
     its lines, see `Revolution`. encoders_true: whether the encoders tell the turning within a turn, and not over whole
-    turns alone. complete: whether samples follow each other closely, and none is missing for long.
+    turns alone. closed: whether it is of whole turns. complete: whether samples follow each other closely, and none is
+    missing for long.
     """
 
     share: Array
@@ -42,6 +43,7 @@ class SampledTurn:
     passing: Array
     beats: int
     encoders_true: bool
+    closed: bool
     complete: bool
 
 
@@ -52,8 +54,8 @@ class Lines:
     What the encoders see of a slow ripple needs no line: it is `seen` (n, m) as one column, beside how it changes and
     what else they tell, their noise above all. Columns (n, 0 to 2) of the `rate` are taken out. Of few samples, and of
     those with a gap between, it is the rate, for they do not meet a ripple evenly. Else it is how the slow ripple
-    changes, which a sensor reads as well as it lags: even weights leave nothing of that, those that are free of slow
-    lines do.
+    changes in a whole turn, which a sensor reads as well as it lags: even weights leave nothing of that, those that are
+    free of slow lines do.
     """
 
     cycles: Array
@@ -73,8 +75,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     lines = _lines(readings, steady, turn)
     shaking = waves(lines.cycles, turn.share, turn.beats)
     weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))[0]
-    columns = np.column_stack([steady, lines.rate, shaking, lines.seen])
-    columns = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.seen]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.unseen else MEMORIES)
@@ -114,7 +115,7 @@ def _by_size(slow: Array, weights: Array, left: Array) -> Array:
 
 def _beside(columns: Array, values: Array) -> Array:
     """Return what columns (n, k) of any size leave of values (n, m)."""
-    unit = columns / (np.linalg.norm(columns, axis=0) + np.finfo(np.float64).tiny)
+    unit = unit_columns(columns)
     left: Array = values - unit @ fitted(unit, values)
     return left
 
@@ -143,7 +144,7 @@ def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
     fast = np.repeat(ripple >= SLOW, wide(SEEN.beats))
     slow = along - columns[:, fast] @ sizes[fast]
     smooth = slow_part(slow, turn.share)
-    late = _changes(smooth)
+    late = _changes(smooth) if turn.closed else none  # over an arc it looks like what encoders err
     seen = np.column_stack([smooth, late, slow - smooth])
     left = _beside(np.column_stack([steady, seen, columns[:, fast]]), readings)
     heard_too = ripple[ripple >= SLOW]

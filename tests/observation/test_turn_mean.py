@@ -57,6 +57,7 @@ def sampled(
         uneven_rad_s=rates @ AXIS - SPEED_RAD_S,
         passing=turning(2 * np.pi * share, 2 * BEATS),
         beats=BEATS,
+        closed=True,
         encoders_true=encoders_true,
         complete=complete,
     )
