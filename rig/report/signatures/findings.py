@@ -48,3 +48,39 @@ def not_as_signed(name: str, why: str) -> Refused:
     return Refused(
         "not_as_signed", f"{name} is not what was signed: {why}", "Do not rely on it; ask the laboratory for it"
     )
+
+
+def signer_not_trusted(name: str, signer: str, why: str) -> Refused:
+    """Return the problem of a file that is unaltered, and signed by somebody else than was expected."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} is signed by {signer}, who is not trusted: {why}",
+        "Compare the SHA-256 of the certificate with what the laboratory says, and give the right one with --trust",
+    )
+
+
+def stamp_not_trusted(name: str, server: str) -> Refused:
+    """Return the problem of a file whose time stamp anybody may have made."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} has a time stamp by {server}, who is not trusted",
+        "Give the certificate of the time server, or of the authority that issued it, with --trust too",
+    )
+
+
+def authority_not_trusted(name: str, authority: str) -> Refused:
+    """Return the problem of a file with an authority's certificate that may have been altered."""
+    return Refused(
+        "signer_not_trusted",
+        f"{name} brings a certificate of {authority} that nobody who is trusted has issued",
+        "Give the certificate of this authority, or of the one above it, with --trust too",
+    )
+
+
+def signer_unknown(name: str, signer: str) -> Refused:
+    """Return the problem of a file that is unaltered, by a verifier who trusts nobody."""
+    return Refused(
+        "signer_unknown",
+        f"{name} is signed by {signer}, and anybody may have made a key of that name",
+        "Give the certificate of the laboratory's key, or of the authority that issued it, with --trust",
+    )

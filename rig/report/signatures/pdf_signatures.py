@@ -18,17 +18,18 @@ from pyhanko_certvalidator import ValidationContext
 
 from rig.errors import Refused
 from rig.report.signatures.cms_coverage import certificates_with, uncovered_in_container
-from rig.report.signatures.findings import Looked, Seen, not_as_signed, not_signed
-from rig.report.signatures.reason import Reason
-from rig.report.signatures.trust import (
-    Trust,
+from rig.report.signatures.findings import (
+    Looked,
+    Seen,
     authority_not_trusted,
+    not_as_signed,
+    not_signed,
     signer_not_trusted,
     signer_unknown,
     stamp_not_trusted,
-    unvouched,
-    why_untrusted,
 )
+from rig.report.signatures.reason import Reason
+from rig.report.signatures.trust import Trust, unvouched, why_untrusted
 
 
 def seen_pdf(name: str, content: bytes, trust: Trust) -> Looked:

@@ -13,9 +13,16 @@ from signxml.exceptions import SignXMLException
 from signxml.util import add_pem_header
 from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier
 
-from rig.report.signatures.findings import Looked, Seen, not_as_signed, not_signed
+from rig.report.signatures.findings import (
+    Looked,
+    Seen,
+    not_as_signed,
+    not_signed,
+    signer_not_trusted,
+    signer_unknown,
+)
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.trust import Trust, signer_not_trusted, signer_unknown, why_untrusted
+from rig.report.signatures.trust import Trust, why_untrusted
 from rig.report.signatures.xml_document import NAMES, canonical, read_xml, rebuilt
 
 DCC = "{https://ptb.de/dcc}"
