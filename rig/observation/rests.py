@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array
-from rig.observation.knocks import KNOCK, steps_of
+from rig.observation.knocks import KNOCK, smallest_steps
 from rig.observation.sampling import find_sampling
 from rig.observation.steadiness import BEYOND
 from rig.observation.windows import Window
@@ -57,7 +57,7 @@ def find_rests(
     times = time_s[: count * width].reshape(count, width)
     blocks = readings[quantity][: count * width].reshape(count, width, -1)
     means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
-    least = np.maximum(COUNTS * quantity.steady, TOGGLES * steps_of(readings[quantity]))
+    least = np.maximum(COUNTS * quantity.steady, TOGGLES * smallest_steps(readings[quantity]))
     noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), least)
     if still_at_first:
         noise = np.maximum(noise, np.median(scatter[:FIRST], axis=0))
