@@ -20,7 +20,6 @@ from rig.estimation.rounding import Steps, cut_steps, found_steps
 
 ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]
 MAX_CHANNELS: Final = 16
-MOST_OF_A_CONVERTER: Final = 1 << 26  # counts to the end of the scale: no converter of an inertial sensor has more
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +52,6 @@ class Channel:
     def resolution(self) -> float:
         """The step between neighbouring readings in the quantity's unit; 0 of numbers that are no counts."""
         return self.step or (0.0 if self.type == "<f8" else self.unit_per_count)
-
-    @property
-    def is_fine(self) -> bool:
-        """Whether a count is no step of the source's, but far finer, so that a count may hold any number of it."""
-        return self.full_scale_counts is None or self.full_scale_counts > MOST_OF_A_CONVERTER
 
     def steps(self, readings: Array, *, trusts_counts: bool = False) -> Steps:
         """The steps of a quantity with axes, of all its readings (n, 3): as stated, or larger ones that they show.
