@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import Chart
 from rig.history.statistics.rig_effects import RigEffect
@@ -182,7 +181,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
         "std_combined": parameter.std_combined,
         "unit": parameter.unit,
         "max_deviation": parameter.max_deviation,
-        "coverage_factor": parameter.coverage_factor or COVERAGE_FACTOR,
+        "coverage_factor": parameter.coverage_factor,
     }
 
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from sqlalchemy import URL, Connection, Engine, create_engine
 
 from rig.errors.extras import missing_extra
-from rig.history import continuity
+from rig.history import continuity, schema
 from rig.history.address import Place
 from rig.history.forks import kept_from_children
 from rig.history.libpq import connect_arguments
 from rig.history.migrations import bring_up_to_date, version_of
-from rig.history.schema import VERSION
 from rig.history.sqlite_engine import WAIT_S, WRITES, shared_engine, sqlite_engine
 from rig.history.sqlite_file import history_is_there, made_whole
 
@@ -36,7 +35,7 @@ def engine_of(place: Place) -> Iterator[Engine]:
             version = version_of(connection, place.label)
         if version == 0:
             continuity.refuse_anew(place)
-        if version < VERSION:
+        if version < schema.VERSION:
             _bring_up_to_date(engine, place.label)
         with engine.connect() as connection:
             continuity.refuse_another(place, connection)

@@ -148,9 +148,10 @@ def content_sha256(text: str) -> str:
 
 
 def configured_in(folder: Path) -> "Loaded | None":
-    """The folder's configuration.
+    """Return the folder's configuration.
 
-    None where there is none, or where it is of before some key was renamed: a result is entered all the same.
+    None if there is none, or if this program refuses it, by a key that it does not know: a result is entered all the
+    same.
     """
     if not (folder / CONFIG).exists():
         return None

@@ -5,7 +5,6 @@ import math
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 
-from rig.data.installed_kinds import quantities
 from rig.data.result_file import ResultDocument
 from rig.report.kinds.followed import Followed, Parameter
 from rig.report.kinds.registry import followed
@@ -50,8 +49,7 @@ def unlike(document: ResultDocument, recomputed: Sequence[Followed]) -> Iterator
     stated = {(each.sensor, each.quantity): each for each in followed(document)}
     beside = {(each.sensor, each.quantity): each for each in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ beside.keys()):
-        if quantity in quantities() or (sensor, quantity) in beside:  # drift and Earth's rate were not followed before
-            yield f"{quantity} of {sensor}, which only one of them has"
+        yield f"{quantity} of {sensor}, which only one of them has"
     for key in sorted(stated.keys() & beside.keys()):
         yield from _differences(stated[key], beside[key])
 

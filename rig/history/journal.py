@@ -61,13 +61,10 @@ def note(connection: Connection, table: Table, *key: int | str) -> None:
 
 def head(connection: Connection) -> Head:
     """The end of the journal; number 0 of one that is empty."""
-    newest = select(schema.journal).order_by(schema.journal.c.number.desc()).limit(1)
+    lines = schema.journal.c
+    newest = select(lines.number, lines.chain_sha256).order_by(lines.number.desc()).limit(1)
     last = connection.execute(newest).one_or_none()
-    if last is None:
-        return Head(0, "")
-    if last.chain_sha256 is not None:
-        return Head(last.number, last.chain_sha256)
-    return Head(last.number, _chained(connection))  # entered before version 6: the next line seals it with all before
+    return Head(0, "") if last is None else Head(last.number, last.chain_sha256)
 
 
 def has(connection: Connection, known: Head) -> bool:
@@ -75,37 +72,23 @@ def has(connection: Connection, known: Head) -> bool:
     lines = schema.journal.c
     if known.number == 0:
         return True
-    found = connection.execute(select(lines.chain_sha256).where(lines.number == known.number)).one_or_none()
-    if found is None:
-        return False
-    return found.chain_sha256 == known.sha256 if found.chain_sha256 is not None else holds(connection, known)
+    chain: str | None = connection.scalar(select(lines.chain_sha256).where(lines.number == known.number))
+    return chain == known.sha256
 
 
 def holds(connection: Connection, known: Head) -> bool:
     """Whether the lines up to that one are those of when it was the end; `known` may be of years ago."""
-    return _chained(connection, known.number) == known.sha256
-
-
-def _chained(connection: Connection, number: int | None = None) -> str:
-    """The chain of the lines as they stand, up to this one or to the last."""
-    lines = select(schema.journal).order_by(schema.journal.c.number)
-    before = ""
-    for line in connection.execute(lines if number is None else lines.where(schema.journal.c.number <= number)):
-        before = _link(before, line._mapping)
-    return before
+    lines = select(schema.journal).where(schema.journal.c.number <= known.number).order_by(schema.journal.c.number)
+    chain = ""
+    for line in connection.execute(lines):
+        chain = _link(chain, line._mapping)
+    return chain == known.sha256
 
 
 def _link(before: str, line: Mapping[Any, Any]) -> str:
     """SHA-256 of a line and of the chain before it."""
     said = [before, *(line[name] for name in ("number", "kind", "key", "sha256", "entered_utc"))]
     return hashlib.sha256(json.dumps(said, separators=(",", ":")).encode()).hexdigest()
-
-
-def note_all(connection: Connection) -> None:
-    """All that is there, of a history that had no journal."""
-    for table in ENTERED.values():
-        for key in connection.execute(select(*table.primary_key).order_by(*table.primary_key)).all():
-            note(connection, table, *key)
 
 
 def broken(connection: Connection) -> Iterator[Broken]:
@@ -115,15 +98,14 @@ def broken(connection: Connection) -> Iterator[Broken]:
         for name, table in ENTERED.items()
         for key in connection.execute(select(*table.primary_key)).all()
     }
-    before, chain, chained = 0, "", False
+    before, chain = 0, ""
     for line in connection.execute(select(schema.journal).order_by(schema.journal.c.number)).all():
         if line.number > before + 1:
             yield Broken(f"journal {before + 1} to {line.number - 1}", "missing", "what was entered then is not known")
         before, chain = line.number, _link(chain, line._mapping)
-        chained = chained or line.chain_sha256 is not None
-        if chained and line.chain_sha256 != chain:
+        if line.chain_sha256 != chain:
             yield Broken(f"journal {line.number}", "changed", "it does not follow from the lines before it")
-            chain = line.chain_sha256 or chain
+            chain = line.chain_sha256
         what, found = f"{line.kind} {line.key}", there.pop((line.kind, line.key), None)
         if found is None:
             yield Broken(what, "missing", f"entered {line.entered_utc}, and not there any more")

@@ -18,7 +18,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 6
+VERSION = 1
+APPLICATION_ID = 0x52494748  # "RIGH", at bytes 68 to 71 of a file (SQLite's file format, 1.3.13)
 HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
@@ -53,8 +54,7 @@ run = Table(
     Column("fit", Boolean, nullable=False),  # whether the measurement passed its own checks
     Column("simulated", Boolean, nullable=False),
     Column("result", Text, nullable=False),
-    # Since version 3, null where nobody said.
-    Column("operator", String(NAME)),
+    Column("operator", String(NAME)),  # null if the configuration does not name one; so is the note
     Column("note", String(NOTE)),
 )
 
@@ -105,10 +105,10 @@ parameter = Table(
     Column("std_combined", Float),  # null where no more than noise is known
     Column("unit", String(40), nullable=False),
     Column("max_deviation", Float),  # from the nominal value, by the limits of that run
-    Column("coverage_factor", Float),  # of U; since version 5, null where it is 2
+    Column("coverage_factor", Float, nullable=False),  # of U
 )
 
-# Since version 2. A wrong entry is not taken away: it is said that it is wrong, and why.
+# A wrong entry is not taken away: it is said that it is wrong, and why.
 voided = Table(
     "voided",
     metadata,
@@ -117,7 +117,7 @@ voided = Table(
     Column("voided_utc", String(TIME), nullable=False),
 )
 
-# Since version 3. A certificate by its number, which another content does not have; `replaces` is the number it says it
+# A certificate by its number, which another content does not have; `replaces` is the number it says it
 # amends, of this history or another. `marks` is what stands across its pages, such as that the laboratory is simulated:
 # only one without any is a certificate to rely on.
 certificate = Table(
@@ -143,7 +143,7 @@ certificate_file = Table(
     Column("entered_utc", String(TIME), nullable=False),
 )
 
-# Since version 4. What lay beside the recordings when the run was entered; of result.json the hash of what it says.
+# What lay beside the recordings when the run was entered; of result.json the hash of what it says.
 document = Table(
     "document",
     metadata,
@@ -152,7 +152,7 @@ document = Table(
     Column("sha256", String(HASH), nullable=False),
 )
 
-# Since version 4. Every entry a second time, as the hash of its rows, numbered without gaps.
+# Every entry a second time, as the hash of its rows, numbered without gaps.
 journal = Table(
     "journal",
     metadata,
@@ -161,7 +161,6 @@ journal = Table(
     Column("key", String(1000), nullable=False),  # what finds the row there, as JSON
     Column("sha256", String(HASH), nullable=False),
     Column("entered_utc", String(TIME), nullable=False),
-    # Since version 6, null of lines before: of this line and, through the one before it, of all before.
-    Column("chain_sha256", String(HASH)),
+    Column("chain_sha256", String(HASH), nullable=False),  # of this line and, through the one before it, of all before
     UniqueConstraint("kind", "key"),
 )

@@ -15,13 +15,17 @@ from tempfile import TemporaryDirectory
 
 from rig.config.regular_file import FileIdentity, UnfitFile, file_identity
 from rig.errors import Refused
+from rig.history.migrations import DEVELOPMENT_KEY, too_old
+from rig.history.schema import APPLICATION_ID
 
-APPLICATION_ID = 0x52494748  # "RIGH", at bytes 68 to 71 of the file (SQLite's file format, 1.3.13)
 BESIDE = ("-wal", "-shm")  # what SQLite lays beside a database: its log, and the log's index with locks of its own
 
 
 def history_is_there(file: Path) -> bool:
-    """Whether there is a history; False where there is nothing at all. Raises Refused `not_a_history`, OSError."""
+    """Return whether there is a history; False if there is nothing at all.
+
+    Raises Refused `not_a_history`, `history_too_old`; OSError.
+    """
     try:
         status = file.lstat()
     except FileNotFoundError:
@@ -48,7 +52,7 @@ def address_of(file: Path, options: str) -> str:
 
 def refuse_unmarked(connection: sqlite3.Connection, file: Path) -> None:
     """Read from a new connection whose database it is, before it writes anything. Raises Refused `not_a_history`."""
-    if not _is_history(connection):
+    if not _is_marked(connection):
         raise _refused(file, "it is a database of something else")
 
 
@@ -81,10 +85,15 @@ def _refuse_unfit(status: os.stat_result) -> None:
 
 
 def _look(file: Path) -> None:
-    """Raise UnfitFile where it is no history. As of a medium that takes no more: locks and writes nothing."""
+    """Read a file as on a medium that takes no more: lock and write nothing.
+
+    Raises UnfitFile if it is no history, Refused `history_too_old`.
+    """
     try:
         with closing(sqlite3.connect(address_of(file, "mode=ro&immutable=1"), uri=True)) as connection:
-            if not _is_history(connection):
+            if _is_too_old(connection):
+                raise too_old(str(file))
+            if not _is_marked(connection):
                 raise UnfitFile("it is a database of something else")
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
@@ -96,15 +105,15 @@ def _look(file: Path) -> None:
         # it looks again under a lock, by `refuse_unmarked`.
 
 
-def _is_history(connection: sqlite3.Connection) -> bool:
-    (marked,) = connection.execute("PRAGMA application_id").fetchone()
-    return marked == APPLICATION_ID or _is_of_before(connection)
+def _is_marked(connection: sqlite3.Connection) -> bool:
+    (mark,) = connection.execute("PRAGMA application_id").fetchone()
+    return bool(mark == APPLICATION_ID)
 
 
-def _is_of_before(connection: sqlite3.Connection) -> bool:
-    """Whether it has the tables of a history made before files were marked."""
+def _is_too_old(connection: sqlite3.Connection) -> bool:
+    """Return whether it has the tables of a history before 0.1.0, of which not all were marked."""
     try:
-        version = connection.execute("SELECT value FROM meta WHERE key = 'version'").fetchone()
+        version = connection.execute("SELECT value FROM meta WHERE key = ?", [DEVELOPMENT_KEY]).fetchone()
         return version is not None and connection.execute("SELECT count(*) FROM run").fetchone() is not None
     except sqlite3.OperationalError:  # it has no such table
         return False

@@ -106,10 +106,11 @@ class Kept:
 
 @contextmanager
 def open_history(where: str | Place | None = None) -> Iterator["History"]:
-    """A history by its file or URL, the user's own by default; its tables are made or migrated if need be.
+    """Open a history by its file or URL, the user's own by default; its tables are made or migrated if need be.
 
-    Raises Refused `history_unreachable`, `history_too_new`, `not_a_history`, `missing_extra`; `history_gone` or
-    `history_exchanged` if this process has opened it before, and it is not there any more or another is.
+    Raises Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
+    `history_gone` or `history_exchanged` if this process has opened it before, and it is not there any more or another
+    is.
     """
     found = where if isinstance(where, Place) else place(where)
     try:

@@ -14,7 +14,10 @@ from rig.history.journal import Broken
 
 NO = "a history keeps its rows as they were entered"
 # A migration says so in `meta`; nothing else there changes.
-NEWER = "OLD.key = 'version' AND NEW.key = 'version' AND CAST(NEW.value AS INTEGER) > CAST(OLD.value AS INTEGER)"
+NEWER = (
+    "OLD.key = 'schema_version' AND NEW.key = 'schema_version' "
+    "AND CAST(NEW.value AS INTEGER) > CAST(OLD.value AS INTEGER)"
+)
 FUNCTION = "history_keeps_its_rows"
 _BODY = f" BEGIN RAISE EXCEPTION USING MESSAGE = '{NO}: ' || TG_OP || ' of ' || TG_TABLE_NAME; END "
 # What PostgreSQL's catalogue has of a trigger, in bits of pg_trigger.tgtype (PostgreSQL's catalog/pg_trigger.h).

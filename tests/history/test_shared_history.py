@@ -4,18 +4,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from sqlalchemy import delete, text
+from sqlalchemy import Connection, text
 
-from rig.history import schema
+from rig.errors import Refused
+from rig.history import migrations, schema
 from rig.history.engine import WRITES
-from rig.history.issued import Issued
 from rig.history.store import open_history
 from support.forked import forked
 from support.kept_rows import as_of_another_process, drop_triggers
 from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
-ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
 PROCESSES, ENTRIES, FEW = 8, 250, 20
 pytestmark = pytest.mark.slow
 
@@ -49,23 +48,42 @@ def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(
         assert len({each.started_utc for each in history.calibrations()}) == PROCESSES * entries
 
 
-def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:
+def test_a_later_version_has_one_place_for_its_migration(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a program whose tables are one version on: the file says so, its rows stay, and this program refuses it."""
+
+    def add_a_column(connection: Connection) -> None:
+        connection.execute(text("ALTER TABLE voided ADD COLUMN voided_by VARCHAR(400)"))
+
     with open_history(url) as history:
         history.enter(finished(0))
+        history.void(1, "another sensor was mounted")
         before = history.calibrations()
-        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
-            drop_triggers(connection)
-            for table in (schema.journal, schema.document, schema.certificate_file, schema.certificate, schema.voided):
-                table.drop(connection)
-            for column in ("operator", "note"):
-                connection.execute(text(f"ALTER TABLE run DROP COLUMN {column}"))
-            connection.execute(text("ALTER TABLE parameter DROP COLUMN coverage_factor"))
-            connection.execute(delete(schema.meta).where(schema.meta.c.key == "version"))
-            connection.execute(schema.meta.insert().values(key="version", value="1"))
     as_of_another_process()
-    with open_history(url) as history:
-        assert history.calibrations() == before
-        history.void(before[0].id, "to see that it can be")
-        assert history.certify(finished(0).content_sha256, ISSUED)
-        assert [each.certificates for each in history.kept()] == [(ISSUED,)]
-        assert list(history.broken()) == []
+    with monkeypatch.context() as newer:
+        newer.setattr(schema, "VERSION", schema.VERSION + 1)
+        newer.setattr(migrations, "MIGRATIONS", {schema.VERSION - 1: add_a_column})
+        with open_history(url) as history:
+            assert history.calibrations() == before
+            assert list(history.broken()) == []
+            with history.engine.connect() as connection:
+                assert connection.execute(text("SELECT voided_by FROM voided")).all() == [(None,)]
+    as_of_another_process()
+    with pytest.raises(Refused, match=rf"history_too_new: .*version {schema.VERSION + 1}"), open_history(url):
+        pass
+
+
+def test_a_server_s_history_from_before_version_1_is_refused(url: str) -> None:
+    with (
+        open_history(url) as history,
+        history.engine.connect().execution_options(**{WRITES: True}) as connection,
+        connection.begin(),
+    ):
+        drop_triggers(connection)
+        connection.execute(text("UPDATE meta SET key = 'version', value = '6' WHERE key = 'schema_version'"))
+    as_of_another_process()
+    with pytest.raises(Refused, match="history_too_old"), open_history(url):
+        pass
+
+
+def test_every_older_version_has_its_migration() -> None:
+    assert list(migrations.MIGRATIONS) == list(range(1, schema.VERSION))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sqlalchemy import URL, event, inspect, text
+from sqlalchemy import URL, event, text
 
 from rig.config.judging_sections import HistorySection
 from rig.config.load import ConfigurationRefused, load
@@ -28,12 +28,7 @@ from rig.history.store import History, Selection, open_history
 from rig.report.budget_entry import budget_entry
 from rig.report.kinds.registry import followed
 from support.past_runs import FIRST, finished
-from support.paths import DEMO, FIXTURES, ROOT
-from support.stated import moved_parameters
-
-OLD = ROOT / "tests" / "fixtures" / "history"
-THEN = ROOT / "tests" / "fixtures" / "history_result"  # what these have rows of
-
+from support.paths import DEMO, FIXTURES
 
 ISSUED = Issued(
     "RIG-20250106-AAAAAAAAAAAA", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),)
@@ -157,43 +152,20 @@ def test_one_sensor_among_many_is_looked_up_not_searched_for(history: History) -
     assert "calibration_of_serial_number" in plan and "SCAN" not in plan
 
 
-def test_there_is_a_fixture_of_every_old_schema() -> None:
-    assert sorted(file.name for file in OLD.iterdir()) == [f"version_{n}.sql" for n in range(1, schema.VERSION)]
-
-
-@pytest.mark.parametrize("version", range(1, schema.VERSION))
-def test_a_history_of_an_old_version_is_migrated_with_equal_numbers(version: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("marked", [True, False])
+def test_a_history_from_before_version_1_is_refused_and_stays_as_it_was(marked: bool, tmp_path: Path) -> None:
     file = tmp_path / "history.sqlite"
-    old = sqlite3.connect(file)
-    old.executescript((OLD / f"version_{version}.sql").read_text(encoding="utf-8"))
-    assert old.execute("SELECT value FROM meta WHERE key = 'version'").fetchone() == (str(version),)
-    tables = [name for (name,) in old.execute("SELECT name FROM sqlite_master WHERE type = 'table' AND name != 'meta'")]
-    columns = {name: ", ".join(row[1] for row in old.execute(f"PRAGMA table_info({name})")) for name in tables}
-    before = {name: old.execute(f"SELECT {columns[name]} FROM {name} ORDER BY 1, 2").fetchall() for name in tables}
-    old.close()
-    with open_history(str(file)) as history:
-        found = history.calibrations()
-        assert [each.voided for each in found] == [None, "the reference was another" if version >= 2 else None]
-        assert {(each.operator, each.note) for each in found} == {(None, None)}
-        with history.engine.connect() as connection:
-            after = {
-                name: [
-                    tuple(row) for row in connection.execute(text(f"SELECT {columns[name]} FROM {name} ORDER BY 1, 2"))
-                ]
-                for name in tables
-            }
-            migrated = columns_of(connection)
-        history.void(1, "to see that it can be")
-        history.enter(replace(finished(0), operator="A. Person", certificate=ISSUED))
-        before_that, now = (each.certificates for each in history.kept())
-        assert len(before_that) == (version >= 3) and now == (ISSUED,)
-        assert list(history.broken()) == []
-    assert after == before and len(before["parameter"]) == 20
-    for stated, kept in zip(followed(read_result(THEN)), found, strict=True):
-        assert kept.parameters.keys() == {each.name for each in stated.parameters}
-        assert moved_parameters(stated.parameters, kept.parameters.values()) == []
-    with open_history(str(tmp_path / "new.sqlite")) as new, new.engine.connect() as connection:
-        assert columns_of(connection) == migrated
+    with closing(sqlite3.connect(file)) as old:
+        old.executescript(
+            "CREATE TABLE meta (key VARCHAR(40) NOT NULL PRIMARY KEY, value VARCHAR(400));"
+            "INSERT INTO meta VALUES ('version', '1');"
+            "CREATE TABLE run (id INTEGER PRIMARY KEY, result TEXT NOT NULL);"
+            f"PRAGMA application_id = {schema.APPLICATION_ID * marked};"
+        )
+    before = file.read_bytes()
+    with pytest.raises(Refused, match=r"history_too_old: .*rig history import"), open_history(str(file)):
+        pass
+    assert file.read_bytes() == before
 
 
 def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> None:
@@ -228,22 +200,12 @@ def test_rows_are_only_added(history: History) -> None:
     assert "INSERT" in said and set(said) <= {"SELECT", "INSERT", "BEGIN"}
 
 
-def columns_of(connection: object) -> dict[str, dict[str, tuple[str, bool]]]:
-    """Of every table: its columns' types, and whether they may be null."""
-    seen = inspect(connection)
-    assert seen is not None
-    return {
-        table: {column["name"]: (str(column["type"]), column["nullable"]) for column in seen.get_columns(table)}
-        for table in seen.get_table_names()
-    }
-
-
 def test_a_history_of_a_newer_program_is_refused_and_not_touched(tmp_path: Path) -> None:
     file = tmp_path / "history.sqlite"
     with open_history(str(file)) as history:
         history.enter(finished(0))
     other = sqlite3.connect(file)
-    other.execute("UPDATE meta SET value = ? WHERE key = 'version'", [str(schema.VERSION + 1)])
+    other.execute("UPDATE meta SET value = ? WHERE key = 'schema_version'", [str(schema.VERSION + 1)])
     other.commit()
     with pytest.raises(Refused, match=rf"history_too_new: .*version {schema.VERSION + 1}"), open_history(str(file)):
         pass

@@ -27,7 +27,7 @@ class Parameter:
     """One number of a calibration. `std_combined` is None where no more than noise is known of its uncertainty.
 
     `max_deviation` from the nominal value is what the run's limits allowed, None without one. `coverage_factor` is that
-    of U by its degrees of freedom, None where it is 2.
+    of U by its degrees of freedom.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Parameter:
     std_combined: float | None
     unit: str
     max_deviation: float | None = None
-    coverage_factor: float | None = None
+    coverage_factor: float = COVERAGE_FACTOR
 
     @property
     def std(self) -> float:
@@ -46,12 +46,12 @@ class Parameter:
     @property
     def expanded(self) -> float:
         """U as the result states it."""
-        return (self.coverage_factor or COVERAGE_FACTOR) * self.std
+        return self.coverage_factor * self.std
 
     @property
     def freedom(self) -> float:
         """The degrees of freedom of its standard uncertainty, by its coverage factor."""
-        return freedom_of(self.coverage_factor or COVERAGE_FACTOR)
+        return freedom_of(self.coverage_factor)
 
     @property
     def nominal(self) -> float:
@@ -122,7 +122,7 @@ def scale_and_bias(
             None if combined is None else _std(row, combined),
             unit,
             limit,
-            None if (factor := float(factors[row > 0].max())) == COVERAGE_FACTOR else factor,
+            float(factors[row > 0].max()),
         )
 
 
@@ -133,8 +133,7 @@ def parameters(characteristics: "Iterable[Term]") -> Iterator[Parameter]:
         sign = -1 if of.opposite else 1
         rows = zip(of.parameters, known.values, known.stds, each.expanded.factors, strict=True)
         for name, value, std, factor in rows:
-            counted = None if factor == COVERAGE_FACTOR else factor
-            yield Parameter(name, sign * value, std, None, each.units.si, coverage_factor=counted)
+            yield Parameter(name, sign * value, std, None, each.units.si, coverage_factor=float(factor))
 
 
 def known(parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
