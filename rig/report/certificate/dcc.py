@@ -14,6 +14,7 @@ from rig.data.result_file import CheckEntry, ProvenanceEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.dcc_results import beside
+from rig.report.certificate.method_words import method_in_short
 from rig.report.certificate.tables import kind as kind_of_part
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
@@ -213,7 +214,7 @@ def _result(c: Certificate, item: str, measured: Measured) -> Element:
     return dcc(
         "measurementResult",
         text("name", measured.name),
-        dcc("usedMethods", dcc("usedMethod", text("name", _method(c)),
+        dcc("usedMethods", dcc("usedMethod", text("name", method_in_short(c)),
                                text("description", "; ".join([DESCRIBED, c.procedure, *c.mounted])),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
@@ -222,14 +223,6 @@ def _result(c: Certificate, item: str, measured: Measured) -> Element:
         dcc("results", *measured.results),
         refId=item,
     )  # fmt: skip
-
-
-def _method(c: Certificate) -> str:
-    if c.by_hand:
-        return "by hand: turned on a flat table between rests"
-    if c.elsewhere:
-        return "readings recorded elsewhere, of a motion that a file tells"
-    return c.words.briefly.format(turns=c.turns)
 
 
 def _arm(c: Certificate) -> Element:

@@ -7,7 +7,15 @@ from rig.config.sensor_catalogue import has_own_port
 from rig.data.absent import NO_BOARD
 from rig.data.installed_kinds import quantities
 from rig.report import expanded, printed_budget, rounding, temperature_words, told_words, validity_words
-from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, temperature_curves, validity
+from rig.report.certificate import (
+    at_rest_tables,
+    coverage_words,
+    method_words,
+    plots,
+    tables,
+    temperature_curves,
+    validity,
+)
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
 from rig.report.kinds import characteristics
@@ -19,7 +27,7 @@ if TYPE_CHECKING:
 
 MODULES = (
     rounding, expanded, validity_words, told_words, printed_budget, tables, coverage_words, at_rest_tables, validity,
-    plots, temperature_curves, temperature_words,
+    plots, temperature_curves, temperature_words, method_words,
 )  # fmt: skip
 TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
