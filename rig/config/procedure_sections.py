@@ -11,7 +11,7 @@ from rig.config.attitude_sets import SETS
 from rig.config.hand_sections import ByHandSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
-from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
+from rig.config.section import DEFAULT_REST_S, RATIO, AccelerometerOrder, Direction, JointAngle
 from rig.config.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
 from rig.config.stage_section import StageSection, Wrist
 
@@ -87,7 +87,7 @@ class SixSweepsSection(ProcedureSection):
         le=ACCELERATION_RANGE_DEG_S2,
         description="acceleration of every motion; the ramps of a sweep are outside the revolution that is averaged",
     )
-    rest_s: float = Field(default=3.0, ge=0, le=3600, description="time of standing still after each sweep")
+    rest_s: float = Field(default=DEFAULT_REST_S, ge=0, le=3600, description="time of standing still after each sweep")
     margin_deg: float = Field(
         default=2.0, gt=0, le=90, description="angle of constant speed before the revolution begins, and after it ends"
     )
@@ -270,7 +270,9 @@ class AttitudesSection(ProcedureSection):
             },
         )
     )
-    dwell_s: float = Field(default=3.0, ge=0.1, le=3600, description="time of standing still in each attitude")
+    dwell_s: float = Field(
+        default=DEFAULT_REST_S, ge=0.1, le=3600, description="time of standing still in each attitude"
+    )
     settle_s: float = Field(
         default=5.0,
         gt=0,

@@ -16,6 +16,7 @@ Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, ma
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
+DEFAULT_REST_S = 3.0  # of standing still after a sweep, and in an attitude (SIX, section IV)
 RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
 
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2
-from rig.config.section import RATIO, Direction, Section
+from rig.config.section import DEFAULT_REST_S, RATIO, Direction, Section
 from rig.config.servo_section import FASTEST_DEG_S
 from rig.config.stage_section import Instruction, StageMountSection, mount_matrix
 
@@ -73,7 +73,9 @@ class ServoSixObservationSection(ProcedureSection):
     acceleration_deg_s2: float = Field(
         default=240.0, ge=10, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
     )
-    rest_s: float = Field(default=3.0, gt=0.5, le=3600, description="time of standing still before and after each turn")
+    rest_s: float = Field(
+        default=DEFAULT_REST_S, gt=0.5, le=3600, description="time of standing still before and after each turn"
+    )
     beyond_deg: float = Field(
         default=90.0,
         ge=30,

@@ -158,7 +158,7 @@ class ArmMotion:
     def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
         """The whole turn, or the arc, of a sweep that was made in a window.
 
-        Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_limited`,
+        Raises Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`,
         `speed_not_constant`, `other_joint_moved`.
         """
         begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])

@@ -98,7 +98,7 @@ def observe_sensor(
 
     An interrupted sweep has no end in the recording and is left out. So are sweeps and dwells whose index is in
     `superseded`, and the rests beside them: a later recording of the same run repeats them.
-    Raises Fault as `dwell_readings` does, and `incomplete_revolution`, `arm_states_lost`, `slider_below_100`,
+    Raises Fault as `dwell_readings` does, and `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
     `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
     `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
     `impossible_times`.

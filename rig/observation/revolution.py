@@ -85,7 +85,7 @@ def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThr
     """The revolution of one sweep, of which `states` (n,) of the turner tell, in the order of their times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
-    `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_limited`, `speed_not_constant`,
+    `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
     `other_joint_moved`.
     """
     where, (low, high) = describe(sweep), sweep.revolution_rad
@@ -165,7 +165,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
     slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
     if slider < MIN_SPEED_FRACTION:
         raise Fault(
-            "slider_below_100",
+            "speed_slider",
             f"in {where} the speed slider was at {100 * slider:.0f} %",
             "Set the speed slider on the pendant to 100 %, then repeat the sweep",
         )

@@ -452,7 +452,7 @@ def gap_in_states(run: RunData) -> RunData:
         (doubled, "duplicated_samples"),
         (lambda run: with_samples(run, lambda samples: samples[:50]), "time_base_not_found"),
         (halt, "speed_not_constant: in sweep 0"),
-        (slow_slider, "slider_below_100: .* 80 %"),
+        (slow_slider, "speed_slider: .* 80 %"),
         (slowed_by_a_limit, "speed_limited: .* 60 % of the programmed speed with the slider at 100 %"),
         (clock_set_back, "arm_clock_stepped: .* goes back"),
         (another_joint, "other_joint_moved"),
