@@ -267,9 +267,9 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
                     connection.execute(text(f"DELETE FROM {table} WHERE run_id = {number}"))
                 connection.execute(text(f"DELETE FROM run WHERE id = {number}"))
             connection.execute(text("DELETE FROM journal"))
-            for table in journal.ENTERED.values():
-                for key in connection.execute(select(*table.primary_key).order_by(*table.primary_key)).all():
-                    journal.note(connection, table, *key)
+            for entered in journal.ENTERED.values():
+                for key in connection.execute(select(*entered.primary_key).order_by(*entered.primary_key)).all():
+                    journal.note(connection, entered, *key)
             create_triggers(connection)
         assert wrong(history) == [("missing", f"{table} 2 to 3") for table in GAPS]
 
