@@ -39,6 +39,10 @@ from rig.analysis.suspicion import Consistency, Statistic, Suspected, basis, exp
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, bias_process, likeliest
 
+# Of one gyroscope, at most; the latter with an allowance alone. Which sweep is disturbed is a check beside them.
+CHECKS = ("bias_jumped", "cw_against_ccw", "loose_mounting", "residuals", "scale_changed", "sweeps_against_rests")
+BY_ALLOWANCE = ("axis_changed",)
+
 
 @dataclass(frozen=True, slots=True)
 class Allowance:

@@ -6,17 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rig.analysis import consistency, readings
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, fitness
-from rig.analysis.consistency import consistency
 from rig.analysis.cut_recording import cut
 from rig.analysis.frozen_axis import longest_frozen
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.over_temperature import taken_to_reference
-from rig.analysis.readings import digits_of, judge_readings
 from rig.analysis.reference_contradictions import (
     DISTURBED_SWEEP,
     ReadInReference,
@@ -37,8 +36,10 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each kind of readings of a sensor, its statistics
-OF_THE_MODEL = 2  # more where they are held to the model: the ways between sweeps, the angles between axes
+NON_ORTHOGONALITY = "non_orthogonality"
+# Of a gyroscope, by what they tell: they share the false alarms. Other kinds of readings count as many.
+OF_READINGS = (*consistency.CHECKS, DISTURBED_SWEEP, *readings.CHECKS)
+OF_THE_MODEL = (*consistency.BY_ALLOWANCE, NON_ORTHOGONALITY)  # more where they are held to the model
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,26 +86,26 @@ def contradictions(
         if surroundings is not None and settings.checked_by_model:
             known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
             allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
-        found = consistency(pieces, explained.solution.matrix, rate, allowance)
+        found = consistency.consistency(pieces, explained.solution.matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *named[sweep], sweep=sweep) for sweep in sorted(named)]
         checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
-        of_readings = judge_readings(
+        of_readings = readings.judge_readings(
             counts,
             pieces.windows,
             rate,
             np.median if settings.holds_all_kinds else np.min,
-            digits=digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
+            digits=readings.digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
             frozen=max(longest_frozen(recording, name) for recording in recordings),
         )
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
         if surroundings is not None and settings.checked_by_model:
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
             leaning = _leaning_deg(explained.solution, stated_deg, rate)
-            checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
+            checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *leaning, unit="°"))
         if surroundings is not None:
             told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
     return Contradictions(tuple(checks), told_from)
@@ -170,7 +171,8 @@ def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
 
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
     """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
-    return coverage.rate_of_each(of_all, (SHARES + OF_THE_MODEL * by_model) * kinds)
+    checks = (*OF_READINGS, *OF_THE_MODEL) if by_model else OF_READINGS
+    return coverage.rate_of_each(of_all, len(checks) * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:

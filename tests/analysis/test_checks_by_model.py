@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.contradictions import OF_READINGS, OF_THE_MODEL
 from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept
-from support.checked_runs import checked, failed
+from support.checked_runs import checked, failed, kind_of
 from support.drawn_recording import KINDS, Drawn, damaged, drawn
 from support.synthetic_run import Setup, synthetic_run
 
@@ -66,6 +67,12 @@ def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> Non
             passed += [] if failed(checked(run)) else [seed]
         print(f"{kind}: {len(passed)} of {len(seeds)} passed {passed}")
         assert len(passed) <= 0.05 * len(seeds), (kind, passed)
+
+
+@pytest.mark.slow
+def test_every_check_that_is_made_has_its_share_of_the_false_alarms() -> None:
+    made = sorted({kind_of(check) for check in checked(drawn(3, KINDS["ADIS16465"]).run)})
+    assert made == sorted((*OF_READINGS, *OF_THE_MODEL))
 
 
 @pytest.mark.slow

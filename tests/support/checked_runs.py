@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.check import Check
-from rig.analysis.contradictions import FALSE_ALARMS, OF_THE_MODEL, SHARES, contradictions
+from rig.analysis.contradictions import FALSE_ALARMS, OF_READINGS, OF_THE_MODEL, contradictions
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.data.run_file import RunData
 from rig.observation.observed_run import ObservedRun
 
-STATISTICS = SHARES + OF_THE_MODEL  # of a gyroscope
+STATISTICS = len(OF_READINGS) + len(OF_THE_MODEL)  # of a gyroscope
 RATE = FALSE_ALARMS / STATISTICS  # of each
 
 Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings | None]
