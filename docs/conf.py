@@ -47,7 +47,10 @@ def without_folders(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 def with_contents(app: Sphinx, name: str, source: list[str]) -> None:
-    """The first page's links, section by section, are the site's contents: they are written once."""
+    """The first page's links, section by section, are the site's contents, as those to decisions are theirs."""
+    if name == "docs/decisions/README":
+        pages = "\n".join(PAGE.findall(source[0]))
+        source[0] += f"\n\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
     if name == root_doc:
         heads = SECTION.split(source[0])[1:]
         for caption, links in zip(heads[::2], heads[1::2], strict=True):

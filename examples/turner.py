@@ -1,0 +1,33 @@
+"""A turner: a turntable on a bearing, which a hand turns: a hand but for its name and what documents say of it.
+
+A package brings it by an entry point, in its pyproject.toml:
+
+    [project.entry-points."rig.turners"]
+    turntable_by_hand = "turner:TURNTABLE_BY_HAND"
+
+Then the configuration names it, `turner: {kind: turntable_by_hand, bearing: A7}`, and `rig plan CONFIG` shows the plan.
+"""
+
+from dataclasses import replace
+
+from pydantic import Field
+
+from rig.config.hand_sections import HandSection
+from rig.motion.state import Made
+from rig.turners.hand.kind import GEOMETRY, HAND
+
+
+class TurntableSection(HandSection):
+    """What the configuration may say of the turntable."""
+
+    bearing: str = Field(min_length=1, max_length=40, description="which bearing it is, for the records")
+
+
+TURNTABLE_BY_HAND = replace(
+    HAND,
+    name="turntable_by_hand",
+    section=TurntableSection,
+    meant=lambda section: Made("turntable on a bearing", section.bearing, GEOMETRY),
+    made=lambda section, report: Made("turntable on a bearing", section.bearing, GEOMETRY),
+    words=replace(HAND.words, name="turntable that a hand turns", short="turntable", turned="the turntable"),
+)
