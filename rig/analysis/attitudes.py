@@ -24,10 +24,10 @@ from rig.estimation.placement import NOISE, LaidDown, laid_down
 from rig.estimation.reference_model import BIAS, REFERENCE, SECOND, F
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
-from rig.observation.csv_windows import check_reads
 from rig.observation.fixes import Turning
 from rig.observation.mean import Held
 from rig.observation.placements import Placements
+from rig.observation.stuck_check import check_reads
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")

@@ -11,7 +11,6 @@ from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, fitness
 from rig.analysis.consistency import consistency
-from rig.analysis.cut_recording import cut
 from rig.analysis.frozen_axis import longest_frozen
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
@@ -24,17 +23,20 @@ from rig.analysis.reference_contradictions import (
     of_magnetometer,
     reference_statistics,
 )
+from rig.analysis.segments import stack_segments, with_transfers
 from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.ways import with_ways
+from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
 from rig.estimation import coverage
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
+from rig.observation.segments import segment_recordings
+from rig.observation.transfers import average_transfers
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 SHARES = 13  # of each kind of readings of a sensor, its statistics
@@ -80,12 +82,16 @@ def contradictions(
         explained = results[name].explained
         if explained is None:
             continue
-        pieces = cut(name, recordings, results[name], explained, settings.site)
+        windows = segment_recordings(name, recordings)
+        segments = stack_segments(windows, explained, settings.site)
         allowance = None
         if surroundings is not None and settings.checked_by_model:
             known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
-            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
-        found = consistency(pieces, explained.solution.matrix, rate, allowance)
+            matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
+            transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
+            ways = with_transfers(segments, transfers, windows, explained, since_first_s(recordings))
+            allowance = allow(known, segments, ways, matrix)
+        found = consistency(segments, explained.solution.matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
@@ -94,7 +100,7 @@ def contradictions(
         checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
         of_readings = judge_readings(
             counts,
-            pieces.windows,
+            segments.readings,
             rate,
             np.median if settings.holds_all_kinds else np.min,
             digits=digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),

@@ -20,11 +20,11 @@ from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
 from rig.observation.field import dwelt_beside, field_mean
+from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.mean import Mean, ReadAtRest
 from rig.observation.observe import Observation, each_sweep, observe_sensor
 from rig.observation.observed_run import times_s
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,10 +37,10 @@ from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.state import Made
 from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST, REST_SETTLING_S
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
-from rig.observation.observe import REST_SETTLING_S, Observation, nearest_axis
-from rig.observation.windows import MIN_SAMPLES_AT_REST
+from rig.observation.observe import Observation, nearest_axis
 
 ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
 STEP_K = 1 / 16  # of a thermometer, assumed

@@ -12,8 +12,8 @@ import numpy as np
 
 from rig.analysis.vector_inputs import since_first_s
 from rig.observation.average import Average
+from rig.observation.finished import dwell_times_s
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import Window, dwelt
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,10 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """Readings of one window, which is on the clock of the first recording; how many, and how warm it was, or NaN."""
+    """Readings from start to end on the clock of the first recording; how many, and how warm it was, or NaN."""
 
-    window: Window
+    start_s: float
+    end_s: float
     weight: float
     temperature_c: float
 
@@ -62,7 +63,12 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
         part = each.sensors[name]
         read += [_averaged(turn.average, since_s) for turn in part.revolutions if turn.acceleration is not None]
         read += [
-            _Read(_moved(dwell.window, since_s), dwell.reading.samples, dwell.temperature_c)
+            _Read(
+                dwell.window.start_s + since_s,
+                dwell.window.end_s + since_s,
+                dwell.reading.samples,
+                dwell.temperature_c,
+            )
             for dwell in part.dwells
             if dwell.index in wanted
         ]
@@ -72,13 +78,14 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
 def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
-    windows = {
-        each.dwell.index: _moved(each.window, since_s)
+    times_s = {
+        index: (start_s + since_s, end_s + since_s)
         for recording, since_s in _on_one_clock(recordings)
-        for each in dwelt(recording.run)
-        if each.dwell.index in wanted
+        for index, (start_s, end_s) in dwell_times_s(recording.run).items()
+        if index in wanted
     }
-    return _when(recordings, name, [_Read(each, each.end_s - each.start_s, float("nan")) for each in windows.values()])
+    read = [_Read(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
+    return _when(recordings, name, read)
 
 
 def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
@@ -86,12 +93,7 @@ def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedR
 
 
 def _averaged(average: Average, since_s: float) -> _Read:
-    window = Window(average.start_s, average.end_s)
-    return _Read(_moved(window, since_s), average.samples, average.temperature_c)
-
-
-def _moved(window: Window, since_s: float) -> Window:
-    return Window(window.start_s + since_s, window.end_s + since_s)
+    return _Read(average.start_s + since_s, average.end_s + since_s, average.samples, average.temperature_c)
 
 
 def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
@@ -102,12 +104,12 @@ def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -
     def utc(time_s: float) -> datetime:
         return began + timedelta(seconds=time_s - first_s)
 
-    middles = [(each.window.start_s + each.window.end_s) / 2 for each in read]
+    middles = [(each.start_s + each.end_s) / 2 for each in read]
     stated = recordings[0].run.sensors[name].temperature_stated
     warm = [each.temperature_c for each in read if np.isfinite(each.temperature_c)]
     return When(
-        utc(min(each.window.start_s for each in read)),
-        utc(max(each.window.end_s for each in read)),
+        utc(min(each.start_s for each in read)),
+        utc(max(each.end_s for each in read)),
         utc(float(np.average(middles, weights=weights))),
         float(np.average(warm, weights=weights)) if warm else None,
         (min(warm), max(warm)) if warm and not stated else None,

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from rig.analysis.clock import ClockCheck, check_clock, state_jitter
+from rig.analysis.clock import ClockCheck, check_clock
 from rig.data.settings import Site, Uncertainty
+from rig.observation.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun
 
 # Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.

@@ -15,11 +15,12 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
+from rig.observation.arm_rests import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream, between, steps_of
 from rig.observation.averaging import dwelling_of
 from rig.observation.lost_samples import lost_samples
 from rig.observation.mean import Mean
-from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Dwelt, Window, dwelt
+from rig.observation.windows import Dwelt, Window, dwelt
 
 LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
 

@@ -13,9 +13,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
 from rig.observation.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.average import Stream, on_clock
+from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import finished_dwells, finished_sweeps
 
 AS_STATED: Mapping[int, Array] = MappingProxyType({})  # no stage's mount is known to be off
 

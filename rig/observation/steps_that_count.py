@@ -8,9 +8,11 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.arm_motion import ArmMotion, motion_of
+from rig.observation.arm_rests import rests_of
 from rig.observation.average import Stream, between, on_the_arms_clock
-from rig.observation.observe import check_feeling, each_sweep, rests_of
-from rig.observation.windows import Window, finished_dwells, finished_sweeps
+from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.observe import check_feeling, each_sweep
+from rig.observation.windows import Window
 
 SPIKE = 8.0  # of the readings' own deviation: one reading in 1e15
 
