@@ -31,6 +31,7 @@ from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
+from rig.data.settings import RunSettings
 from rig.errors import Fault, RigError
 from rig.estimation import coverage
 from rig.estimation.vector_model import VectorSolution
@@ -64,6 +65,7 @@ def contradictions(
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
     surroundings: Surroundings | None,
+    settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
@@ -72,12 +74,11 @@ def contradictions(
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
     that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
     """
-    settings = recordings[0].run.settings
     if settings.site is None:
         return NOTHING
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    rate = _rate(recordings[0].run, sensors, false_alarms)
+    rate = _rate(recordings[0].run, sensors, settings, false_alarms)
     for name in sensors:
         explained = results[name].explained
         if explained is None:
@@ -136,6 +137,7 @@ def in_reference(
     recordings: Sequence[ObservedRun],
     accelerometers: Mapping[str, AccelerometerResult],
     magnetometers: Mapping[str, MagnetometerResult | Fault],
+    settings: RunSettings,
     *,
     drifting: bool = False,
 ) -> Contradictions:
@@ -144,16 +146,15 @@ def in_reference(
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
     steadily where it is `drifting`.
     """
-    run = recordings[0].run
-    known = run.settings.uncertainty
-    if known is None or not run.settings.holds_all_kinds:
+    known = settings.uncertainty
+    if known is None or not settings.holds_all_kinds:
         return NOTHING
     asked: dict[tuple[str, Quantity], ReadInReference] = {
         **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
            for name, each in accelerometers.items()},
         **{(name, FIELD): of_magnetometer(name, recordings, each, known)
            for name, each in magnetometers.items() if not isinstance(each, Fault)}}  # fmt: skip
-    rate = _rate(run, run.settings.to_calibrate, FALSE_ALARMS)
+    rate = _rate(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     for (name, quantity), held in asked.items():
@@ -165,13 +166,13 @@ def in_reference(
     return Contradictions(tuple(checks), told_from)
 
 
-def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
+def _rate(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
     """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
     kinds = len(sensors)
-    if run.settings.holds_all_kinds:
-        accelerometers = run.measuring(ACCELERATION).keys() & run.settings.to_calibrate
+    if settings.holds_all_kinds:
+        accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
         kinds += len(accelerometers) + len(run.measuring(FIELD))
-    return rate_of_each(kinds, by_model=run.settings.checked_by_model, of_all=false_alarms)
+    return rate_of_each(kinds, by_model=settings.checked_by_model, of_all=false_alarms)
 
 
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
@@ -189,14 +190,15 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
         return frozenset()
     named = frozenset[int]()
     with suppress(RigError), solvable():
-        recordings, _ = observe_as_mounted(runs)
+        recordings, _ = observe_as_mounted(runs, settings)
         if not recordings:
             return named
         if settings.reference_c is not None:
             recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
-        surroundings = surroundings_of(recordings)
+        surroundings = surroundings_of(recordings, settings)
         results = solve_observed(chosen, recordings, surroundings=surroundings)
-        named = contradictions(recordings, results, settings.to_calibrate, surroundings).disturbed
-        named |= in_reference(recordings, calibrate_accelerometers(recordings, settings, results), {}).disturbed
+        named = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
+        accelerometers = calibrate_accelerometers(recordings, settings, results)
+        named |= in_reference(recordings, accelerometers, {}, settings).disturbed
     return named

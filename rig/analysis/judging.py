@@ -31,7 +31,7 @@ from rig.analysis.over_temperature import (
 )
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.told_from import ToldFrom
-from rig.analysis.vector_inputs import arms_of
+from rig.analysis.vector_inputs import lever_arms_m
 from rig.analysis.verdict import (
     acceleration_checks,
     clock_checks,
@@ -59,9 +59,9 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrated` says."""
     settings = runs[0].settings
     if (read := runs[0].elsewhere) is not None:
-        return _elsewhere(runs, read, estimator)
+        return _elsewhere(runs, read, settings, estimator)
     chosen = known_estimator(estimator)
-    recordings, mounts = observe_as_mounted(runs)
+    recordings, mounts = observe_as_mounted(runs, settings)
     averages = [board_averages(name, recordings) for name in settings.to_calibrate] if settings.planned_sweeps else []
     if not recordings:
         raise Fault(
@@ -73,14 +73,14 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     if settings.reference_c is not None:
         taken = taken_to_reference(recordings, settings, settings.reference_c)
         recordings, found = taken.recordings, taken.polynomials
-    swept = _swept(runs, recordings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
+    swept = _swept(runs, recordings, settings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
     accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
     accelerometers, found = _over_temperature(
         accelerometers, ACCELERATION, with_acceleration_polynomials, swept.polynomials
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
-    among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
+    among_dwells = in_reference(recordings, accelerometers, magnetometers, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -127,12 +127,16 @@ class _Swept:
 
 
 def _swept(
-    runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], estimator: Estimator, polynomials: Polynomials
+    runs: Sequence[RunData],
+    recordings: tuple[ObservedRun, ...],
+    settings: RunSettings,
+    estimator: Estimator,
+    polynomials: Polynomials,
 ) -> _Swept:
-    settings, surroundings = runs[0].settings, surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, estimator, surroundings, settings.matrix_corrected)
     results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
-    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
+    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
@@ -168,9 +172,9 @@ def _over_temperature(
     return {**results, **added}, {**polynomials, **known}
 
 
-def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> Outcome:
+def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, settings: RunSettings, estimator: str) -> Outcome:
     """What readings from elsewhere amount to; the usual estimator stands for the one that was asked for."""
-    settings, name = runs[0].settings, read.item.name
+    name = read.item.name
     asked = None if settings.elsewhere is None else settings.elsewhere.estimator
     found = solved_elsewhere(read, settings, asked if estimator == DEFAULT_ESTIMATOR else estimator)
     return Outcome(
@@ -257,7 +261,9 @@ def _gravity_left(
         turns = turns_of(each, after)
         attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
         turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
-        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(turned, arms_of(turns, settings))
+        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(
+            turned, lever_arms_m(turns, np.array(settings.extension_m))
+        )
         left.append(pull @ (matrix @ solution.g_sensitivity).T)
     of_sensor, of_reference = left
     return of_sensor, of_reference

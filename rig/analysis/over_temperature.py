@@ -56,7 +56,7 @@ def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings,
 
     Raises Fault as `over_temperature` does, and `temperature_not_recorded`.
     """
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, settings)
     if surroundings is None:
         raise NOT_RECORDED  # by a recording of before there was a site
     moved, found = list(recordings), dict[str, dict[Quantity, OverTemperature]]()

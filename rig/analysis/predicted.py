@@ -67,7 +67,9 @@ def _budget(config: RigConfig, run: PlannedRun, made: Made, name: str, sensor: S
     known, mounting = run.known, mounting_matrix(sensor.mounting)
     scatters = made.reading_std_rad > 0
     jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
-    surroundings = Surroundings(run.site, known, _clock(known, on_board=sensor.on_board), jitter_s)
+    surroundings = Surroundings(
+        run.site, known, _clock(known, on_board=sensor.on_board), jitter_s, run.settings.extension_m
+    )
     parts = [_part(config, each, sensor, made) for each in _stages(run)]
     seen = put_together(parts, surroundings)
     of = name, sensor.part, float(np.radians(sensor.range_deg_s))
@@ -127,7 +129,7 @@ def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, made: Made)
     ]
     told = [each for each in still if (each.end_s - each.start_s) * sensor.rate_hz >= MIN_SAMPLES_AT_REST]
     rests = [_average(each, run, sensor) for each in told]
-    return Part(turns, rests, run.since_s, run.settings, np.array(run.settings.mount))
+    return Part(turns, rests, run.since_s, run.settings.stage, np.array(run.settings.mount))
 
 
 def _average(at: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:

@@ -72,7 +72,7 @@ def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, si
         ),
         intervals=tuple(segment.interval for segment in segments),
         readings=tuple(window.readings for window in windows),
-        roundings_rad_s=np.sqrt([segment.mean.rounding for segment in segments]),
+        roundings_rad_s=np.sqrt(np.array([segment.mean.rounding for segment in segments])),
     )
 
 

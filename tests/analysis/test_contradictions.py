@@ -137,11 +137,11 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
 def judged(run: RunData) -> tuple[tuple[Check, ...], Array, Array]:
     """The checks, the six parameters and their standard deviations. Raises Fault."""
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
     results = solve_observed(run.sensors, recordings, surroundings=surroundings)
     solution = results["gyro"].solution
     found = np.concatenate([solution.scale, solution.bias_rad_s])
-    checks = contradictions(recordings, results, ["gyro"], surroundings).checks
+    checks = contradictions(recordings, results, ["gyro"], surroundings, recordings[0].run.settings).checks
     return checks, found, np.sqrt(np.diag(solution.covariance))
 
 

@@ -38,7 +38,7 @@ def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
 
 def segments_of(run: RunData) -> Segments:
     recordings = observe_recordings([run])
-    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings))["gyro"]
+    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings, run.settings))["gyro"]
     assert result.explained is not None and run.settings.site is not None
     return stack_segments(segment_recordings("gyro", recordings), result.explained, run.settings.site)
 

@@ -127,7 +127,7 @@ def told_of(run: RunData) -> Told:
     accelerometers = calibrate_accelerometers(recordings, run.settings)
     magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
     refused = frozenset(each.name for each in magnetometers.values() if isinstance(each, Fault))
-    return Told(in_reference(recordings, accelerometers, magnetometers).checks, refused)
+    return Told(in_reference(recordings, accelerometers, magnetometers, recordings[0].run.settings).checks, refused)
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:
