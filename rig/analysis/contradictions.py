@@ -28,7 +28,6 @@ from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
@@ -90,7 +89,7 @@ def contradictions(
             known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
             matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
             transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
-            ways = with_transfers(segments, transfers, windows, explained, since_first_s(recordings))
+            ways = with_transfers(segments, transfers, windows, explained)
             allowance = allow(known, segments, ways, matrix)
         found = consistency(segments, explained.solution.matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]

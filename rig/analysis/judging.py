@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -16,13 +14,12 @@ from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
-from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
+from rig.analysis.estimators import Estimator, known_estimator
 from rig.analysis.installed_kinds import KindFound, kinds_on_arm
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.onboard_check import Agreement, agreement
-from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.over_temperature import (
     Polynomials,
     taken_to_reference,
@@ -41,7 +38,6 @@ from rig.analysis.verdict import (
 )
 from rig.analysis.verification import Verification, verify
 from rig.config.judged_by import DecisionRule
-from rig.data.motion_file import ReadElsewhere
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
@@ -58,8 +54,6 @@ ResultT = TypeVar("ResultT")
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
     """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrated` says."""
     settings = runs[0].settings
-    if (read := runs[0].elsewhere) is not None:
-        return _elsewhere(runs, read, settings, estimator)
     chosen = known_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs, settings)
     averages = [board_averages(name, recordings) for name in settings.to_calibrate] if settings.planned_sweeps else []
@@ -96,7 +90,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         ),
         of_kinds=of_kinds,
         mounts=mounts,
-        provenance=_origin(runs),
+        provenance=origin_of(runs),
         clock=swept.clock,
         accelerometers=accelerometers,
         magnetometers=magnetometers,
@@ -170,22 +164,6 @@ def _over_temperature(
     added = {name: result for name, (result, _) in settled.items()}
     known = {name: {**polynomials[name], quantity: found} for name, (_, found) in settled.items()}
     return {**results, **added}, {**polynomials, **known}
-
-
-def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, settings: RunSettings, estimator: str) -> Outcome:
-    """What readings from elsewhere amount to; the usual estimator stands for the one that was asked for."""
-    name = read.item.name
-    asked = None if settings.elsewhere is None else settings.elsewhere.estimator
-    found = solved_elsewhere(read, settings, asked if estimator == DEFAULT_ESTIMATOR else estimator)
-    return Outcome(
-        settings=settings,
-        provenance=_origin(runs),
-        checks=(*checks_elsewhere(name, found), *(check for each in found.of_kinds for check in each.checks)),
-        results={} if found.gyroscope is None else {name: found.gyroscope},
-        elsewhere={name: found},
-        of_kinds=found.of_kinds,
-        polynomials={} if found.polynomials is None else {name: {RATE: found.polynomials}},
-    )
 
 
 def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
@@ -271,19 +249,5 @@ def _gravity_left(
 
 def verified_alone(repeated: Sequence[RunData]) -> Outcome:
     """Verify the calibrations that the board had stored before, as `rig.analysis.analyses.verified_alone` says."""
-    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=_origin(repeated[:1]))
+    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=origin_of(repeated[:1]))
     return verified(nothing_calibrated, repeated)
-
-
-def _origin(runs: Sequence[RunData]) -> Origin:
-    return Origin(
-        recorded=runs[0].provenance,
-        stored_calibrations=runs[-1].provenance.stored_calibrations,
-        resumed_utc=tuple(
-            run.provenance.started_utc
-            for before, run in pairwise(runs)
-            if run.settings.stage == before.settings.stage  # else the item was mounted anew between them
-        ),
-        verified_utc=(),
-        solved_utc=datetime.now(UTC),
-    )

@@ -10,7 +10,6 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from rig.analysis.vector_inputs import since_first_s
 from rig.observation.average import Average
 from rig.observation.finished import dwell_times_s
 from rig.observation.observed_run import ObservedRun
@@ -50,7 +49,7 @@ class _Read:
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
     """When a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
-    parts = [(each.sensors[name], since_s) for each, since_s in _on_one_clock(recordings)]
+    parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
     rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
     return Held(_when(recordings, name, turns), _when(recordings, name, [*turns, *rests]))
@@ -59,8 +58,8 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """When an accelerometer was read: in the dwells of these indices, and its sweeps."""
     wanted, read = frozenset(dwells), []
-    for each, since_s in _on_one_clock(recordings):
-        part = each.sensors[name]
+    for recording in recordings:
+        part, since_s = recording.sensors[name], recording.clock_offset_s
         read += [_averaged(turn.average, since_s) for turn in part.revolutions if turn.acceleration is not None]
         read += [
             _Read(
@@ -79,17 +78,13 @@ def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterab
     """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
     times_s = {
-        index: (start_s + since_s, end_s + since_s)
-        for recording, since_s in _on_one_clock(recordings)
+        index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)
+        for recording in recordings
         for index, (start_s, end_s) in dwell_times_s(recording.run).items()
         if index in wanted
     }
     read = [_Read(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
     return _when(recordings, name, read)
-
-
-def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
-    return zip(recordings, since_first_s(recordings), strict=True)
 
 
 def _averaged(average: Average, since_s: float) -> _Read:

@@ -16,7 +16,6 @@ from rig.analysis.reference_budgets import drift_patterns, lag_pattern
 from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_suspected import Read
 from rig.analysis.suspicion import Statistic
-from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
@@ -81,8 +80,7 @@ def of_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
 ) -> ReadInReference:
     """What an accelerometer read in a run, in the order of its solution; `known` is of what no recording shows."""
-    timed = zip(recordings, since_first_s(recordings), strict=True)
-    dwells = [dwell for each, since_s in timed for dwell in raw_acceleration_dwells(name, each, since_s)]
+    dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording)]
     pieces = pieces_of(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
@@ -116,8 +114,7 @@ def of_magnetometer(
     """What a magnetometer read, as of an accelerometer that nothing swept."""
     solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
     channel = result.sensor.channel(FIELD)
-    timed = zip(recordings, since_first_s(recordings), strict=True)
-    dwells = [dwell for each, since_s in timed for dwell in raw_field_dwells(name, each, since_s)]
+    dwells = [dwell for recording in recordings for dwell in raw_field_dwells(name, recording)]
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = solution.theta
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)

@@ -81,25 +81,19 @@ def with_transfers(
     transfers: Sequence[Transfer],
     windows: Sequence[SegmentedAverage],
     explained: Explained,
-    clock_offsets_s: Sequence[float],
 ) -> Segments:
     """Return the segments, and each transfer as one; their sweeps count down from below `REST`.
 
     Their noise is that of the other segments, for as long as they last, or their own where that is more, and what a
-    vibration leaves of which the rests beside either end tell. `windows` are those of the segments; `clock_offsets_s`
-    take the times of each recording to the clock of the first.
+    vibration leaves of which the rests beside either end tell. `windows` are those of the segments.
     """
     if not transfers:
         return segments
     of_noise = segments.variances_rad2_s2 - np.square(segments.roundings_rad_s)
     density = np.median(of_noise * np.diff(segments.times_s), axis=0)
-    offsets_s = [clock_offsets_s[transfer.recording] for transfer in transfers]
-    times_s = np.array(
-        [
-            (transfer.interval.start_s + offset_s, transfer.interval.end_s + offset_s)
-            for transfer, offset_s in zip(transfers, offsets_s, strict=True)
-        ]
-    )
+    intervals = tuple(transfer.interval for transfer in transfers)
+    own_times_s = np.array([[interval.start_s, interval.end_s] for interval in intervals])
+    times_s = own_times_s + np.array([[transfer.clock_offset_s] for transfer in transfers])
     duration_s, count = np.diff(times_s), len(transfers)
     noise = np.maximum(density / duration_s, [transfer.scatter_rad2_s2 for transfer in transfers])
     roundings = np.array([transfer.rounding_rad2_s2 for transfer in transfers])
@@ -120,7 +114,7 @@ def with_transfers(
         attitudes=np.concatenate([segments.attitudes, [transfer.attitude for transfer in transfers]]),
         speed_std=np.concatenate([segments.speed_std, np.zeros(count)]),
         times_s=np.concatenate([segments.times_s, times_s]),
-        intervals=(*segments.intervals, *(transfer.interval for transfer in transfers)),
+        intervals=(*segments.intervals, *intervals),
     )
 
 

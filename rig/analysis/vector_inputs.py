@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from itertools import pairwise
 
 import numpy as np
@@ -51,11 +50,11 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         Part(
             recording.sensors[sensor].revolutions,
             recording.sensors[sensor].rests,
-            offset_s,
+            recording.clock_offset_s,
             recording.run.settings.stage,
             recording.motion.mount,
         )
-        for recording, offset_s in zip(recordings, since_first_s(recordings), strict=True)
+        for recording in recordings
     ]
     seen = put_together(parts, surroundings)
     averages = [average for part in parts for average in (turn.average for turn in part.turns)]
@@ -189,25 +188,6 @@ def _visits(turns: Sequence[Observation]) -> list[list[int]]:
         else:
             found.append([place])
     return found
-
-
-def since_first_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """What takes the controller's times of each recording to the clock of the first: it may have been switched off.
-
-    No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
-    accelerated laboratory's time passes faster.
-    """
-    first = recordings[0]
-    since_s = [0.0]
-    for last, each in pairwise(recordings):
-        by_the_computer = (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0])
-        ended = float(last.motion.time_s[-1]) + since_s[-1]
-        since_s.append(max(by_the_computer, ended) - float(each.motion.time_s[0]))
-    return since_s
-
-
-def _started(recording: ObservedRun) -> datetime:
-    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def known_of(surroundings: Surroundings, name: str, part: str) -> Known:

@@ -36,14 +36,14 @@ class RawDwell:
         return (self.window.start_s + self.window.end_s) / 2
 
 
-def raw_acceleration_dwells(name: str, recording: ObservedRun, clock_offset_s: float = 0.0) -> list[RawDwell]:
+def raw_acceleration_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
     """Return what a sensor's accelerometer read in each of its dwells."""
     stream = recording.stream(name)
     dwells = []
     for dwell in recording.sensors[name].dwells:
         inside = between(stream, dwell.window.start_s, dwell.window.end_s)
         counts = counts_of(stream, ACCELERATION, inside)
-        dwells.append(_raw_dwell(dwell, counts, stream.time_s[inside], recording, clock_offset_s))
+        dwells.append(_raw_dwell(dwell, counts, stream.time_s[inside], recording))
     return dwells
 
 
@@ -59,10 +59,10 @@ def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadin
     return sweeps
 
 
-def raw_field_dwells(name: str, recording: ObservedRun, clock_offset_s: float = 0.0) -> list[RawDwell]:
+def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
     """Return what a magnetometer read in each of its dwells."""
     return [
-        _raw_dwell(dwell, counts.astype(np.int64), time_s, recording, clock_offset_s)
+        _raw_dwell(dwell, counts.astype(np.int64), time_s, recording)
         for dwell, counts, time_s in dwelt_field(recording, name)
     ]
 
@@ -72,9 +72,7 @@ def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
     return [RawReadings(REST, dwell.counts, dwell.counts - dwell.counts.mean(axis=0), np.zeros(3)) for dwell in dwells]
 
 
-def _raw_dwell(
-    dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun, clock_offset_s: float
-) -> RawDwell:
+def _raw_dwell(dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun) -> RawDwell:
     window = dwell.window
     q_rad = recording.motion.angles((window.start_s + window.end_s) / 2)
-    return RawDwell(dwell.index, counts, time_s, window, q_rad, clock_offset_s)
+    return RawDwell(dwell.index, counts, time_s, window, q_rad, recording.clock_offset_s)

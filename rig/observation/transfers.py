@@ -47,7 +47,7 @@ LOW = 0.0  # of the data rate: no more low frequencies than the fewest, for a se
 class Transfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
-    recording: index of its recording.
+    clock_offset_s: takes its times to the clock of the first recording.
     mean_rad_s (3,): mean of the readings.
     scatter_rad2_s2 (3,): variance of that by what neither the arm nor gravity explains of the readings.
     rounding_rad2_s2 (3,): variance of that by rounding.
@@ -56,7 +56,7 @@ class Transfer:
     attitude (3, 3): from the base into that frame.
     """
 
-    recording: int
+    clock_offset_s: float
     mean_rad_s: Array
     scatter_rad2_s2: Array
     rounding_rad2_s2: Array
@@ -74,7 +74,7 @@ def average_transfers(
     In none of them a sample is missing or out of range.
     """
     transfers = list[Transfer]()
-    for index, recording in enumerate(recordings):
+    for recording in recordings:
         stream = recording.stream(name)
         for interval in _find_transfers(recording.run, stream, recording.motion):
             inside = between(stream, interval.start_s, interval.end_s)
@@ -82,7 +82,7 @@ def average_transfers(
             moving = interval.motion.rate(time_s) @ matrix.T
             transfers.append(
                 Transfer(
-                    recording=index,
+                    clock_offset_s=recording.clock_offset_s,
                     mean_rad_s=readings.mean(axis=0),
                     scatter_rad2_s2=_scatter(readings, time_s, interval.motion, site.down_m_s2),
                     rounding_rad2_s2=rounding_left(readings, stream.steps, moving, stream.steps.variance),
