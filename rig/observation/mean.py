@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
-from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.mean_weights import even_groups
 from rig.estimation.rounding import Steps, rounding_left
@@ -63,17 +62,24 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadAtRest:
-    """What was read of a `quantity` in one dwell, by its `index` and name, or the Fault for which there is no mean.
-
-    `expected` is the size that it is known to have there, in SI units, None where that was not said.
-    """
+class QuantityInDwell:
+    """A `quantity` of a sensor in one dwell, by its `index`; its name is empty where nothing tells it."""
 
     sensor: str
     quantity: Quantity
     index: int
-    dwell: str
-    reading: Mean | Fault
+    dwell: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadAtRest:
+    """The mean `reading` of a quantity in one dwell.
+
+    `expected` is the size that it is known to have there, in SI units, None where that was not said.
+    """
+
+    of: QuantityInDwell
+    reading: Mean
     expected: float | None
 
 

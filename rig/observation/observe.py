@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
@@ -126,12 +127,12 @@ def observe_sensor(
     )
 
 
-def each_sweep(
+def observe_each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
-) -> dict[int, Observation | Fault]:
-    """Every finished sweep's observation, or why there is none, by the sweep's index."""
-    seen = partial(_revolution, run, stream, motion, settings=settings)
-    return {each.sweep.index: or_fault(partial(seen, each)) for each in swept(run)}
+) -> Attempts[int, Observation]:
+    """Observe every finished sweep by itself; return the observations, and why there is none, by the sweep's index."""
+    observe = partial(_revolution, run, stream, motion, settings=settings)
+    return attempt_each({finished.sweep.index: partial(observe, finished) for finished in swept(run)})
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:

@@ -23,7 +23,7 @@ from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, ProblemError, Refused
 from rig.motion.steps import Plan
 from rig.observation.acceleration import DwellReading
-from rig.observation.mean import Held, ReadAtRest
+from rig.observation.mean import Held, QuantityInDwell, ReadAtRest
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
@@ -277,4 +277,4 @@ def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead
 
 
 def _read(name: str, quantity: Quantity, dwell: DwellReading | Held, expected: float) -> AttitudeRead:
-    return AttitudeRead(ReadAtRest(name, quantity, dwell.index, dwell.name, dwell.reading, expected))
+    return AttitudeRead(ReadAtRest(QuantityInDwell(name, quantity, dwell.index, dwell.name), dwell.reading, expected))
