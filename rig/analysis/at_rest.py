@@ -1,6 +1,6 @@
 """How sensors behave at rest, by the Allan deviation of every rest and dwell, or of a log made elsewhere. Pure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -9,7 +9,8 @@ import numpy as np
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
@@ -43,7 +44,7 @@ class SensorAtRest:
     """A sensor, None where the readings do not say which, and each quantity it sends, or the Fault it ends in."""
 
     sensor: RecordedSensor | None
-    quantities: Mapping[Quantity, AtRest | Fault]
+    quantities: Attempts[Quantity, AtRest]
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
@@ -59,7 +60,7 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
             stream = on_the_arms_clock(run.samples[name], sensor, motion)
             pieces += [(stream, inside) for inside in still_samples(run, stream, motion)]
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
-        found[name] = SensorAtRest(sensor, {each: or_fault(partial(_of, pieces, each)) for each in quantities})
+        found[name] = SensorAtRest(sensor, attempt_each({each: partial(_of, pieces, each) for each in quantities}))
     return found
 
 
@@ -73,12 +74,14 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     pieces = [inside for inside in whole_stretches(samples.time_s) if inside.stop - inside.start > 2]
     return SensorAtRest(
         None,
-        {
-            quantity: or_fault(
-                partial(_told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity)
-            )
-            for quantity, readings in samples.readings.items()
-        },
+        attempt_each(
+            {
+                quantity: partial(
+                    _told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity
+                )
+                for quantity, readings in samples.readings.items()
+            }
+        ),
     )
 
 

@@ -31,7 +31,7 @@ from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
-from rig.errors import Fault, RigError
+from rig.errors import RigError
 from rig.estimation import coverage
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
@@ -135,7 +135,7 @@ def _leaning_deg(solution: VectorSolution, stated_deg: float, rate: float) -> St
 def in_reference(
     recordings: Sequence[ObservedRun],
     accelerometers: Mapping[str, AccelerometerResult],
-    magnetometers: Mapping[str, MagnetometerResult | Fault],
+    magnetometers: Mapping[str, MagnetometerResult],
     settings: RunSettings,
     *,
     drifting: bool = False,
@@ -152,7 +152,7 @@ def in_reference(
         **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
            for name, each in accelerometers.items()},
         **{(name, FIELD): of_magnetometer(name, recordings, each, known)
-           for name, each in magnetometers.items() if not isinstance(each, Fault)}}  # fmt: skip
+           for name, each in magnetometers.items()}}  # fmt: skip
     rate = _rate(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}

@@ -42,6 +42,7 @@ from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Fault
+from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
 from rig.estimation.vector_fit import centripetal_m_s2
@@ -74,7 +75,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
-    among_dwells = in_reference(recordings, accelerometers, magnetometers, settings, drifting=drifting)
+    among_dwells = in_reference(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -100,11 +101,9 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     )
 
 
-def _unsolved(
-    magnetometers: Mapping[str, MagnetometerResult | Fault], of_kinds: Sequence[KindFound]
-) -> Iterator[Check]:
+def _unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
     """The checks of what was to be calibrated and is not."""
-    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.items())
+    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.faults.items())
     yield from unsolved_checks((each.name, each.quantity.name, each.found) for each in of_kinds)
 
 

@@ -6,6 +6,8 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
+from rig.errors.attempts import Attempts
+
 if TYPE_CHECKING:
     from rig.analysis.acceleration import AccelerometerResult
     from rig.analysis.bias_drift import Drifts
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
     from rig.data.result_file import StoredCalibrationEntry
     from rig.data.run_file import RunData
     from rig.data.settings import RunSettings
-    from rig.errors import Fault
     from rig.observation.observed_run import ObservedRun
 
 
@@ -80,7 +81,7 @@ class Outcome:
     verifications: "Mapping[str, Verification]" = field(default_factory=dict)
     clock: "ClockCheck | None" = None
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
-    magnetometers: "Mapping[str, MagnetometerResult | Fault]" = field(default_factory=dict)
+    magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     drifts: "Drifts" = field(default_factory=dict)
     told_from: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
     told_from_in_reference: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)

@@ -11,6 +11,7 @@ from rig.errors import Fault
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,11 @@ class Attempts(Generic[Key, Result]):
         kept = {key: result for key, result in self.results.items() if key not in again}
         kept_faults = {key: fault for key, fault in self.faults.items() if key not in again}
         return Attempts({**kept, **later.results}, {**kept_faults, **later.faults})
+
+    def by_key(self, of_result: Callable[[Result], Made], of_fault: Callable[[Fault], Made]) -> dict[Key, Made]:
+        """Return what `of_result` makes of each result, then what `of_fault` makes of each Fault."""
+        made = {key: of_result(result) for key, result in self.results.items()}
+        return {**made, **{key: of_fault(fault) for key, fault in self.faults.items()}}
 
 
 def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, Result]:
