@@ -14,7 +14,8 @@ from rig.analysis.triad import BESIDE, Triad, check_mounted, check_seen, known_g
 from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.accelerometer import specific_force
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Movement, Sweeps
 from rig.estimation.arrays import Array
@@ -71,7 +72,7 @@ class AccelerometerResult:
     triad: Triad
     budget: Budget | None
     alignment: Alignment | None
-    beside: Mapping[Method, TriaxialSolution | Fault]
+    beside: Attempts[Method, TriaxialSolution]
     dwells: tuple[DwellReading, ...]
     sweeps: int
     held_out: HeldOut | None
@@ -155,11 +156,12 @@ def _calibrated(
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
-    weighted = or_fault(partial(solve, method="attitude_weighted"))
-    if not isinstance(weighted, Fault):
+    methods: tuple[Method, ...] = ("attitude_weighted", *BESIDE)
+    beside = attempt_each({method: partial(solve, method=method) for method in methods})
+    if weighted := beside.results.get("attitude_weighted"):
         check_mounted(weighted.matrix)
-    elif movement.own is None:
-        raise weighted  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
+    elif movement.own is None:  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
+        raise beside.faults["attitude_weighted"]
     solution = solve_imu(
         seen,
         sweeps,
@@ -174,7 +176,6 @@ def _calibrated(
     check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
-    others = {each: or_fault(partial(solve, method=each)) for each in BESIDE}
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
@@ -192,7 +193,7 @@ def _calibrated(
             noise_freedom=_noise_freedom(used, swept) if settings.counts_freedom else None,
         ),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
-        beside={"attitude_weighted": weighted, **others},
+        beside=beside,
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,

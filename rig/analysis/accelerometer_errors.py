@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.arm_patterns import Stood, arm_turns
-from rig.analysis.vector_inputs import since_first_s
 from rig.config.judged_by import OfSensor
 from rig.data.budget_entries import IN_U
 from rig.data.recorded_sensor import RecordedSensor
@@ -91,17 +90,12 @@ class Piece:
 
 def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[Piece]:
     """The pieces that the sensor `name` is calibrated from: these dwells, then all sweeps."""
-    timed, used = list(zip(recordings, since_first_s(recordings), strict=True)), {dwell.index for dwell in dwells}
+    used = {dwell.index for dwell in dwells}
     return [
+        *(_dwelt(each, dwell) for each in recordings for dwell in each.sensors[name].dwells if dwell.index in used),
         *(
-            _dwelt(each, since_s, dwell)
-            for each, since_s in timed
-            for dwell in each.sensors[name].dwells
-            if dwell.index in used
-        ),
-        *(
-            _swept(each, since_s, turn.sweep, turn.average, turn.acceleration.joint)
-            for each, since_s in timed
+            _swept(each, turn.sweep, turn.average, turn.acceleration.joint)
+            for each in recordings
             for turn in each.sensors[name].revolutions
             if turn.acceleration is not None
         ),
@@ -175,14 +169,15 @@ def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -
     return replace(spread, covariance=spread.covariance - own), lines
 
 
-def _dwelt(recording: ObservedRun, since_s: float, dwell: DwellReading) -> Piece:
+def _dwelt(recording: ObservedRun, dwell: DwellReading) -> Piece:
     start_s, end_s = dwell.window.start_s, dwell.window.end_s
     stood = Stood(recording.motion.angles((start_s + end_s) / 2), None)
-    window_s = start_s + since_s, end_s + since_s
+    window_s = start_s + recording.clock_offset_s, end_s + recording.clock_offset_s
     return Piece(dwell.index, window_s, dwell.reading.samples, dwell.temperature_c, stood)
 
 
-def _swept(recording: ObservedRun, since_s: float, sweep: int, average: Average, joint: int) -> Piece:
+def _swept(recording: ObservedRun, sweep: int, average: Average, joint: int) -> Piece:
     stood = Stood(recording.motion.angles(average.start_s), joint - WRIST_1)
-    window_s = average.start_s + since_s, average.end_s + since_s
+    offset_s = recording.clock_offset_s
+    window_s = average.start_s + offset_s, average.end_s + offset_s
     return Piece(sweep, window_s, average.samples, average.temperature_c, stood)

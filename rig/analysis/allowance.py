@@ -1,4 +1,4 @@
-"""What arm and sensor may be off by in the pieces of a recording: a pattern for each thing that is not known.
+"""What arm and sensor may be off by in the segments of a recording: a pattern for each thing that is not known.
 
 Each pattern is what one standard deviation of one thing does to all readings at once, as in the model of common errors
 (`rig.estimation.common_errors`), so that what they have in common excuses nothing that they do not. Nothing is allowed
@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.analysis.calibration import SensorResult, found_earth_rate
 from rig.analysis.consistency import Allowance
-from rig.analysis.cut_recording import REST, Pieces, Stretch
+from rig.analysis.segments import Segments
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import WAVE_SHARE, unknown_of
 from rig.config.judged_by import OfSensor
@@ -24,6 +24,9 @@ from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.own_errors import KnownSensor, own_errors, rounding_errors
 from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3
 from rig.observation.arm_motion import ArmMotion
+from rig.observation.raw_readings import REST
+from rig.observation.segments import MotionInterval
+from rig.observation.transfers import STANDS_RAD
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
@@ -31,7 +34,6 @@ WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos 
 ZEROS = {ANGLES.index("zero of wrist_2"): -2, ANGLES.index("zero of wrist_3"): -1}  # and which joint's, from the end
 CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")  # its odd and its even part
 STEPS = 24  # of a way, in which directions are taken to stand still
-STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,14 +123,14 @@ def allowed_of(
     )
 
 
-def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowance:
+def allow(known: Allowed, segments: Segments, ways: Segments, matrix: Array) -> Allowance:
     """What the means of a sensor of that F (3, 3) may contradict each other by.
 
     What is even of its curve is left free on the ways, which are faster than sweeps: it is no change with time.
     """
     on_ways = replace(known, curve=replace(known.curve, square=1.0))
     unstable = 0.0 if known.sensor is None else known.sensor.instability_rad_s
-    return Allowance(patterns(pieces, matrix, known), ways, patterns(ways, matrix, on_ways), unstable)
+    return Allowance(patterns(segments, matrix, known), ways, patterns(ways, matrix, on_ways), unstable)
 
 
 def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:
@@ -144,96 +146,98 @@ def any_earth_rate(*, known: bool) -> Array:
     return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 0 if known else 3], dtype=np.float64)
 
 
-def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
-    """(P, N, 3) rad/s in the readings of pieces, for a sensor of that F (3, 3)."""
+def patterns(segments: Segments, matrix: Array, known: Allowed) -> Array:
+    """(P, N, 3) rad/s in the readings of segments, for a sensor of that F (3, 3)."""
     of_the_arm = np.concatenate(
         [
-            _of_angles(pieces, known),
-            _of_marks(pieces, known.encoder_rad),
-            _of_times(pieces, known.jitter_s),
-            _of_stamps(pieces, known.stamp_s),
-            *_of_speeds(pieces),
-            *_of_mounts(pieces, known.mount_rad),
-            np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
+            _of_angles(segments, known),
+            _of_marks(segments, known.encoder_rad),
+            _of_times(segments, known.jitter_s),
+            _of_stamps(segments, known.stamp_s),
+            *_of_speeds(segments),
+            *_of_mounts(segments, known.mount_rad),
+            np.moveaxis(segments.attitudes @ known.earth_rad_s, -1, 0),
         ]
     )
     of_the_sensor = [
-        _curved(pieces.stretches, matrix, known.curve),
-        *_of_temperature(pieces, matrix, known),
-        *_of_rounding(pieces),
+        _curved(segments.intervals, matrix, known.curve),
+        *_of_temperature(segments, matrix, known),
+        *_of_rounding(segments),
     ]
     found = np.concatenate([of_the_arm @ matrix.T, *of_the_sensor])
     return np.asarray(found[found.any(axis=(1, 2))], dtype=np.float64)
 
 
-def _of_angles(pieces: Pieces, known: Allowed) -> Array:
+def _of_angles(segments: Segments, known: Allowed) -> Array:
     """Patterns of the arm's angles, and of those that do not come back to where they were, for each sweep and way."""
-    each = np.zeros((len(ANGLES), *pieces.means_rad_s.shape))
+    each = np.zeros((len(ANGLES), *segments.means_rad_s.shape))
     again = []
-    for place, (sweep, stretch) in enumerate(zip(pieces.sweep, pieces.stretches, strict=True)):
+    for place, (sweep, interval) in enumerate(zip(segments.sweep, segments.intervals, strict=True)):
         if sweep == REST:
             continue
-        each[:, place] = turned_by(stretch, 1 if sweep > REST else STEPS)
+        each[:, place] = turned_by(interval, 1 if sweep > REST else STEPS)
         if sweep < REST:
-            for ends in _ends(stretch):
-                again.append(np.zeros(pieces.means_rad_s.shape))
-                unseen_rad = np.hypot(stretch.unseen_rad, known.encoder_rad)
+            for ends in _ends(interval):
+                again.append(np.zeros(segments.means_rad_s.shape))
+                unseen_rad = np.hypot(interval.unseen_rad, known.encoder_rad)
                 again[-1][place] = np.hypot(known.repeatability_rad, unseen_rad) * ends
     for zero, joint in ZEROS.items():
-        for alike in _off_alike(pieces, joint) if each[zero].any() else ():  # a servo has no such joint
-            there = np.isin(pieces.sweep, alike)[:, None]
+        for alike in _off_alike(segments, joint) if each[zero].any() else ():  # a servo has no such joint
+            there = np.isin(segments.sweep, alike)[:, None]
             again.append(known.repeatability_rad * np.where(there, each[zero], 0.0))
-    return np.concatenate([known.angles_rad[:, None, None] * each, np.reshape(again, (-1, *pieces.means_rad_s.shape))])
+    return np.concatenate(
+        [known.angles_rad[:, None, None] * each, np.reshape(again, (-1, *segments.means_rad_s.shape))]
+    )
 
 
-def _of_marks(pieces: Pieces, encoder_rad: float) -> Array:
+def _of_marks(segments: Segments, encoder_rad: float) -> Array:
     """Patterns of what a joint's encoder errs at each angle where parts of sweeps begin or end.
 
     Marks that lie within a part's quarter are one: a sweep back has the same as the sweep there.
     """
     marks: list[tuple[int, float]] = []
     found: list[Array] = []
-    for place, (sweep, stretch) in enumerate(zip(pieces.sweep, pieces.stretches, strict=True)):
+    for place, (sweep, interval) in enumerate(zip(segments.sweep, segments.intervals, strict=True)):
         if sweep <= REST or not encoder_rad:
             continue
-        q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
+        q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
         moved = q_rad[1] - q_rad[0]
         joint = int(np.argmax(np.abs(moved)))
-        axis = stretch.motion.axes(q_rad[0])[:, joint] / (stretch.end_s - stretch.start_s)
+        axis = interval.motion.axes(q_rad[0])[:, joint] / (interval.end_s - interval.start_s)
         for end, angle in zip((-1.0, 1.0), q_rad[:, joint], strict=True):
             apart = [abs(at - angle) if of == joint else np.inf for of, at in marks]
             mark = next((each for each, by in enumerate(apart) if by < abs(moved[joint]) / 4), len(marks))
             if mark == len(marks):
                 marks.append((joint, float(angle)))
-                found.append(np.zeros(pieces.means_rad_s.shape))
+                found.append(np.zeros(segments.means_rad_s.shape))
             found[mark][place] += end * encoder_rad * axis
-    return np.array(found).reshape(-1, *pieces.means_rad_s.shape)
+    return np.array(found).reshape(-1, *segments.means_rad_s.shape)
 
 
-def _off_alike(pieces: Pieces, joint: int) -> list[list[int]]:
+def _off_alike(segments: Segments, joint: int) -> list[list[int]]:
     """Sweeps and ways from one move of a joint to its next; a way on which it moves is among those after it.
 
     The joint is counted from the end of the chain. Where a way is missing, another angle or recording says that it was
     moved.
     """
-    sweeps, firsts = np.unique(pieces.sweep, return_index=True)
+    sweeps, firsts = np.unique(segments.sweep, return_index=True)
     found: list[list[int]] = []
     motion, stood_rad = None, np.nan
-    for first in sorted(firsts[sweeps != REST], key=lambda first: float(pieces.times_s[first, 0])):
-        stretch = pieces.stretches[first]
-        start_rad, end_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))[:, joint]
+    for first in sorted(firsts[sweeps != REST], key=lambda first: float(segments.times_s[first, 0])):
+        interval = segments.intervals[first]
+        start_rad, end_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))[:, joint]
         stands = max(abs(start_rad - stood_rad), abs(end_rad - start_rad)) < STANDS_RAD
-        if not stands or stretch.motion is not motion:
+        if not stands or interval.motion is not motion:
             found.append([])
-        found[-1].append(int(pieces.sweep[first]))
-        motion, stood_rad = stretch.motion, end_rad
+        found[-1].append(int(segments.sweep[first]))
+        motion, stood_rad = interval.motion, end_rad
     return found
 
 
-def turned_by(stretch: Stretch, steps: int) -> Array:
-    """(17, 3) rad/s by which the mean rate of the flange is off in a stretch, for a radian of each of `ANGLES`."""
-    motion = stretch.motion
-    q_rad = motion.angles(np.linspace(stretch.start_s, stretch.end_s, steps + 1))
+def turned_by(interval: MotionInterval, steps: int) -> Array:
+    """(17, 3) rad/s by which the mean rate of the flange is off in an interval, for a radian of each of `ANGLES`."""
+    motion = interval.motion
+    q_rad = motion.angles(np.linspace(interval.start_s, interval.end_s, steps + 1))
     middle, moved = (q_rad[1:] + q_rad[:-1]) / 2, np.diff(q_rad, axis=0)
     axes = motion.axes(middle)
     off = np.zeros((len(ANGLES), 3))
@@ -243,7 +247,7 @@ def turned_by(stretch: Stretch, steps: int) -> Array:
         off[: len(AXIS_ERRORS)] += np.tensordot(moved[:, joint], motion.axis_errors(middle, joint), axes=1)
         waves = [wave(times * q_rad[:, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
         off[first : first + len(WAVES)] += np.diff(waves) @ axes[:, :, joint]
-    return off / (stretch.end_s - stretch.start_s)
+    return off / (interval.end_s - interval.start_s)
 
 
 def _waves_of(motion: ArmMotion) -> dict[int, int]:
@@ -252,75 +256,75 @@ def _waves_of(motion: ArmMotion) -> dict[int, int]:
     return {joint + beyond: first for joint, first in WAVES_OF.items() if joint + beyond >= 0}
 
 
-def _ends(stretch: Stretch) -> list[Array]:
+def _ends(interval: MotionInterval) -> list[Array]:
     """(3,) rad/s for a radian by which one joint that moved was elsewhere before a way, or after it; for each."""
-    q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
-    axes = stretch.motion.axes(q_rad) / (stretch.end_s - stretch.start_s)
-    moved = [joint for joint in _waves_of(stretch.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
+    q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
+    axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
+    moved = [joint for joint in _waves_of(interval.motion) if np.ptp(q_rad[:, joint]) >= STANDS_RAD]
     return [end[:, joint] for joint in moved for end in axes]
 
 
-def _of_times(pieces: Pieces, jitter_s: float) -> Array:
+def _of_times(segments: Segments, jitter_s: float) -> Array:
     """Patterns of the times at which one part of a sweep ends and the next begins: what one gains the other loses."""
     edges = [
         (sweep, time_s)
-        for sweep in np.unique(pieces.sweep[pieces.sweep > REST])
-        for time_s in np.unique(pieces.times_s[pieces.sweep == sweep].round(6))
+        for sweep in np.unique(segments.sweep[segments.sweep > REST])
+        for time_s in np.unique(segments.times_s[segments.sweep == sweep].round(6))
     ]
-    lengths = np.diff(pieces.times_s)
-    found = np.zeros((len(edges), *pieces.means_rad_s.shape))
+    lengths = np.diff(segments.times_s)
+    found = np.zeros((len(edges), *segments.means_rad_s.shape))
     for place, (sweep, time_s) in enumerate(edges):
-        start, end = (np.abs(pieces.times_s - time_s) < 1e-5).T & (pieces.sweep == sweep)
-        found[place] = jitter_s * (end.astype(np.float64) - start)[:, None] * pieces.rates_rad_s / lengths
+        start, end = (np.abs(segments.times_s - time_s) < 1e-5).T & (segments.sweep == sweep)
+        found[place] = jitter_s * (end.astype(np.float64) - start)[:, None] * segments.rates_rad_s / lengths
     return found
 
 
-def _of_stamps(pieces: Pieces, stamp_s: float) -> Array:
+def _of_stamps(segments: Segments, stamp_s: float) -> Array:
     """Patterns of how long each way lasted by its first and last sample; the mean of a steady turn takes no harm."""
-    ways = np.flatnonzero((pieces.sweep < REST) & (stamp_s > 0))
-    found = np.zeros((len(ways), *pieces.means_rad_s.shape))
-    lasting_s = np.diff(pieces.times_s[ways])
-    found[np.arange(len(ways)), ways] = np.sqrt(2) * stamp_s * pieces.rates_rad_s[ways] / lasting_s
+    ways = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
+    found = np.zeros((len(ways), *segments.means_rad_s.shape))
+    lasting_s = np.diff(segments.times_s[ways])
+    found[np.arange(len(ways)), ways] = np.sqrt(2) * stamp_s * segments.rates_rad_s[ways] / lasting_s
     return found
 
 
-def _of_speeds(pieces: Pieces) -> list[Array]:
+def _of_speeds(segments: Segments) -> list[Array]:
     """Patterns of sweeps whose ends lie between arm states that are far apart."""
-    off = pieces.speed_std[:, None] * pieces.rates_rad_s
-    return [np.where((pieces.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(pieces.sweep)]
+    off = segments.speed_std[:, None] * segments.rates_rad_s
+    return [np.where((segments.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(segments.sweep)]
 
 
-def _of_mounts(pieces: Pieces, mount_rad: float) -> list[Array]:
+def _of_mounts(segments: Segments, mount_rad: float) -> list[Array]:
     """Patterns of an item that sits a little off in every stage but the first, against which they all are held."""
-    mounts = [stretch.motion.mount.tobytes() for stretch in pieces.stretches]
-    off = mount_rad * np.cross(np.eye(3)[:, None, :], pieces.rates_rad_s)
+    mounts = [interval.motion.mount.tobytes() for interval in segments.intervals]
+    off = mount_rad * np.cross(np.eye(3)[:, None, :], segments.rates_rad_s)
     _, *others = dict.fromkeys(mounts)
     return [np.where(np.array([each == other for each in mounts])[:, None], off, 0.0) for other in others]
 
 
-def _curved(stretches: Sequence[Stretch], matrix: Array, curve: Curve) -> Array:
+def _curved(intervals: Sequence[MotionInterval], matrix: Array, curve: Curve) -> Array:
     """(6, N, 3) patterns of the curve's cube and square, one standard deviation each, from moment to moment."""
     found = []
-    for stretch in stretches:
-        edges = np.linspace(stretch.start_s, stretch.end_s, STEPS + 1)
-        rates = stretch.motion.rate((edges[1:] + edges[:-1]) / 2)
+    for interval in intervals:
+        edges = np.linspace(interval.start_s, interval.end_s, STEPS + 1)
+        rates = interval.motion.rate((edges[1:] + edges[:-1]) / 2)
         bent = curvature(matrix, rates) if curve.free else bending(matrix, rates, curve.full_scale_rad_s)
         found.append(bent.mean(axis=1))
     sizes = np.ones(6) if curve.free else np.repeat([curve.cube, curve.square], 3)
     return np.asarray(sizes[:, None, None] * np.stack(found, axis=1), dtype=np.float64)
 
 
-def _of_temperature(pieces: Pieces, matrix: Array, known: Allowed) -> list[Array]:
+def _of_temperature(segments: Segments, matrix: Array, known: Allowed) -> list[Array]:
     """Patterns of one standard deviation of what warming does to bias and scale."""
     if known.sensor is None:
         return []
-    inside, order = pieces.times_s.mean(axis=1), np.argsort(known.at_s)
+    inside, order = segments.times_s.mean(axis=1), np.argsort(known.at_s)
     warm = replace(known.sensor, temperature_c=np.interp(inside, known.at_s[order], known.sensor.temperature_c[order]))
-    turns = np.where((pieces.sweep == REST)[:, None], 0.0, pieces.rates_rad_s)
-    return [each.patterns / np.sqrt(3) for each in own_errors(warm, matrix, turns, pieces.times_s, ())]
+    turns = np.where((segments.sweep == REST)[:, None], 0.0, segments.rates_rad_s)
+    return [each.patterns / np.sqrt(3) for each in own_errors(warm, matrix, turns, segments.times_s, ())]
 
 
-def _of_rounding(pieces: Pieces) -> list[Array]:
-    """Patterns of one standard deviation of what rounding does to pieces alike."""
-    rounded = rounding_errors(pieces.means_rad_s, pieces.roundings_rad_s, pieces.variances_rad2_s2)
+def _of_rounding(segments: Segments) -> list[Array]:
+    """Patterns of one standard deviation of what rounding does to segments alike."""
+    rounded = rounding_errors(segments.means_rad_s, segments.roundings_rad_s, segments.variances_rad2_s2)
     return [each.patterns / np.sqrt(3) for each in rounded]

@@ -22,8 +22,10 @@ def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *,
     Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
     recordings do not hold what they should.
     """
-    from rig.analysis import judging
+    from rig.analysis import external_judging, judging
 
+    if (external := runs[0].elsewhere) is not None:
+        return external_judging.calibrate_external(runs, external, estimator)
     return judging.calibrated(runs, estimator, drifting=drifting)
 
 

@@ -1,25 +1,24 @@
 """How sensors behave at rest, by the Allan deviation of every rest and dwell, or of a log made elsewhere. Pure."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
-from rig.observation.arm_motion import ArmMotion, motion_of
-from rig.observation.average import Stream, between, on_the_arms_clock
+from rig.observation.arm_motion import motion_of
+from rig.observation.arm_rests import still_samples
+from rig.observation.average import Stream, on_the_arms_clock
 from rig.observation.csv_samples import Samples
-from rig.observation.observe import standing
 from rig.observation.steadiness import check_at_rest, whole_stretches
-from rig.observation.windows import rested
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -45,7 +44,7 @@ class SensorAtRest:
     """A sensor, None where the readings do not say which, and each quantity it sends, or the Fault it ends in."""
 
     sensor: RecordedSensor | None
-    quantities: Mapping[Quantity, AtRest | Fault]
+    quantities: Attempts[Quantity, AtRest]
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
@@ -59,9 +58,9 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
         pieces = []
         for run, motion in zip(runs, motions, strict=True):
             stream = on_the_arms_clock(run.samples[name], sensor, motion)
-            pieces += [(stream, inside) for inside in _stretches(run, stream, motion)]
+            pieces += [(stream, inside) for inside in still_samples(run, stream, motion)]
         quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
-        found[name] = SensorAtRest(sensor, {each: or_fault(partial(_of, pieces, each)) for each in quantities})
+        found[name] = SensorAtRest(sensor, attempt_each({each: partial(_of, pieces, each) for each in quantities}))
     return found
 
 
@@ -75,26 +74,15 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     pieces = [inside for inside in whole_stretches(samples.time_s) if inside.stop - inside.start > 2]
     return SensorAtRest(
         None,
-        {
-            quantity: or_fault(
-                partial(_told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity)
-            )
-            for quantity, readings in samples.readings.items()
-        },
+        attempt_each(
+            {
+                quantity: partial(
+                    _told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity
+                )
+                for quantity, readings in samples.readings.items()
+            }
+        ),
     )
-
-
-def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
-    """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
-    for window in rested(run):
-        still = standing(motion, window)
-        if still is None:
-            continue
-        inside = between(stream, still.start_s, still.end_s)
-        sequence = stream.raw["sequence"][inside].astype(np.int64)
-        gaps = inside.start + 1 + np.flatnonzero(np.diff(sequence) != 1)
-        edges = [inside.start, *gaps.tolist(), inside.stop]
-        yield from (slice(start, end) for start, end in pairwise(edges))
 
 
 def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:

@@ -1,6 +1,6 @@
 """From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
@@ -17,6 +17,7 @@ from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.settings import Elsewhere, Site
 from rig.errors import Fault, or_fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
@@ -24,10 +25,10 @@ from rig.estimation.placement import NOISE, LaidDown, laid_down
 from rig.estimation.reference_model import BIAS, REFERENCE, SECOND, F
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
-from rig.observation.csv_windows import check_reads
 from rig.observation.fixes import Turning
 from rig.observation.mean import Held
 from rig.observation.placements import Placements
+from rig.observation.stuck_check import check_reads
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
@@ -49,7 +50,7 @@ class InAttitudes:
 
     solution: TriaxialSolution
     triad: Triad
-    beside: Mapping[Method, TriaxialSolution | Fault]
+    beside: Attempts[Method, TriaxialSolution]
     budget: Budget
     seen: Dwells
     reference_fault: Fault | None = None
@@ -64,7 +65,7 @@ Result = InAttitudes | InIncrements
 
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
-) -> dict[Quantity, Result | OfKind | Fault]:
+) -> Attempts[Quantity, Result | OfKind]:
     """Every quantity that was recorded of a sensor of that name, by `method`; None chooses the one that suits it.
 
     That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
@@ -94,13 +95,13 @@ def solve_placed(
         equations = Equations.of_placements(placements, quantity, known, second_order=second_order)
         return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
 
-    found: dict[Quantity, Result | OfKind | Fault] = {}
+    solves = dict[Quantity, Callable[[], Result | OfKind]]()
     for quantity in (each for each in placed.quantities if not asked.only or each.sensor in asked.only):
         if quantity == RATE and placed.turning is not None:
-            found[quantity] = or_fault(partial(of_rate, placed.turning))
+            solves[quantity] = partial(of_rate, placed.turning)
         elif placed.placements is not None:
-            found[quantity] = or_fault(partial(of_reference, quantity, placed.placements))
-    return found
+            solves[quantity] = partial(of_reference, quantity, placed.placements)
+    return attempt_each(solves)
 
 
 def _check_noisy(placements: Placements, quantity: Quantity) -> None:

@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.triad import known_gravity
-from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
@@ -22,9 +21,9 @@ from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_model import BIAS, KnownNorm
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
+from rig.observation.finished import dwell_times_s
 from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import dwelt
 
 FEWEST_REPEATS = 2
 
@@ -126,11 +125,11 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
             dwell.reading.mean,
             dwell.reading.variance,
             mounting @ nearest_rotation(dwell.attitude),
-            (dwell.window.start_s + dwell.window.end_s) / 2 + since_s,
+            (dwell.window.start_s + dwell.window.end_s) / 2 + recording.clock_offset_s,
             dwell.temperature_c,
             dwell.reading.freedom,
         )
-        for recording, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        for recording in recordings
         for dwell in recording.sensors[name].dwells
     }
 
@@ -138,16 +137,16 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
     """A dwell is a rest of the gyroscope's."""
     mounting, found = np.array(sensor.mounting), {}
-    for recording, since_s in zip(recordings, since_first_s(recordings), strict=True):
-        for each in dwelt(recording.run):
+    for recording in recordings:
+        for index, (start_s, end_s) in dwell_times_s(recording.run).items():
             for rest in recording.sensors[name].rests:
-                inside = each.window.start_s <= rest.start_s and rest.end_s <= each.window.end_s
+                inside = start_s <= rest.start_s and rest.end_s <= end_s
                 if inside and rest.attitude is not None:  # always where an arm made it
-                    found[each.dwell.index] = Stand(
+                    found[index] = Stand(
                         rest.mean_rad_s,
                         rest.variance_rad2_s2 - rest.drift_rad2_s2,
                         mounting @ nearest_rotation(rest.attitude),
-                        (rest.start_s + rest.end_s) / 2 + since_s,
+                        (rest.start_s + rest.end_s) / 2 + recording.clock_offset_s,
                         rest.temperature_c,
                         rest.freedom,
                     )

@@ -9,8 +9,8 @@ from rig.errors import Fault
 from rig.estimation.by_hand import HandSolution, Told, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.csv_samples import Samples
-from rig.observation.csv_windows import check_reads
 from rig.observation.handled import handled
+from rig.observation.stuck_check import check_reads
 
 NO_SWEEPS = Fault("too_few_observations", "moves by hand are no sweeps", "Give sweeps in six directions")
 

@@ -27,10 +27,10 @@ from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Explained, Seen, explain
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
+from rig.observation.finished import finished_sweeps
 from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)

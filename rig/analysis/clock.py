@@ -4,27 +4,23 @@ Both stand in every recording. A speed is 2π over a time of the controller's, s
 clock errs by. No clock is left out for being far off: what two differ by is held against what is stated of both.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from math import comb
 
 import numpy as np
 
 from rig.data.provenance import calls_itself_simulated
 from rig.data.settings import Uncertainty
-from rig.observation.coloured_noise import widening
+from rig.observation.arm_clock import compare_with_computer
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import NOMINAL_DRIFT
-from rig.observation.windows import inside, swept
 
 # A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
 LOCKED, REAL_TIME = 150e-6, 1e-3  # beyond these no comparison was made, before what contradicts was told
 CERTAIN = 4.0  # standard deviations of what is found beside what is stated
 PPM = 1e-6
-ORDER = 6
-EVEN_S = 1e-4  # states whose steps in time differ by less follow each other evenly
 
 BY_COMPUTER, BY_CRYSTAL = "the computer's clock", "the board's crystal"
 SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
@@ -91,14 +87,6 @@ class ClockCheck:
         return self.std**4 / sum(found) if any(found) else np.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Jitter:
-    """Scatter of the times of the arm's states: standard deviation in s, and its degrees of freedom."""
-
-    std_s: float
-    freedom: float
-
-
 def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool = True) -> ClockCheck:
     """The clock of one recording's controller, held against others: against every one, or as before against near ones.
 
@@ -123,41 +111,10 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
     return list(worst.values())
 
 
-def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
-    """The jitter of the times of the arm's states, from how the joint angles of all sweeps of a run scatter.
-
-    Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
-    left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
-    n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
-    """
-    scatter, count = [], 0
-    sweeps = [(each, finished) for each in recordings for finished in swept(each.run)]
-    for recording, finished in sweeps:
-        motion = recording.motion
-        time_s = motion.time_s[inside(motion.time_s, finished.window)]
-        steps = np.diff(motion.angle(finished.sweep, time_s), n=ORDER)
-        even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
-        steps = steps[even < EVEN_S]
-        if len(steps):
-            scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
-            count += len(steps)
-    if not scatter:
-        return Jitter(0.0, np.inf)
-    return Jitter(float(np.sqrt(np.mean(scatter))), count * comb(2 * ORDER, ORDER) ** 2 / comb(4 * ORDER, 2 * ORDER))
-
-
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
     """The controller's clock by the computer's, from the times at which the states came."""
-    motion = recording.motion
-    host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
-    design = np.column_stack([np.ones_like(host_s), host_s])
-    (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
-    late = arm_s - design @ (offset, slope)
-    alone = len(late) / widening(late)  # states come late in bursts
-    of_the_line = float(late.std() / host_s.std() / np.sqrt(alone))
-    return ClockComparison(
-        BY_COMPUTER, float(slope - 1), known.computer_clock_ppm * PPM, of_the_line, max(alone - 2, 1.0)
-    )
+    rate = compare_with_computer(recording.motion)
+    return ClockComparison(BY_COMPUTER, rate.error, known.computer_clock_ppm * PPM, rate.std, rate.freedom)
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from rig.analysis.alignment import mean_rates
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream
-from rig.observation.observe import REST_SETTLING_S, Observation
+from rig.observation.movement_masks import mask_movement
+from rig.observation.observe import Observation
 from rig.observation.observed_run import Delay, ObservedRun
-from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, rested, swept
 
 MAX_DELAY_S = 0.2  # between the filters of two sensors; more means that their time stamps do not belong together
 MAX_GAP = 2.5  # sampling intervals of the reference across which it is interpolated
@@ -145,13 +146,13 @@ class _Part:
 def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _Part:
     delay = _delay(recording, sensor, reference.name)
     tested, known = recording.stream(sensor), recording.stream(reference.name)
-    sweeps, rests = [finished.window for finished in swept(recording.run)], list(rested(recording.run))
-    moving = _within(tested.time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests])))
-    used = moving & _surrounded(tested.time_s, known.time_s)
-    if not used.sum() > MIN_COVERED * moving.sum():
+    movement = mask_movement(recording.run, tested.time_s)
+    used = movement.moving & _surrounded(tested.time_s, known.time_s)
+    if not used.sum() > MIN_COVERED * movement.moving.sum():
         raise Fault(
             "no_overlap",
-            f"the reference was recorded during {used.sum()} of the sensor's {moving.sum()} samples of the movement",
+            f"the reference was recorded during {used.sum()} of the sensor's {movement.moving.sum()} samples of the "
+            "movement",
             "Check the reference's wiring and its data-ready line, then repeat the verification",
         )
     time_s = tested.time_s[used]
@@ -159,11 +160,9 @@ def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: A
         time_s=time_s,
         reading=tested.readings_rad_s[used],
         reference=_interpolated(known, reference, time_s) @ rotation.T,
-        sweeping=_within(time_s, *sweeps),
-        resting=_within(time_s, *rests),
-        still=tuple(
-            _within(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)) for rest in rests
-        ),
+        sweeping=movement.sweeping[used],
+        resting=movement.resting[used],
+        still=tuple(rest[used] for rest in movement.still),
         delay=delay,
     )
 
@@ -177,14 +176,6 @@ def _delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | None:
             "Record both with the same board",
         )
     return found
-
-
-def _within(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
-    """Which times (n,) lie in any of the windows."""
-    inside = np.zeros(len(time_s), dtype=np.bool_)
-    for window in windows:
-        inside |= (time_s >= window.start_s) & (time_s <= window.end_s)
-    return inside
 
 
 def _surrounded(time_s: Array, by_s: Array) -> NDArray[np.bool_]:

@@ -11,7 +11,6 @@ from rig.analysis.acceleration import AccelerometerResult, calibrate_acceleromet
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, fitness
-from rig.analysis.cut_recording import cut
 from rig.analysis.frozen_axis import longest_frozen
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.mounts import observe_as_mounted
@@ -23,17 +22,20 @@ from rig.analysis.reference_contradictions import (
     of_magnetometer,
     reference_statistics,
 )
+from rig.analysis.segments import stack_segments, with_transfers
 from rig.analysis.solvable import solvable
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.ways import with_ways
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
-from rig.errors import Fault, RigError
+from rig.data.settings import RunSettings
+from rig.errors import RigError
 from rig.estimation import coverage
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
+from rig.observation.segments import segment_recordings
+from rig.observation.transfers import average_transfers
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 NON_ORTHOGONALITY = "non_orthogonality"
@@ -63,6 +65,7 @@ def contradictions(
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
     surroundings: Surroundings | None,
+    settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
@@ -71,22 +74,25 @@ def contradictions(
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
     that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
     """
-    settings = recordings[0].run.settings
     if settings.site is None:
         return NOTHING
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    rate = _rate(recordings[0].run, sensors, false_alarms)
+    rate = _rate(recordings[0].run, sensors, settings, false_alarms)
     for name in sensors:
         explained = results[name].explained
         if explained is None:
             continue
-        pieces = cut(name, recordings, results[name], explained, settings.site)
+        windows = segment_recordings(name, recordings)
+        segments = stack_segments(windows, explained, settings.site)
         allowance = None
         if surroundings is not None and settings.checked_by_model:
             known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
-            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
-        found = consistency.consistency(pieces, explained.solution.matrix, rate, allowance)
+            matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
+            transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
+            ways = with_transfers(segments, transfers, windows, explained)
+            allowance = allow(known, segments, ways, matrix)
+        found = consistency.consistency(segments, explained.solution.matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
@@ -95,7 +101,7 @@ def contradictions(
         checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *found.piece)]
         of_readings = readings.judge_readings(
             counts,
-            pieces.windows,
+            segments.readings,
             rate,
             np.median if settings.holds_all_kinds else np.min,
             digits=readings.digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
@@ -130,7 +136,8 @@ def _leaning_deg(solution: VectorSolution, stated_deg: float, rate: float) -> St
 def in_reference(
     recordings: Sequence[ObservedRun],
     accelerometers: Mapping[str, AccelerometerResult],
-    magnetometers: Mapping[str, MagnetometerResult | Fault],
+    magnetometers: Mapping[str, MagnetometerResult],
+    settings: RunSettings,
     *,
     drifting: bool = False,
 ) -> Contradictions:
@@ -139,16 +146,15 @@ def in_reference(
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
     steadily where it is `drifting`.
     """
-    run = recordings[0].run
-    known = run.settings.uncertainty
-    if known is None or not run.settings.holds_all_kinds:
+    known = settings.uncertainty
+    if known is None or not settings.holds_all_kinds:
         return NOTHING
     asked: dict[tuple[str, Quantity], ReadInReference] = {
         **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
            for name, each in accelerometers.items()},
         **{(name, FIELD): of_magnetometer(name, recordings, each, known)
-           for name, each in magnetometers.items() if not isinstance(each, Fault)}}  # fmt: skip
-    rate = _rate(run, run.settings.to_calibrate, FALSE_ALARMS)
+           for name, each in magnetometers.items()}}  # fmt: skip
+    rate = _rate(recordings[0].run, settings.to_calibrate, settings, FALSE_ALARMS)
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     for (name, quantity), held in asked.items():
@@ -160,13 +166,13 @@ def in_reference(
     return Contradictions(tuple(checks), told_from)
 
 
-def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
+def _rate(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
     """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
     kinds = len(sensors)
-    if run.settings.holds_all_kinds:
-        accelerometers = run.measuring(ACCELERATION).keys() & run.settings.to_calibrate
+    if settings.holds_all_kinds:
+        accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
         kinds += len(accelerometers) + len(run.measuring(FIELD))
-    return rate_of_each(kinds, by_model=run.settings.checked_by_model, of_all=false_alarms)
+    return rate_of_each(kinds, by_model=settings.checked_by_model, of_all=false_alarms)
 
 
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
@@ -185,14 +191,15 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
         return frozenset()
     named = frozenset[int]()
     with suppress(RigError), solvable():
-        recordings, _ = observe_as_mounted(runs)
+        recordings, _ = observe_as_mounted(runs, settings)
         if not recordings:
             return named
         if settings.reference_c is not None:
             recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
-        surroundings = surroundings_of(recordings)
+        surroundings = surroundings_of(recordings, settings)
         results = solve_observed(chosen, recordings, surroundings=surroundings)
-        named = contradictions(recordings, results, settings.to_calibrate, surroundings).disturbed
-        named |= in_reference(recordings, calibrate_accelerometers(recordings, settings, results), {}).disturbed
+        named = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
+        accelerometers = calibrate_accelerometers(recordings, settings, results)
+        named |= in_reference(recordings, accelerometers, {}, settings).disturbed
     return named

@@ -216,18 +216,22 @@ def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) 
         )
     placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
     found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
-    rates = found.get(RATE)
+    rates = found.results.get(RATE)
     told = rates if isinstance(rates, InAttitudes | InIncrements) else None
     return OfSensor(
         read.item,
         gyroscope=None if told is None else _gyroscope(read.item, told, placed.clock),
         rates=told,
-        at_rest={each: result for each, result in found.items() if each != RATE and isinstance(result, InAttitudes)},
-        unsolved={each: result for each, result in found.items() if isinstance(result, Fault)},
-        omitted=tuple(omitted_in_attitudes(placed, found)),
+        at_rest={
+            quantity: result
+            for quantity, result in found.results.items()
+            if quantity != RATE and isinstance(result, InAttitudes)
+        },
+        unsolved=found.faults,
+        omitted=tuple(omitted_in_attitudes(placed, found.results)),
         of_kinds=tuple(
             KindFound(read.item.name, read.item, each, result)
-            for each, result in found.items()
+            for each, result in found.results.items()
             if isinstance(result, OfKind)
         ),
     )

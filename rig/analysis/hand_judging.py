@@ -1,11 +1,10 @@
 """What recordings of a session by hand amount to: every gyroscope solved from its rests and moves, and judged."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 
 from rig.analysis.by_hand import result_by_hand
 from rig.analysis.correction import diagonal_correction, matrix_correction
-from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.verdict import judge
 from rig.data.run_file import RunData
 from rig.errors import Refused
@@ -31,13 +30,7 @@ def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
         results[name] = result_by_hand(runs[0].sensors[name], found, corrected_by)
     return Outcome(
         settings=settings,
-        provenance=Origin(
-            recorded=runs[0].provenance,
-            stored_calibrations=runs[-1].provenance.stored_calibrations,
-            resumed_utc=tuple(run.provenance.started_utc for run in runs[1:]),
-            verified_utc=(),
-            solved_utc=datetime.now(UTC),
-        ),
+        provenance=origin_of(runs),
         results=results,
         checks=judge(
             {name: result.solution for name, result in results.items()},

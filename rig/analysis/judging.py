@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -16,13 +14,12 @@ from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
-from rig.analysis.elsewhere import checks_elsewhere, solved_elsewhere
-from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
+from rig.analysis.estimators import Estimator, known_estimator
 from rig.analysis.installed_kinds import KindFound, kinds_on_arm
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.mounts import observe_as_mounted
 from rig.analysis.onboard_check import Agreement, agreement
-from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.outcome import Outcome, origin_of
 from rig.analysis.over_temperature import (
     Polynomials,
     taken_to_reference,
@@ -31,7 +28,7 @@ from rig.analysis.over_temperature import (
 )
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.told_from import ToldFrom
-from rig.analysis.vector_inputs import arms_of
+from rig.analysis.vector_inputs import lever_arms_m
 from rig.analysis.verdict import (
     acceleration_checks,
     clock_checks,
@@ -41,11 +38,11 @@ from rig.analysis.verdict import (
 )
 from rig.analysis.verification import Verification, verify
 from rig.config.judged_by import DecisionRule
-from rig.data.motion_file import ReadElsewhere
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Fault
+from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
 from rig.estimation.vector_fit import centripetal_m_s2
@@ -58,10 +55,8 @@ ResultT = TypeVar("ResultT")
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
     """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrated` says."""
     settings = runs[0].settings
-    if (read := runs[0].elsewhere) is not None:
-        return _elsewhere(runs, read, estimator)
     chosen = known_estimator(estimator)
-    recordings, mounts = observe_as_mounted(runs)
+    recordings, mounts = observe_as_mounted(runs, settings)
     averages = [board_averages(name, recordings) for name in settings.to_calibrate] if settings.planned_sweeps else []
     if not recordings:
         raise Fault(
@@ -73,14 +68,14 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     if settings.reference_c is not None:
         taken = taken_to_reference(recordings, settings, settings.reference_c)
         recordings, found = taken.recordings, taken.polynomials
-    swept = _swept(runs, recordings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
+    swept = _swept(runs, recordings, settings, chosen, found) if settings.planned_sweeps else _Swept(polynomials=found)
     accelerometers = calibrate_accelerometers(recordings, settings, swept.results)
     accelerometers, found = _over_temperature(
         accelerometers, ACCELERATION, with_acceleration_polynomials, swept.polynomials
     )
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     of_kinds = kinds_on_arm(recordings, settings)
-    among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
+    among_dwells = in_reference(recordings, accelerometers, magnetometers.results, settings, drifting=drifting)
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -96,7 +91,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
         ),
         of_kinds=of_kinds,
         mounts=mounts,
-        provenance=_origin(runs),
+        provenance=origin_of(runs),
         clock=swept.clock,
         accelerometers=accelerometers,
         magnetometers=magnetometers,
@@ -106,11 +101,9 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
     )
 
 
-def _unsolved(
-    magnetometers: Mapping[str, MagnetometerResult | Fault], of_kinds: Sequence[KindFound]
-) -> Iterator[Check]:
+def _unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
     """The checks of what was to be calibrated and is not."""
-    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.items())
+    yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.faults.items())
     yield from unsolved_checks((each.name, each.quantity.name, each.found) for each in of_kinds)
 
 
@@ -127,12 +120,16 @@ class _Swept:
 
 
 def _swept(
-    runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], estimator: Estimator, polynomials: Polynomials
+    runs: Sequence[RunData],
+    recordings: tuple[ObservedRun, ...],
+    settings: RunSettings,
+    estimator: Estimator,
+    polynomials: Polynomials,
 ) -> _Swept:
-    settings, surroundings = runs[0].settings, surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, estimator, surroundings, settings.matrix_corrected)
     results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
-    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
+    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
@@ -166,22 +163,6 @@ def _over_temperature(
     added = {name: result for name, (result, _) in settled.items()}
     known = {name: {**polynomials[name], quantity: found} for name, (_, found) in settled.items()}
     return {**results, **added}, {**polynomials, **known}
-
-
-def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> Outcome:
-    """What readings from elsewhere amount to; the usual estimator stands for the one that was asked for."""
-    settings, name = runs[0].settings, read.item.name
-    asked = None if settings.elsewhere is None else settings.elsewhere.estimator
-    found = solved_elsewhere(read, settings, asked if estimator == DEFAULT_ESTIMATOR else estimator)
-    return Outcome(
-        settings=settings,
-        provenance=_origin(runs),
-        checks=(*checks_elsewhere(name, found), *(check for each in found.of_kinds for check in each.checks)),
-        results={} if found.gyroscope is None else {name: found.gyroscope},
-        elsewhere={name: found},
-        of_kinds=found.of_kinds,
-        polynomials={} if found.polynomials is None else {name: {RATE: found.polynomials}},
-    )
 
 
 def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
@@ -257,7 +238,9 @@ def _gravity_left(
         turns = turns_of(each, after)
         attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
         turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
-        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(turned, arms_of(turns, settings))
+        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(
+            turned, lever_arms_m(turns, np.array(settings.extension_m))
+        )
         left.append(pull @ (matrix @ solution.g_sensitivity).T)
     of_sensor, of_reference = left
     return of_sensor, of_reference
@@ -265,19 +248,5 @@ def _gravity_left(
 
 def verified_alone(repeated: Sequence[RunData]) -> Outcome:
     """Verify the calibrations that the board had stored before, as `rig.analysis.analyses.verified_alone` says."""
-    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=_origin(repeated[:1]))
+    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=origin_of(repeated[:1]))
     return verified(nothing_calibrated, repeated)
-
-
-def _origin(runs: Sequence[RunData]) -> Origin:
-    return Origin(
-        recorded=runs[0].provenance,
-        stored_calibrations=runs[-1].provenance.stored_calibrations,
-        resumed_utc=tuple(
-            run.provenance.started_utc
-            for before, run in pairwise(runs)
-            if run.settings.stage == before.settings.stage  # else the item was mounted anew between them
-        ),
-        verified_utc=(),
-        solved_utc=datetime.now(UTC),
-    )

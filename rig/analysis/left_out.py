@@ -7,7 +7,6 @@ from rig.analysis.increments import InIncrements
 from rig.analysis.installed_kinds import OfKind
 from rig.data.motion_file import ReadElsewhere
 from rig.data.quantity import RATE, Quantity
-from rig.errors import Fault
 from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import TurnedSolution
 from rig.observation.attitude_import import PlacedReadings
@@ -18,14 +17,14 @@ from rig.observation.sampling import Sampling
 
 
 def omitted_in_attitudes(
-    placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind | Fault]
+    placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
     """Yield what was left out of readings in attitudes, by the quantity that it is missing from, None of all."""
     yield from ((None, each) for each in placed.omitted)
     rates = results.get(RATE)
     if isinstance(rates, InIncrements | InAttitudes):
         yield from ((RATE, each) for each in (rates.omitted if isinstance(rates, InIncrements) else placed.incomplete))
-    solved = [each for each, result in results.items() if each != RATE and not isinstance(result, Fault)]
+    solved = [quantity for quantity in results if quantity != RATE]
     if isinstance(placed.placements, Placements) and solved:
         yield from ((solved[0], each) for each in (*placed.unsampled, *placed.placements.omitted))
 

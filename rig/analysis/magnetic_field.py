@@ -16,7 +16,8 @@ from rig.analysis.triad import BESIDE, Triad, check_mounted, known_field, seen_i
 from rig.data.quantity import FIELD
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
@@ -48,24 +49,27 @@ class MagnetometerResult:
     drift: FieldDrift | None
     triad: Triad
     budget: Budget
-    beside: Mapping[Method, TriaxialSolution | Fault]
+    beside: Attempts[Method, TriaxialSolution]
     dwells: tuple[Held, ...]
     seen: Dwells
 
 
 def calibrate_magnetometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
-) -> dict[str, MagnetometerResult | Fault]:
+) -> Attempts[str, MagnetometerResult]:
     """Every magnetometer that was recorded, or the Fault for which it is not calibrated.
 
     `accelerometers` say how far the arm's attitudes are off. The Fault is `no_attitudes` where none were held,
     `field_strength_unknown`, `field_drifts`, `field_not_uniform`, one of those of `field_readings` and of
     `solve_triaxial`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
     """
-    return {
-        name: or_fault(partial(_calibrated, name, sensor, recordings, settings, accelerometers))
-        for name, sensor in recordings[0].run.measuring(FIELD).items()
-    }
+    magnetometers = recordings[0].run.measuring(FIELD)
+    return attempt_each(
+        {
+            name: partial(_calibrated, name, sensor, recordings, settings, accelerometers)
+            for name, sensor in magnetometers.items()
+        }
+    )
 
 
 def _calibrated(
@@ -109,7 +113,7 @@ def _calibrated(
             field_t=known.norm,
             noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel() if settings.counts_freedom else None,
         ),
-        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
+        beside=attempt_each({method: partial(solve, method=method) for method in BESIDE}),
         dwells=dwells,
         seen=seen,
     )

@@ -15,6 +15,7 @@ from rig.analysis.surroundings import surroundings_of
 from rig.analysis.vector_inputs import see
 from rig.config.stage_section import rotation_by
 from rig.data.run_file import RunData
+from rig.data.settings import RunSettings
 from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained, explain
@@ -39,29 +40,31 @@ class FoundMount:
         return rotation_by(-self.turn_rad)
 
 
-def observe_as_mounted(runs: Sequence[RunData]) -> tuple[tuple[ObservedRun, ...], tuple[FoundMount, ...]]:
+def observe_as_mounted(
+    runs: Sequence[RunData], settings: RunSettings
+) -> tuple[tuple[ObservedRun, ...], tuple[FoundMount, ...]]:
     """All recordings of one calibration with the item as it was found to sit, and the mounts that were found.
 
     What is left of a mount's error, which is as small as the second order of it, each sensor's solution still finds.
     Raises as `observe_recordings` does.
     """
     recordings = observe_recordings(runs)
-    found = _found(recordings)
+    found = _found(recordings, settings)
     if not found:
         return recordings, ()
     turned: Mapping[int, Array] = {each.stage: each.rotation for each in found}
     return observe_recordings(runs, turned), found
 
 
-def _found(recordings: Sequence[ObservedRun]) -> tuple[FoundMount, ...]:
+def _found(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[FoundMount, ...]:
     """The mounts of all stages but the first, by the sensor to calibrate that tells them best; none where none does."""
     stages = list(dict.fromkeys(each.run.settings.stage for each in recordings))
-    if len(stages) < 2 or (surroundings := surroundings_of(recordings)) is None:
+    if len(stages) < 2 or (surroundings := surroundings_of(recordings, settings)) is None:
         return ()
     run = recordings[0].run
     told = [
         or_fault(partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting)))
-        for name in run.settings.to_calibrate
+        for name in settings.to_calibrate
     ]
     explained = [each for each in told if not isinstance(each, Fault)]
     if not explained:

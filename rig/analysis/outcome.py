@@ -1,9 +1,12 @@
 """The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
+
+from rig.errors.attempts import Attempts
 
 if TYPE_CHECKING:
     from rig.analysis.acceleration import AccelerometerResult
@@ -21,8 +24,8 @@ if TYPE_CHECKING:
     from rig.analysis.verification import Verification
     from rig.data.provenance import Provenance
     from rig.data.result_file import StoredCalibrationEntry
+    from rig.data.run_file import RunData
     from rig.data.settings import RunSettings
-    from rig.errors import Fault
     from rig.observation.observed_run import ObservedRun
 
 
@@ -35,6 +38,22 @@ class Origin:
     resumed_utc: tuple[str, ...]
     verified_utc: tuple[str, ...]
     solved_utc: datetime
+
+
+def origin_of(runs: "Sequence[RunData]") -> Origin:
+    """Return where and when the recordings of a run were made, at least one; they are solved now.
+
+    A recording of another stage does not resume the one before it: the item was mounted anew between them.
+    """
+    return Origin(
+        recorded=runs[0].provenance,
+        stored_calibrations=runs[-1].provenance.stored_calibrations,
+        resumed_utc=tuple(
+            run.provenance.started_utc for before, run in pairwise(runs) if run.settings.stage == before.settings.stage
+        ),
+        verified_utc=(),
+        solved_utc=datetime.now(UTC),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +81,7 @@ class Outcome:
     verifications: "Mapping[str, Verification]" = field(default_factory=dict)
     clock: "ClockCheck | None" = None
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
-    magnetometers: "Mapping[str, MagnetometerResult | Fault]" = field(default_factory=dict)
+    magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     drifts: "Drifts" = field(default_factory=dict)
     told_from: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
     told_from_in_reference: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)

@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import SensorResult
 from rig.analysis.surroundings import Surroundings, surroundings_of
-from rig.analysis.vector_inputs import see, since_first_s
+from rig.analysis.vector_inputs import see
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
 from rig.data.settings import RunSettings
 from rig.errors import Fault
@@ -56,7 +56,7 @@ def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings,
 
     Raises Fault as `over_temperature` does, and `temperature_not_recorded`.
     """
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, settings)
     if surroundings is None:
         raise NOT_RECORDED  # by a recording of before there was a site
     moved, found = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
@@ -156,9 +156,7 @@ def _accelerations(
     recordings: Sequence[ObservedRun], name: str, surroundings: Surroundings, reference_c: float
 ) -> tuple[list[ObservedRun], OverTemperature]:
     parts = [each.sensors[name] for each in recordings]
-    placed = [
-        (dwell, since) for part, since in zip(parts, since_first_s(recordings), strict=True) for dwell in part.dwells
-    ]
+    placed = [(dwell, each.clock_offset_s) for each in recordings for dwell in each.sensors[name].dwells]
     dwells = [dwell for dwell, _ in placed]
     attitudes = np.array([dwell.attitude for dwell in dwells])
     felt = -(attitudes @ surroundings.site.down_m_s2)

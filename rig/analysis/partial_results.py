@@ -4,7 +4,7 @@ Whoever looks on is told this. The result comes from `rig.analysis.outcome` when
 otherwise: of uncertainty there is the noise alone here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,28 +14,29 @@ from rig.analysis.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RunData
 from rig.errors import Fault, or_fault
+from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
-from rig.observation.acceleration import DwellReading, each_dwell
+from rig.observation.acceleration import DwellReading, read_each_dwell
 from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
 from rig.observation.field import dwelt_beside, field_mean
-from rig.observation.mean import Mean, ReadAtRest
-from rig.observation.observe import Observation, each_sweep, observe_sensor
+from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.mean import QuantityInDwell, ReadAtRest
+from rig.observation.observe import Observation, observe_each_sweep, observe_sensor
 from rig.observation.observed_run import times_s
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """What a run tells of a gyroscope yet: each finished sweep's observation or the Fault it ends in, by its index.
+    """What a run tells of a gyroscope yet: its finished sweeps by index, observed or refused.
 
     The `solution` is the vector model's, or the Fault that says what is missing yet. `bias_rad_s` (3,) is that of the
     rests alone, with its standard deviation, None without rests.
     """
 
-    sweeps: Mapping[int, Observation | Fault]
+    sweeps: Attempts[int, Observation]
     solution: VectorSolution | Fault
     bias_rad_s: tuple[Array, Array] | None
 
@@ -45,107 +46,111 @@ class SoFar:
     """What a run tells yet: of each gyroscope, and what others read in each finished dwell."""
 
     gyroscopes: Mapping[str, Turned]
-    at_rest: Sequence[ReadAtRest]
+    at_rest: Attempts[QuantityInDwell, ReadAtRest]
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _Recorded:
     """What one recording holds of a gyroscope, and of the accelerometer in it; no `clock` where none is found."""
 
     clock: TimeBase | None
-    sweeps: Mapping[int, Observation | Fault]
-    dwells: Mapping[int, DwellReading | Fault]
+    sweeps: Attempts[int, Observation]
+    dwells: Attempts[int, DwellReading]
     rests: Sequence[Average]
 
 
 def so_far(runs: Sequence[RunData]) -> SoFar:
-    """What recordings of raw readings hold; a sweep or dwell that several hold counts in the last one."""
-    sweeps: dict[str, dict[int, Observation | Fault]] = {}
+    """Return what recordings of raw readings hold; a sweep or dwell that several hold counts in the last one."""
+    sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
-    at_rest: dict[tuple[str, str, int], ReadAtRest] = {}
+    at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for run in runs:
         try:
             motion = motion_of(run)
         except Fault:
             continue  # nothing has moved yet
-        seen = {name: _seen(run, name, motion) for name in run.measuring(RATE)}
-        for name, each in seen.items():
-            sweeps.setdefault(name, {}).update(each.sweeps)
-            rests.setdefault(name, []).extend(each.rests)
-        for read in (*_accelerations(run, seen), *_fields(run, seen)):
-            at_rest[read.sensor, read.quantity.name, read.index] = read
+        recorded = {name: _observe(run, name, motion) for name in run.measuring(RATE)}
+        for name, sensor in recorded.items():
+            sweeps[name] = sweeps.get(name, Attempts()).updated(sensor.sweeps)
+            rests.setdefault(name, []).extend(sensor.rests)
+        at_rest = at_rest.updated(_accelerations(run, recorded)).updated(_fields(run, recorded))
     return SoFar(
         {
             name: Turned(
-                dict(sorted(found.items())),
-                _solution(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
+                attempts,
+                _solution(attempts.results, rests[name], np.array(runs[-1].sensors[name].mounting)),
                 _bias(rests[name]),
             )
-            for name, found in sweeps.items()
+            for name, attempts in sweeps.items()
         },
-        sorted(at_rest.values(), key=lambda read: (read.sensor, read.index)),
+        at_rest,
     )
 
 
-def _seen(run: RunData, name: str, motion: ArmMotion) -> _Seen:
+def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
     sensor = run.sensors[name]
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
     except Fault as fault:  # of the sensor as a whole: its clock is not found
-        dwelt = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
-        return _Seen(None, dict.fromkeys(finished_sweeps(run), fault), dict.fromkeys(dwelt, fault), ())
-    turned, rests = _observed(run, name, stream, motion)
-    return _Seen(stream.clock, turned, each_dwell(run, stream, motion, run.settings.observation), rests)
+        dwells = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
+        return _Recorded(None, all_failed(finished_sweeps(run), fault), all_failed(dwells, fault), ())
+    sweeps, rests = _observe_sweeps(run, name, stream, motion)
+    return _Recorded(stream.clock, sweeps, read_each_dwell(run, stream, motion, run.settings.observation), rests)
 
 
-def _accelerations(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
+def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
     site = run.settings.site
     gravity_m_s2 = None if site is None else site.gravity_m_s2
-    for name, each in seen.items():
-        for index, dwell in each.dwells.items():
-            words, reading = ("", dwell) if isinstance(dwell, Fault) else (dwell.name, dwell.reading)
-            yield ReadAtRest(name, ACCELERATION, index, words, reading, gravity_m_s2)
+    results, faults = dict[QuantityInDwell, ReadAtRest](), dict[QuantityInDwell, Fault]()
+    for name, sensor in recorded.items():
+        faults |= {QuantityInDwell(name, ACCELERATION, i, ""): fault for i, fault in sensor.dwells.faults.items()}
+        for index, dwell in sensor.dwells.results.items():
+            of = QuantityInDwell(name, ACCELERATION, index, dwell.name)
+            results[of] = ReadAtRest(of, dwell.reading, gravity_m_s2)
+    return Attempts(results, faults)
 
 
-def _fields(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
-    """What magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
+def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
+    """Return what magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
     site = run.settings.site
     expected_t = None if site is None else site.magnetic_field_t
+    fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):
-        other = dwelt_beside(run, name, (sensor for sensor, each in seen.items() if each.dwells))
+        dwelling = (sensor for sensor, each in recorded.items() if each.dwells.results or each.dwells.faults)
+        other = dwelt_beside(run, name, dwelling)
         if other is None:
             continue
-        clock = seen[other].clock
+        clock, dwells = recorded[other].clock, recorded[other].dwells
         time_s = np.empty(0) if clock is None else times_s(run, name, {other: clock}, other)
-        for index, dwell in seen[other].dwells.items():
-            words = "" if isinstance(dwell, Fault) else dwell.name
-            yield ReadAtRest(name, FIELD, index, words, _field(run, name, time_s, dwell), expected_t)
+        read = partial(_read_field, run, time_s, expected_t)
+        by_dwell = {QuantityInDwell(name, FIELD, i, dwell.name): dwell for i, dwell in dwells.results.items()}
+        fields = fields.updated(attempt_each({of: partial(read, of, dwell) for of, dwell in by_dwell.items()}))
+        refused = {QuantityInDwell(name, FIELD, i, ""): fault for i, fault in dwells.faults.items()}
+        fields = fields.updated(Attempts({}, refused))
+    return fields
 
 
-def _field(run: RunData, name: str, time_s: Array, dwell: DwellReading | Fault) -> Mean | Fault:
-    if isinstance(dwell, Fault):
-        return dwell
-    return or_fault(partial(field_mean, run, name, time_s, dwell, run.settings.observation))
+def _read_field(
+    run: RunData, time_s: Array, expected_t: float | None, of: QuantityInDwell, dwell: DwellReading
+) -> ReadAtRest:
+    return ReadAtRest(of, field_mean(run, of.sensor, time_s, dwell, run.settings.observation), expected_t)
 
 
-def _observed(
+def _observe_sweeps(
     run: RunData, name: str, stream: Stream, motion: ArmMotion
-) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
+) -> tuple[Attempts[int, Observation], Sequence[Average]]:
     thresholds = run.settings.observation
-    found = each_sweep(run, stream, motion, thresholds)
-    left_out = {index for index, each in found.items() if isinstance(each, Fault)}
+    sweeps = observe_each_sweep(run, stream, motion, thresholds)
     dwells = {dwell.index for dwell in run.settings.planned_dwells}
     try:
-        seen = observe_sensor(run, name, motion, thresholds, left_out | dwells)
+        sensor = observe_sensor(run, name, motion, thresholds, sweeps.faults.keys() | dwells)
     except Fault as fault:  # of the sensor as a whole
-        return dict.fromkeys(finished_sweeps(run), fault), ()
-    return {**found, **{each.sweep: each for each in seen.revolutions}}, seen.rests
+        return all_failed(finished_sweeps(run), fault), ()
+    return sweeps.updated(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
 
 
-def _solution(
-    sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array
-) -> VectorSolution | Fault:
-    observations = [each for _, each in sorted(sweeps.items()) if isinstance(each, Observation)]
+def _solution(sweeps: Mapping[int, Observation], rests: Sequence[Average], mounting: Array) -> VectorSolution | Fault:
+    observations = [observation for _, observation in sorted(sweeps.items())]
     if not observations:
         return Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
     return or_fault(partial(solve_vector, observations, rests, mounting))

@@ -1,11 +1,11 @@
-"""Pieces of a recording held against their model, whitened by all that is known of both."""
+"""Segments of a recording held against their model, whitened by all that is known of both."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.cut_recording import Pieces
+from rig.analysis.segments import Segments
 from rig.analysis.suspected import each_axis, in_time
 from rig.analysis.suspicion import TOLD, Statistic, Suspected, basis, explained, told_from
 from rig.estimation.arrays import Array
@@ -28,7 +28,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldPieces:
+class WhitenedSegments:
     """Readings (3 N,) and the columns of the model (3 N, k) as `white` (3 N, 3 N) makes them."""
 
     white: Array
@@ -84,26 +84,26 @@ def beyond_chance(rate: float) -> Callable[[int], float]:
     return lambda freedom: float(chdtri(freedom, rate))
 
 
-def held_pieces(pieces: Pieces, scatter: Scatter, bias: BiasProcess) -> HeldPieces:
-    white = whitening(covariance_of(pieces, scatter, bias), pieces.variances_rad2_s2.min())
-    seen = whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
-    return HeldPieces(white, seen, whiten(white, each_axis(_known(pieces))))
+def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> WhitenedSegments:
+    white = whitening(covariance_of(segments, scatter, bias), segments.variances_rad2_s2.min())
+    seen = whiten(white, segments.means_rad_s.T[:, :, None])[:, 0]
+    return WhitenedSegments(white, seen, whiten(white, each_axis(_known(segments))))
 
 
-def tolerated(pieces: Pieces, felt: Array) -> Scatter:
+def tolerated(segments: Segments, felt: Array) -> Scatter:
     """What was allowed to every sensor alike: in all of a sweep, and within it."""
-    same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
+    same = (segments.sweep[:, None] == segments.sweep) & (segments.sweep >= 0)
     speed = np.linalg.norm(felt, axis=1)
-    off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
-    return Scatter(pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None], np.kron(np.eye(3), off))
+    off = (TOLERANCE**2 + np.outer(segments.speed_std, segments.speed_std)) * same * np.outer(speed, speed)
+    return Scatter(segments.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None], np.kron(np.eye(3), off))
 
 
-def covariance_of(pieces: Pieces, scatter: Scatter, bias: BiasProcess) -> Array:
-    """(3 N, 3 N) covariance of the pieces' means, axis by axis: their scatter, and a bias that wanders."""
-    each, count = np.arange(3), len(pieces.sweep)
+def covariance_of(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:
+    """(3 N, 3 N) covariance of the segments' means, axis by axis: their scatter, and a bias that wanders."""
+    each, count = np.arange(3), len(segments.sweep)
     covariance = scatter.common_rad2_s2.reshape(3, count, 3, count).copy()
     noise = np.array([np.diag(each) for each in scatter.variances_rad2_s2.T])
-    covariance[each, :, each] += noise + bias.covariance(pieces.times_s)
+    covariance[each, :, each] += noise + bias.covariance(segments.times_s)
     return covariance.reshape(3 * count, 3 * count)
 
 
@@ -113,10 +113,10 @@ def together(off: Array) -> Array:
     return np.asarray(columns @ columns.T, dtype=np.float64)
 
 
-def _known(pieces: Pieces) -> Array:
+def _known(segments: Segments) -> Array:
     """(N, 8) columns of the model, for each axis alike."""
-    ones = np.ones(len(pieces.sweep))
-    return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, in_time(pieces)])
+    ones = np.ones(len(segments.sweep))
+    return np.column_stack([segments.rates_rad_s, ones, segments.gravity_m_s2, in_time(segments)])
 
 
 def whitening(covariance: Array, least: float) -> Array:

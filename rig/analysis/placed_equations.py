@@ -7,7 +7,8 @@ import numpy as np
 
 from rig.analysis.inverted import solved_in
 from rig.data.quantity import ACCELERATION, Quantity
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import Placed
@@ -92,9 +93,9 @@ class Equations:
             attitude_std_rad=self.std_rad,
         )
 
-    def beside(self, method: Method, *others: Method) -> dict[Method, TriaxialSolution | Fault]:
+    def beside(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
         """The solutions by all other methods, or why there is none."""
-        return {other: or_fault(partial(self.solve, other)) for other in others if other != method}
+        return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
 def _scatter(rows: Rows, known: KnownVector) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from rig.analysis import reference_consistency
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
-from rig.analysis.cut_plan import Planned, planned_pieces
+from rig.analysis.cut_plan import Planned, planned_segments
 from rig.analysis.planned_motion import PlannedRun, planned_run
 from rig.analysis.planned_reference import planned_accelerometers, planned_read
 from rig.analysis.suspected import DAMAGES
@@ -45,7 +45,7 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
     rates: dict[str, tuple[ToldFrom, ...]] = {}
     if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
-        turned = planned_pieces(run)
+        turned = planned_segments(run)
         rates = {name: _told_from(run, name, each, turned, rate) for name, each in config.to_calibrate.items()}
     on_arm = isinstance(config.turner, ArmSection) and run.plan.dwells
     read = {each.name: planned_read(each) for each in planned_accelerometers(config, run)} if on_arm else {}
@@ -62,7 +62,7 @@ def _one_set(plan: Plan) -> Plan:
 def _told_from(run: PlannedRun, name: str, sensor: SensorSection, turned: Planned, rate: float) -> tuple[ToldFrom, ...]:
     matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
     seen = turned.read_by(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
-    at_s = seen.pieces.times_s.mean(axis=1)
+    at_s = seen.segments.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in run.plan.sweeps]))
     allowed = allowed_of(
         run.known,
@@ -74,7 +74,7 @@ def _told_from(run: PlannedRun, name: str, sensor: SensorSection, turned: Planne
         sensor=known_sensor(run.known, of, np.zeros(len(at_s)), 0.0),
         at_s=at_s,
     )
-    found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))
+    found = would_tell(seen.segments, matrix, rate, allow(allowed, seen.segments, seen.ways, matrix))
     return tuple(
         ToldFrom(each.what, each.check, found[each.what], each.unit or RATE.unit)
         for each in DAMAGES

@@ -37,10 +37,10 @@ from rig.estimation.six_observation_budget import six_observation_budget
 from rig.estimation.vector_fit import Seen, explain
 from rig.motion.state import Made
 from rig.motion.steps import TURN_RAD, Plan, Step, Sweep
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST, REST_SETTLING_S
 from rig.observation.average import Average
 from rig.observation.even_turn import GUARD_RAD
-from rig.observation.observe import REST_SETTLING_S, Observation, nearest_axis
-from rig.observation.windows import MIN_SAMPLES_AT_REST
+from rig.observation.observe import Observation, nearest_axis
 
 ROOM_C = 22.0  # at one temperature all the time: what a run warms is not known beforehand
 STEP_K = 1 / 16  # of a thermometer, assumed
@@ -67,7 +67,9 @@ def _budget(config: RigConfig, run: PlannedRun, made: Made, name: str, sensor: S
     known, mounting = run.known, mounting_matrix(sensor.mounting)
     scatters = made.reading_std_rad > 0
     jitter_s = 0.0 if scatters else STATE_JITTER_S  # what scatters tells no jitter beside
-    surroundings = Surroundings(run.site, known, _clock(known, on_board=sensor.on_board), jitter_s)
+    surroundings = Surroundings(
+        run.site, known, _clock(known, on_board=sensor.on_board), jitter_s, run.settings.extension_m
+    )
     parts = [_part(config, each, sensor, made) for each in _stages(run)]
     seen = put_together(parts, surroundings)
     of = name, sensor.part, float(np.radians(sensor.range_deg_s))
@@ -127,7 +129,7 @@ def _part(config: RigConfig, run: PlannedRun, sensor: SensorSection, made: Made)
     ]
     told = [each for each in still if (each.end_s - each.start_s) * sensor.rate_hz >= MIN_SAMPLES_AT_REST]
     rests = [_average(each, run, sensor) for each in told]
-    return Part(turns, rests, run.since_s, run.settings, np.array(run.settings.mount))
+    return Part(turns, rests, run.since_s, run.settings.stage, np.array(run.settings.mount))
 
 
 def _average(at: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:

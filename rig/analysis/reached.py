@@ -19,7 +19,7 @@ def reached_so_far(runs: Sequence[RunData], estimator: str) -> Reached | None:
             recordings = observe_recordings(runs)
             if not recordings:
                 return None
-            surroundings = surroundings_of(recordings)
+            surroundings = surroundings_of(recordings, settings)
             sensors = runs[0].measuring(RATE)
             found = solve_observed(sensors, recordings, estimator, surroundings, settings.matrix_corrected)
     except Fault:  # what is wrong with it, the end of the run will say

@@ -10,10 +10,9 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from rig.analysis.vector_inputs import since_first_s
 from rig.observation.average import Average
+from rig.observation.finished import dwell_times_s
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import Window, dwelt
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,16 +39,17 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    """Readings of one window, which is on the clock of the first recording; how many, and how warm it was, or NaN."""
+    """Readings from start to end on the clock of the first recording; how many, and how warm it was, or NaN."""
 
-    window: Window
+    start_s: float
+    end_s: float
     weight: float
     temperature_c: float
 
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
     """When a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
-    parts = [(each.sensors[name], since_s) for each, since_s in _on_one_clock(recordings)]
+    parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
     rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
     return Held(_when(recordings, name, turns), _when(recordings, name, [*turns, *rests]))
@@ -58,11 +58,16 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """When an accelerometer was read: in the dwells of these indices, and its sweeps."""
     wanted, read = frozenset(dwells), []
-    for each, since_s in _on_one_clock(recordings):
-        part = each.sensors[name]
+    for recording in recordings:
+        part, since_s = recording.sensors[name], recording.clock_offset_s
         read += [_averaged(turn.average, since_s) for turn in part.revolutions if turn.acceleration is not None]
         read += [
-            _Read(_moved(dwell.window, since_s), dwell.reading.samples, dwell.temperature_c)
+            _Read(
+                dwell.window.start_s + since_s,
+                dwell.window.end_s + since_s,
+                dwell.reading.samples,
+                dwell.temperature_c,
+            )
             for dwell in part.dwells
             if dwell.index in wanted
         ]
@@ -72,26 +77,18 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
 def of_magnetometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
     """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
-    windows = {
-        each.dwell.index: _moved(each.window, since_s)
-        for recording, since_s in _on_one_clock(recordings)
-        for each in dwelt(recording.run)
-        if each.dwell.index in wanted
+    times_s = {
+        index: (start_s + recording.clock_offset_s, end_s + recording.clock_offset_s)
+        for recording in recordings
+        for index, (start_s, end_s) in dwell_times_s(recording.run).items()
+        if index in wanted
     }
-    return _when(recordings, name, [_Read(each, each.end_s - each.start_s, float("nan")) for each in windows.values()])
-
-
-def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
-    return zip(recordings, since_first_s(recordings), strict=True)
+    read = [_Read(start_s, end_s, end_s - start_s, float("nan")) for start_s, end_s in times_s.values()]
+    return _when(recordings, name, read)
 
 
 def _averaged(average: Average, since_s: float) -> _Read:
-    window = Window(average.start_s, average.end_s)
-    return _Read(_moved(window, since_s), average.samples, average.temperature_c)
-
-
-def _moved(window: Window, since_s: float) -> Window:
-    return Window(window.start_s + since_s, window.end_s + since_s)
+    return _Read(average.start_s + since_s, average.end_s + since_s, average.samples, average.temperature_c)
 
 
 def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -> When:
@@ -102,12 +99,12 @@ def _when(recordings: Sequence[ObservedRun], name: str, read: Sequence[_Read]) -
     def utc(time_s: float) -> datetime:
         return began + timedelta(seconds=time_s - first_s)
 
-    middles = [(each.window.start_s + each.window.end_s) / 2 for each in read]
+    middles = [(each.start_s + each.end_s) / 2 for each in read]
     stated = recordings[0].run.sensors[name].temperature_stated
     warm = [each.temperature_c for each in read if np.isfinite(each.temperature_c)]
     return When(
-        utc(min(each.window.start_s for each in read)),
-        utc(max(each.window.end_s for each in read)),
+        utc(min(each.start_s for each in read)),
+        utc(max(each.end_s for each in read)),
         utc(float(np.average(middles, weights=weights))),
         float(np.average(warm, weights=weights)) if warm else None,
         (min(warm), max(warm)) if warm and not stated else None,

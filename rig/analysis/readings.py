@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.cut_recording import Window
 from rig.data.quantity import Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.rounding import Steps
-from rig.observation.coloured_noise import innovations
+from rig.observation.raw_readings import MEMORY, RawReadings, innovation_std
 from rig.observation.steps_that_count import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
@@ -27,7 +26,6 @@ CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
 LONGEST_RUN = 25  # equal readings of one axis: at one step of noise every fourth reading equals the one before
 STRETCH = 8  # readings on three axes, some 50 bits at one step of noise
-MEMORY = 12  # readings
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
 FEWEST_SPIKES = 5
@@ -79,7 +77,7 @@ def digits_of(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDAr
 
 def judge_readings(
     counts: Sequence[NDArray[np.int64]],
-    windows: Sequence[Window],
+    windows: Sequence[RawReadings],
     rate: float,
     usual: Usual = np.median,
     *,
@@ -96,7 +94,7 @@ def judge_readings(
 
     sure = -float(ndtri(rate / (2 * 3 * 16)))  # of a normal variable, over three axes and their bits
     at_rest = [window for window in windows if window.sweep < 0] or windows
-    noises = [_noise(window.counts) for window in at_rest]
+    noises = [innovation_std(window.counts) for window in at_rest]
     noise = np.asarray(usual(noises, axis=0), dtype=np.float64)
     steps_of_noise = noise / digits.step_counts
     noisy = steps_of_noise >= 1
@@ -117,21 +115,6 @@ def judge_readings(
     return found
 
 
-def _noise(counts: NDArray[np.int64]) -> Array:
-    """(3,) standard deviation in counts of what the readings before a reading do not tell of it.
-
-    Drift and vibration do not count: they carry a reading across counts together with its neighbours.
-    """
-    return np.array([_innovation(axis - axis.mean()) for axis in counts.T])
-
-
-def _innovation(readings: Array) -> float:
-    """Standard deviation of the error of the best linear prediction from the `MEMORY` readings before."""
-    if len(readings) < 4 * MEMORY:
-        return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
-    return float(1.4826 * np.median(np.abs(innovations(readings, MEMORY))))
-
-
 def _constant_bits(counts: NDArray[np.int64]) -> int:
     """How many bits, over the axes, never change although the readings reach far enough to change them."""
     constant = 0
@@ -143,7 +126,7 @@ def _constant_bits(counts: NDArray[np.int64]) -> int:
     return constant
 
 
-def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
+def _uneven_bits(windows: Sequence[RawReadings], noise: Array, sure: float) -> int:
     """How many bits, far enough below the noise to be set in every other reading, are not."""
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
@@ -157,7 +140,7 @@ def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
     return uneven
 
 
-def _spikes(windows: Sequence[Window], step_counts: Array) -> tuple[float, int]:
+def _spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
     """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such.
 
     The noise is half a step at least. The first readings are left out: the filter of a quiet sensor has not settled.
@@ -189,7 +172,7 @@ def _one_bit(powers: Array) -> bool:
     return bool(which[most] >= 0 and often[most] >= ONE_BIT * len(powers))
 
 
-def _skewness(windows: Sequence[Window], axes: NDArray[np.bool_], sure: float) -> tuple[float, float]:
+def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], sure: float) -> tuple[float, float]:
     """The largest skewness of the noise of such axes (3,), which a bit that is now and then wrong makes, and a limit.
 
     At rest: the arm's vibration need not be even.

@@ -9,27 +9,26 @@ from numpy.typing import NDArray
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.accelerometer_errors import pieces_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
-from rig.analysis.cut_recording import Window
+from rig.analysis.knocked_dwells import hold_halves_together
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.readings import COUNTS, Digits, digits_of, judge_readings
 from rig.analysis.reference_budgets import drift_patterns, lag_pattern
 from rig.analysis.reference_consistency import reference_consistency
-from rig.analysis.reference_readings import (
-    Dwelt,
-    acceleration_dwells,
-    acceleration_sweeps,
-    field_dwells,
-    knocked,
-    resting,
-)
 from rig.analysis.reference_suspected import Read
 from rig.analysis.suspicion import Statistic
-from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.observation.observed_run import ObservedRun
+from rig.observation.raw_dwells import (
+    RawDwell,
+    raw_acceleration_dwells,
+    raw_acceleration_sweeps,
+    raw_field_dwells,
+    rests_of_dwells,
+)
+from rig.observation.raw_readings import RawReadings
 
 DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
 
@@ -56,8 +55,8 @@ class ReadInReference:
     """
 
     counts: Sequence[NDArray[np.int64]]
-    dwells: Sequence[Dwelt]
-    sweeps: Sequence[Window]
+    dwells: Sequence[RawDwell]
+    sweeps: Sequence[RawReadings]
     read: Read
     pieces: Sequence[Place]
     flicker_counts: float = 0.0
@@ -81,8 +80,7 @@ def of_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
 ) -> ReadInReference:
     """What an accelerometer read in a run, in the order of its solution; `known` is of what no recording shows."""
-    timed = zip(recordings, since_first_s(recordings), strict=True)
-    dwells = [dwell for each, since_s in timed for dwell in acceleration_dwells(name, each, since_s)]
+    dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording)]
     pieces = pieces_of(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
@@ -94,7 +92,7 @@ def of_accelerometer(
         digits=digits_of(sensor, ACCELERATION, [recording.run.samples[name] for recording in recordings]),
         counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
-        sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
+        sweeps=[sweep for each in recordings for sweep in raw_acceleration_sweeps(name, each)],
         read=Read(
             theta=theta,
             movement=movement,
@@ -116,8 +114,7 @@ def of_magnetometer(
     """What a magnetometer read, as of an accelerometer that nothing swept."""
     solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
     channel = result.sensor.channel(FIELD)
-    timed = zip(recordings, since_first_s(recordings), strict=True)
-    dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
+    dwells = [dwell for recording in recordings for dwell in raw_field_dwells(name, recording)]
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = solution.theta
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
@@ -133,7 +130,7 @@ def of_magnetometer(
             theta=theta,
             movement=movement,
             known=np.concatenate([drift / (np.sqrt(3) if result.drift is None else 1.0), of_arm]),
-            times_s=np.array([each.middle_s + each.since_s for each in dwells]),
+            times_s=np.array([each.middle_s + each.clock_offset_s for each in dwells]),
             second_order=False,
         ),
         pieces=[_at_dwell(each.index) for each in dwells],
@@ -145,10 +142,10 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
     found = reference_consistency(held.read, rate, drifting=drifting)
     named = [(held.pieces[place], statistic) for place, statistic in sorted(found.disturbed.items())]
     worst = Place(DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP)
-    windows = [*resting(held.dwells), *held.sweeps]
+    windows = [*rests_of_dwells(held.dwells), *held.sweeps]
     statistics = {
         **found.statistics,
-        **knocked(held.dwells, held.flicker_counts, rate, held.digits.steps),
+        **hold_halves_together(held.dwells, held.flicker_counts, rate, held.digits.steps),
         **judge_readings(held.counts, windows, rate, digits=held.digits),
     }
     return ReferenceStatistics(named or [(worst, found.piece)], statistics, found.told_from)

@@ -8,7 +8,7 @@ import numpy as np
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
 from rig.analysis.reference_budgets import SIZE_OF_FIELD
-from rig.errors import Fault, Refused
+from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.reversal import Reversal, separate
 
@@ -43,19 +43,21 @@ def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReve
     """
     if len(runs) < 2:
         raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", ALIKE)
-    names = list(runs[0][1].magnetometers)
+    first = runs[0][1].magnetometers
+    names = [*first.results, *first.faults]
     if not names:
         raise Refused("no_magnetometer", f"{runs[0][0]} has no recording of a magnetometer", "Give runs with one")
     return {name: _reversal([_as_mounted(run, outcome, name) for run, outcome in runs]) for name in names}
 
 
 def _as_mounted(run: str, outcome: Outcome, name: str) -> AsMounted:
-    result = outcome.magnetometers.get(name)
-    if result is None:
-        raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", ALIKE)
-    if isinstance(result, Fault):
-        raise Refused("no_magnetometer", f"in {run} {name} was not calibrated: {result}", "Correct that, and run again")
-    return AsMounted(run, outcome, result)
+    magnetometers = outcome.magnetometers
+    if name in magnetometers.results:
+        return AsMounted(run, outcome, magnetometers.results[name])
+    if name in magnetometers.faults:
+        why = f"in {run} {name} was not calibrated: {magnetometers.faults[name]}"
+        raise Refused("no_magnetometer", why, "Correct that, and run again")
+    raise Refused("no_magnetometer", f"{run} has no recording of a magnetometer {name}", ALIKE)
 
 
 def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-from rig.analysis.clock import ClockCheck, check_clock, state_jitter
-from rig.data.settings import Site, Uncertainty
+from rig.analysis.clock import ClockCheck, check_clock
+from rig.data.settings import RunSettings, Site, Uncertainty
+from rig.observation.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun
 
 # Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.
@@ -16,6 +17,7 @@ BETWEEN_TWO = sqrt(2 / 3)
 class Surroundings:
     """The site, what no recording shows of it, the controller's clock, and its states' jitter (s).
 
+    `extension_m` (3,) is where the sensors sit, from the flange, in its frame.
     `clock` is the one that speeds are corrected by, `clocks` what every recording that is held against others says.
     `finds_earth_rate` says that the site is not asked for the Earth's rate, `counts_freedom` as `RunSettings` does.
     """
@@ -24,19 +26,19 @@ class Surroundings:
     uncertainty: Uncertainty
     clock: ClockCheck
     state_jitter_s: float
+    extension_m: tuple[float, float, float]
     finds_earth_rate: bool = False
     state_jitter_freedom: float = inf
     counts_freedom: bool = True
     clocks: tuple[ClockCheck, ...] = ()
 
 
-def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
-    """What surrounded the sensors, by the first recording's settings; None where those of before know no site.
+def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings | None:
+    """Return what surrounded the sensors by a run's settings; None where those of before know no site.
 
     The clock is that of the longest motion, which tells it best: the controller's is one quartz in all recordings, and
     where it was another, or its computer's time was, the others tell. What was made before knows the longest alone.
     """
-    settings = recordings[0].run.settings
     if settings.site is None or settings.uncertainty is None:
         return None
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
@@ -50,6 +52,7 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
         settings.uncertainty,
         clock,
         jitter.std_s * (BETWEEN_TWO if settings.knows_returns else 1.0),
+        settings.extension_m,
         settings.finds_earth_rate,
         jitter.freedom,
         settings.counts_freedom,

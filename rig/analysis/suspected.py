@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.cut_recording import REST, Pieces
+from rig.analysis.segments import Segments
 from rig.analysis.suspicion import Damage, Suspicions
 from rig.estimation.arrays import Array
+from rig.observation.raw_readings import REST
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,52 +76,52 @@ DAMAGES: tuple[Damage[Means], ...] = (  # (k, N, 3) each
 )  # fmt: skip
 
 
-def changes(pieces: Pieces, felt: Array) -> Suspicions:
+def changes(segments: Segments, felt: Array) -> Suspicions:
     """What another scale factor of an axis, or another mounting, with time adds, by name of the check (3, N, k)."""
-    time = in_time(pieces)
-    for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
-        time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
+    time = in_time(segments)
+    for sweep in np.unique(segments.sweep):  # what changes within a sweep is that sweep's own matter
+        time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
     return {"scale_changed": per_axis(felt * time[:, None]), "loose_mounting": np.transpose(turned, (2, 1, 0))}
 
 
-def differences(pieces: Pieces, felt: Array, whole: Array | None) -> dict[str, Array | None]:
+def differences(segments: Segments, felt: Array, whole: Array | None) -> dict[str, Array | None]:
     """What a difference between directions, sweeps and rests adds, by name of the check (3, N, k).
 
     What else may differ is `whole` (3, N, k), each sweep from what the model says; None is anything at all, but of that
     the scatter within sweeps is made which the bias' wandering is found from.
     """
     found: dict[str, Array | None] = {"cw_against_ccw": per_axis(np.abs(felt)), "residuals": whole}
-    moving = pieces.sweep >= 0
+    moving = segments.sweep >= 0
     if not moving.all():
         found["sweeps_against_rests"] = per_axis(np.outer(moving, np.ones(3)))
     return found
 
 
-def of_one_axis(ways: Pieces, felt: Array) -> Array:
+def of_one_axis(ways: Segments, felt: Array) -> Array:
     """(3, N, k): another scale factor of one axis, from one sweep or way on."""
     starts = np.unique([ways.times_s[ways.sweep == sweep].min() for sweep in np.unique(ways.sweep[ways.sweep != REST])])
     later = ways.times_s.mean(axis=1)[:, None] > starts[1:]
     return np.concatenate([per_axis(felt * since[:, None]) for since in later.T], axis=2)
 
 
-def of_sweep(pieces: Pieces, sweep: int) -> Array:
+def of_sweep(segments: Segments, sweep: int) -> Array:
     """(3, N, 6): another reading in this sweep, and another in its second half than in its first."""
-    inside = (pieces.sweep == sweep).astype(np.float64)
-    return each_axis(np.column_stack([inside, inside * pieces.place]))
+    inside = (segments.sweep == sweep).astype(np.float64)
+    return each_axis(np.column_stack([inside, inside * segments.position]))
 
 
-def jumps(pieces: Pieces) -> list[Array]:
+def jumps(segments: Segments) -> list[Array]:
     """(N, 1) zero before a sweep ends and one after, for each end that rests stand on both sides of."""
-    middle = pieces.times_s.mean(axis=1)
-    ends = [pieces.times_s[pieces.sweep == sweep].max() for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
+    middle = segments.times_s.mean(axis=1)
+    ends = [segments.times_s[segments.sweep == sweep].max() for sweep in np.unique(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
-    return [step for step in steps if len(np.unique(step[pieces.sweep < 0])) > 1]
+    return [step for step in steps if len(np.unique(step[segments.sweep < 0])) > 1]
 
 
-def in_time(pieces: Pieces) -> Array:
-    """(N,) times of the pieces' middles, from −1 to 1."""
-    middle = pieces.times_s.mean(axis=1)
+def in_time(segments: Segments) -> Array:
+    """(N,) times of the segments' middles, from −1 to 1."""
+    middle = segments.times_s.mean(axis=1)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.calibration import SensorResult, found_earth_rate
-from rig.analysis.cut_recording import REST
 from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
@@ -16,6 +15,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
 from rig.estimation.vector_fit import Explained, explain
+from rig.observation.raw_readings import REST
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.settings import RunSettings, Uncertainty
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
@@ -31,13 +30,13 @@ WAVE_SHARE = 0.3  # of the error of a joint's zero, what its encoder errs once o
 class Part:
     """What one recording adds of a sensor: its turns and rests, and when its clock began by that of the first.
 
-    Its `settings` say the stage, and `mount` (3, 3) takes the flange's frame into the item's.
+    The item was mounted anew for each `stage`; `mount` (3, 3) takes the flange's frame into the item's.
     """
 
     turns: Sequence[Observation]
     rests: Sequence[Average]
     since_s: float
-    settings: RunSettings
+    stage: int
     mount: Array | None
 
 
@@ -49,13 +48,15 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     run = recordings[0].run
     parts = [
         Part(
-            each.sensors[sensor].revolutions, each.sensors[sensor].rests, since_s, each.run.settings, each.motion.mount
+            recording.sensors[sensor].revolutions,
+            recording.sensors[sensor].rests,
+            recording.clock_offset_s,
+            recording.run.settings.stage,
+            recording.motion.mount,
         )
-        for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        for recording in recordings
     ]
     seen = put_together(parts, surroundings)
-    if not run.settings.knows_sensor:
-        return seen
     averages = [average for part in parts for average in (turn.average for turn in part.turns)]
     averages += [rest for part in parts for rest in part.rests]
     return replace(seen, sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages))
@@ -63,15 +64,15 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
 
 def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
     """What all parts of a run tell, the turns before the rests, without what is known of the sensor."""
-    site, settings = surroundings.site, parts[0].settings
+    site, extension_m = surroundings.site, np.array(surroundings.extension_m)
     turns = [(turn, part.since_s) for part in parts for turn in part.turns]
     rests = [(rest, part.since_s) for part in parts for rest in part.rests]
     placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    arms_m = np.concatenate([arms_of(each.turns, settings, each.mount) for each in parts])
-    mounted = [each.settings.stage for each in parts for _ in each.turns]
+    arms_m = np.concatenate([lever_arms_m(each.turns, extension_m, each.mount) for each in parts])
+    mounted = [part.stage for part in parts for _ in part.turns]
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -84,9 +85,7 @@ def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
-        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty)
-        if settings.knows_returns
-        else None,
+        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
@@ -121,14 +120,14 @@ def known_sensor(
     )
 
 
-def arms_of(turns: Sequence[Observation], settings: RunSettings, mount: Array | None = None) -> Array:
-    """(M, 3) from the axis that turns to where the sensors sit, in the item's frame; zero where it is left out.
+def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
+    """Return (M, 3) from the axis that turns to where the sensors sit, in the item's frame; zero where no arm tells.
 
     The `mount` (3, 3) takes the flange's frame, in which the extension stands, into the item's; None: they are one.
     """
-    extension_m = np.array(settings.extension_m) if mount is None else mount @ np.array(settings.extension_m)
-    known = [turn.arm_m + extension_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
-    return np.reshape(known, (-1, 3)) * settings.knows_own_motion
+    mounted_m = extension_m if mount is None else mount @ extension_m
+    known_m = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
+    return np.reshape(known_m, (-1, 3))
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
@@ -189,25 +188,6 @@ def _visits(turns: Sequence[Observation]) -> list[list[int]]:
         else:
             found.append([place])
     return found
-
-
-def since_first_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """What takes the controller's times of each recording to the clock of the first: it may have been switched off.
-
-    No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
-    accelerated laboratory's time passes faster.
-    """
-    first = recordings[0]
-    since_s = [0.0]
-    for last, each in pairwise(recordings):
-        by_the_computer = (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0])
-        ended = float(last.motion.time_s[-1]) + since_s[-1]
-        since_s.append(max(by_the_computer, ended) - float(each.motion.time_s[0]))
-    return since_s
-
-
-def _started(recording: ObservedRun) -> datetime:
-    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def known_of(surroundings: Surroundings, name: str, part: str) -> Known:

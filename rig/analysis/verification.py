@@ -15,8 +15,8 @@ from rig.analysis.comparison import Comparison, Reference, compare, turns_of
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.finished import finished_sweeps
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,14 +12,16 @@ from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
+from rig.observation.arm_rests import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream, between, steps_of
 from rig.observation.averaging import dwelling_of
 from rig.observation.lost_samples import lost_samples
 from rig.observation.mean import Mean
-from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Dwelt, Window, dwelt
+from rig.observation.windows import Dwelt, Window, dwelt
 
 LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
 
@@ -51,14 +53,17 @@ def dwell_readings(
             yield _dwell_reading(run, stream, motion, each, settings)
 
 
-def each_dwell(
+def read_each_dwell(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
-) -> dict[int, DwellReading | Fault]:
-    """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
+) -> Attempts[int, DwellReading]:
+    """Read every finished dwell by itself; return the readings, and why there is none, by the dwell's index.
+
+    There is nothing of a sensor without accelerations.
+    """
     if not stream.sensor.measures(ACCELERATION):
-        return {}
+        return Attempts()
     read = partial(_dwell_reading, run, stream, motion, settings=settings)
-    return {each.dwell.index: or_fault(partial(read, each)) for each in dwelt(run)}
+    return attempt_each({finished.dwell.index: partial(read, finished) for finished in dwelt(run)})
 
 
 def accelerations(stream: Stream, inside: slice) -> Array:

@@ -6,30 +6,19 @@ it; else what they tell of each other does.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.rounding import Steps, rounding_left
+from rig.estimation.rounding import Steps
 from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import LineSearch, find_lines, fitted, waves
-from rig.observation.mean import Mean
+from rig.observation.mean import Mean, Noise, weighted_means, whole
 from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
 
 FEWEST = 120  # readings, of which lines can be told from noise
 BRIEF = (1, 2)  # memories that know a colour, and nothing of what may be left of a line
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Noise of readings beside lines: the `scatter` (3,) variance of one, what of it counts `in_a_mean` (3,)
-    over long, and with how many degrees of `freedom` (3,) that is known."""
-
-    scatter: Array
-    in_a_mean: Array
-    freedom: Array
 
 
 def rest_beside_lines(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
@@ -39,16 +28,9 @@ def rest_beside_lines(readings: Array, time_s: Array, window: Window, steps: Ste
     columns = np.column_stack([np.ones(len(left)), shaking])
     smooth = columns @ fitted(columns, left)
     noise = noise_of(left - smooth, columns.shape[1], steps, BRIEF if shaking.size else MEMORIES)
-    rounding = rounding_left(readings, steps, smooth, noise.scatter)
-    shares = weights(time_s, window.start_s, window.end_s)
-    return Mean(
-        mean=shares @ readings,
-        variance=noise.in_a_mean * float(shares @ shares) + rounding,
-        noise=np.sqrt(noise.scatter),
-        samples=len(readings),
-        freedom=noise.freedom,
-        rounding=rounding,
-    )
+    tapered = weights(time_s, window.start_s, window.end_s)[None]
+    (mean,) = weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
+    return mean
 
 
 def swinging(residuals: Array) -> Array:

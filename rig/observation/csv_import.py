@@ -32,7 +32,6 @@ from rig.observation.csv_windows import (
     average_of,
     check_complete,
     check_overlap,
-    check_reads,
     check_scattered,
     check_times,
     overlapping,
@@ -40,6 +39,7 @@ from rig.observation.csv_windows import (
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.omitted import Omitted
 from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.stuck_check import check_reads
 from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window, inside
 

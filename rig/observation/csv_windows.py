@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.data.quantity import Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
@@ -32,19 +31,6 @@ def check_times(time_s: Array, where: str = "the samples") -> None:
             "time_not_increasing",
             what,
             "Give every sample once, in the order of time, on one clock, with all digits of its time",
-        )
-
-
-def check_reads(readings: Array, quantity: Quantity) -> None:
-    """Raises Fault `stuck_sensor` where an axis of readings (n, 3) has one and the same value in all of them."""
-    still = np.ptp(readings, axis=0) == 0 if len(readings) else np.zeros(3, bool)
-    stuck = [int(axis) for axis in np.flatnonzero(still)]
-    if stuck:
-        axes = " and ".join(quantity.axes[axis] for axis in stuck)
-        raise Fault(
-            "stuck_sensor",
-            f"the {quantity.sensor} reads {readings[0, stuck[0]]:g} {quantity.unit} on {axes} in every sample",
-            "Check which columns hold its axes, its supply and its bus wires, then record again",
         )
 
 

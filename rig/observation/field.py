@@ -12,10 +12,11 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading, check_complete
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import steps_of
 from rig.observation.mean import Held, Mean, even_mean
 from rig.observation.observed_run import ObservedRun, one_clock
-from rig.observation.windows import MIN_SAMPLES_AT_REST, Window, inside, rested
+from rig.observation.windows import Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
 SETTLING_S = 0.2  # kept away from either end of a rest

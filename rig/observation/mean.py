@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
-from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.mean_weights import even_groups
 from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.coloured_noise import Left, left_of
 from rig.observation.tapered_weights import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
@@ -34,6 +35,19 @@ class Mean:
 
 
 @dataclass(frozen=True, slots=True)
+class Noise:
+    """Noise of single readings in any unit, by axis.
+
+    `scatter` (3,) is the variance of one reading, `in_a_mean` (3,) what of it counts in a mean over long, `freedom`
+    (3,) the degrees of freedom of that.
+    """
+
+    scatter: Array
+    in_a_mean: Array
+    freedom: Array | float
+
+
+@dataclass(frozen=True, slots=True)
 class Held:
     """A mean `reading` of what was held still: in a dwell of the procedure, by its `index`, or a placement of a file.
 
@@ -48,23 +62,65 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadAtRest:
-    """What was read of a `quantity` in one dwell, by its `index` and name, or the Fault for which there is no mean.
-
-    `expected` is the size that it is known to have there, in SI units, None where that was not said.
-    """
+class QuantityInDwell:
+    """A `quantity` of a sensor in one dwell, by its `index`; its name is empty where nothing tells it."""
 
     sensor: str
     quantity: Quantity
     index: int
-    dwell: str
-    reading: Mean | Fault
+    dwell: str = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadAtRest:
+    """The mean `reading` of a quantity in one dwell.
+
+    `expected` is the size that it is known to have there, in SI units, None where that was not said.
+    """
+
+    of: QuantityInDwell
+    reading: Mean
     expected: float | None
 
 
 def by_axis(freedom: Iterable[Array | float]) -> Array:
     """(N, 3) degrees of freedom of N means' variances, of which some are known for all axes alike."""
     return np.array([np.broadcast_to(each, 3) for each in freedom])
+
+
+def weighted_means(
+    readings: Array, groups: Array, weights: Array, *, smooth: Array, noise: Noise, steps: Steps
+) -> tuple[Mean, ...]:
+    """Return the means of p groups of readings by their weights: one group is a whole window, several its segments.
+
+    readings (n, 3): in any unit, recorded in `steps`. groups (n, p): above zero where a reading belongs to a group.
+    weights (p, n): those of each group add up to one over its readings; those of others leave nothing of nuisance
+    columns (`rig.estimation.mean_weights`). smooth (n, 3): the part of the readings that is no noise. What rounding
+    leaves in a mean, however many readings it has, is part of its variance.
+    """
+    return tuple(
+        _weighted_mean(readings, own > 0, row, smooth=smooth, noise=noise, steps=steps)
+        for own, row in zip(groups.T, weights, strict=True)
+    )
+
+
+def _weighted_mean(
+    readings: Array, own: NDArray[np.bool_], weights: Array, *, smooth: Array, noise: Noise, steps: Steps
+) -> Mean:
+    rounding = rounding_left(readings[own], steps, smooth[own], noise.scatter)
+    return Mean(
+        mean=weights @ readings,
+        variance=noise.in_a_mean * float(weights @ weights) + rounding,
+        noise=np.sqrt(noise.scatter),
+        samples=int(np.count_nonzero(own)),
+        freedom=noise.freedom,
+        rounding=rounding,
+    )
+
+
+def whole(readings: Array) -> Array:
+    """Return the groups (n, 1) of readings (n, 3) that are all of one mean."""
+    return even_groups(np.zeros(len(readings), dtype=np.intp), 1)
 
 
 def even_mean(readings: Array, steps: Steps, left: Callable[[Array], Left] = left_of) -> Mean:
@@ -75,17 +131,16 @@ def even_mean(readings: Array, steps: Steps, left: Callable[[Array], Left] = lef
     added.
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
-    rounding = rounding_left(readings, steps, np.zeros(readings.shape), variance)
     coloured = [left(axis) for axis in (readings - readings.mean(axis=0)).T]
-    factor = np.array([each.factor for each in coloured])
-    return Mean(
-        mean=readings.mean(axis=0),
-        variance=variance * factor / len(readings) + rounding,
-        noise=np.sqrt(variance),
-        samples=len(readings),
-        freedom=np.array([each.freedom for each in coloured]),
-        rounding=rounding,
+    noise = Noise(
+        scatter=variance,
+        in_a_mean=variance * np.array([axis.factor for axis in coloured]),
+        freedom=np.array([axis.freedom for axis in coloured]),
     )
+    groups = whole(readings)
+    still = np.zeros(readings.shape)
+    (mean,) = weighted_means(readings, groups, groups.T / len(readings), smooth=still, noise=noise, steps=steps)
+    return mean
 
 
 def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
@@ -107,15 +162,10 @@ def tapered_mean(readings: Array, time_s: Array, window: Window, steps: Steps) -
 
     The variance is that of the noise without the vibration, which the weights leave nothing of.
     """
-    shares = weights(time_s, window.start_s, window.end_s)
     variance = np.maximum(np.var(readings, axis=0, ddof=1), steps.variance)
     at_zero = np.minimum(noise_at_zero(readings), variance)
-    rounding = rounding_left(readings, steps, np.zeros(readings.shape), variance)
-    return Mean(
-        mean=shares @ readings,
-        variance=at_zero * float(shares @ shares) + rounding,
-        noise=np.sqrt(variance),
-        samples=len(readings),
-        freedom=np.full(3, freedom_at_zero(len(readings))),
-        rounding=rounding,
-    )
+    noise = Noise(scatter=variance, in_a_mean=at_zero, freedom=np.full(3, freedom_at_zero(len(readings))))
+    tapered = weights(time_s, window.start_s, window.end_s)[None]
+    still = np.zeros(readings.shape)
+    (mean,) = weighted_means(readings, whole(readings), tapered, smooth=still, noise=noise, steps=steps)
+    return mean

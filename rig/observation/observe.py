@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_motion import ArmMotion, is_sparse
+from rig.observation.arm_rests import bias_drift, place, rests_of
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
-from rig.observation.averaging import Averaging, averaging_of
+from rig.observation.averaging import averaging_of
 from rig.observation.lines import BEATS, turning
 from rig.observation.lost_samples import lost_samples
 from rig.observation.revolution import Revolution, arm_states_lost, describe
@@ -33,13 +35,11 @@ from rig.observation.stuck_check import check_dwells, check_other_way, check_res
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
-from rig.observation.windows import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST, Finished, Window, rested, swept
+from rig.observation.windows import Finished, Window, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 FROZEN = 0.5  # of the rate of a sweep, by which an axis that repeats one reading must misread it
-REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
-MIN_RESTS = 3  # to tell whether the bias drifts
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,12 +127,12 @@ def observe_sensor(
     )
 
 
-def each_sweep(
+def observe_each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
-) -> dict[int, Observation | Fault]:
-    """Every finished sweep's observation, or why there is none, by the sweep's index."""
-    seen = partial(_revolution, run, stream, motion, settings=settings)
-    return {each.sweep.index: or_fault(partial(seen, each)) for each in swept(run)}
+) -> Attempts[int, Observation]:
+    """Observe every finished sweep by itself; return the observations, and why there is none, by the sweep's index."""
+    observe = partial(_revolution, run, stream, motion, settings=settings)
+    return attempt_each({finished.sweep.index: partial(observe, finished) for finished in swept(run)})
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:
@@ -151,19 +151,6 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
     check_dwells(dwells, run.settings.site)
 
 
-def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
-    """The rests in which the arm stood still for long enough, without those beside a step in `superseded`."""
-    found = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
-    return tuple(rest for rest in found if rest is not None)
-
-
-def standing(motion: ArmMotion, rest: Window) -> Window | None:
-    """A rest without its beginning and its end; None where the arm moved in it or too few states tell."""
-    still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
-    moved_rad = motion.moved_rad(still)
-    return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
-
-
 def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
@@ -173,27 +160,6 @@ def _revolution(
         averaging = averaging_of(run.settings)
         return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
     return seen
-
-
-def bias_drift(rests: Sequence[Average]) -> Array:
-    """(3,) variance in (rad/s)² by which the bias differs from rest to rest, beyond what the noise of a rest explains.
-
-    Zero unless that is significant over all axes (χ² at 0.999), so that a steady sensor is left alone.
-    """
-    from scipy.special import chdtri
-
-    if len(rests) < MIN_RESTS:
-        return np.zeros(3)
-    means = np.array([rest.mean_rad_s for rest in rests])
-    noise = np.array([rest.variance_rad2_s2 for rest in rests]).mean(axis=0)
-    scatter = means.var(axis=0, ddof=1)
-    freedom = len(rests) - 1
-    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.001)
-    return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
-
-
-def _placed(average: Average, motion: ArmMotion) -> Average:
-    return replace(average, attitude=motion.attitude(average.start_s, average.end_s))
 
 
 def _drifting(average: Average, drift: Array) -> Average:
@@ -214,7 +180,7 @@ def _observation(
     sampled = _sampled(stream.time_s[inside], motion, turn, covered)
     readings = stream.readings_rad_s[inside][covered]
     found, weights = turn_mean(readings, stream.steps, sampled)
-    average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
+    average = place(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_frozen(readings, turned, turn.speed_rad_s * expected, where)
@@ -260,19 +226,6 @@ def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArra
         closed=turn.closed,
         complete=bool(covered.all()) and not is_sparse(time_s),
     )
-
-
-def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averaging) -> Average | None:
-    """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
-    still = standing(motion, window)
-    if still is None:
-        return None
-    inside = between(stream, still.start_s, still.end_s)
-    if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
-        return None
-    readings = stream.readings_rad_s[inside]
-    found, lasting = averaging.rested(readings, stream.time_s[inside], still, stream.steps)
-    return _placed(averaged(stream, inside, lasting, found), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

@@ -1,7 +1,9 @@
 """A recording and all it tells: the arm's motion, and of each sensor its time, its revolutions and its rests."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -13,9 +15,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.over_temperature import OverTemperature
 from rig.observation.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.average import Stream, on_clock
+from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
-from rig.observation.windows import finished_dwells, finished_sweeps
 
 AS_STATED: Mapping[int, Array] = MappingProxyType({})  # no stage's mount is known to be off
 
@@ -32,13 +34,15 @@ class Delay:
 class ObservedRun:
     """One recording, observed once; `sensors` by name.
 
-    By `polynomials` its readings were taken to one temperature, and are whenever they are asked for.
+    By `polynomials` its readings were taken to one temperature, and are whenever they are asked for. `clock_offset_s`
+    takes its times to the clock of the first recording of its run.
     """
 
     run: RunData
     motion: ArmMotion
     sensors: Mapping[str, SensorObservations]
     polynomials: Mapping[str, Mapping[Quantity, OverTemperature]] = field(default_factory=dict)
+    clock_offset_s: float = 0.0
 
     def stream(self, sensor: str) -> Stream:
         """A sensor's samples in rad/s on the arm's clock."""
@@ -107,11 +111,34 @@ def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATE
     """
     for run in runs:
         turner_of(run)
-    return tuple(
+    recordings = [
         observe_run(run, runs[0].settings.observation, _repeated(runs, place), turned.get(run.settings.stage))
         for place, run in enumerate(runs)
         if _finished(run) - _repeated(runs, place)
+    ]
+    offsets_s = _clock_offsets_s(recordings)
+    return tuple(
+        replace(recording, clock_offset_s=offset_s) for recording, offset_s in zip(recordings, offsets_s, strict=True)
     )
+
+
+def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
+    """Return what takes the times of each recording to the clock of the first: the controller may have been off.
+
+    No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
+    accelerated laboratory's time passes faster.
+    """
+    offsets_s = [0.0] * bool(recordings)
+    for last, recording in pairwise(recordings):
+        first_s = float(recordings[0].motion.time_s[0])
+        by_computer_s = (_started(recording) - _started(recordings[0])).total_seconds() + first_s
+        ended_s = float(last.motion.time_s[-1]) + offsets_s[-1]
+        offsets_s.append(max(by_computer_s, ended_s) - float(recording.motion.time_s[0]))
+    return offsets_s
+
+
+def _started(recording: ObservedRun) -> datetime:
+    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def _repeated(runs: Sequence[RunData], place: int) -> frozenset[int]:

@@ -13,7 +13,8 @@ from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
-from rig.observation.windows import Window, finished_sweeps
+from rig.observation.finished import finished_sweeps
+from rig.observation.windows import Window
 
 
 def revolution_on_the_board(

@@ -6,11 +6,13 @@ from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.observation.acceleration import DwellReading, each_dwell
+from rig.observation.acceleration import read_each_dwell
 from rig.observation.arm_motion import ArmMotion, motion_of
+from rig.observation.arm_rests import rests_of
 from rig.observation.average import Stream, between, on_the_arms_clock
-from rig.observation.observe import check_feeling, each_sweep, rests_of
-from rig.observation.windows import Window, finished_dwells, finished_sweeps
+from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.observe import check_feeling, observe_each_sweep
+from rig.observation.windows import Window
 
 SPIKE = 8.0  # of the readings' own deviation: one reading in 1e15
 
@@ -39,18 +41,16 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
     """Sweeps and dwells that a sensor read soundly: none if it once did not feel the arm; since when nobody knows."""
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-        readings = each_dwell(run, stream, motion, settings)
-        dwells = [each for each in readings.values() if isinstance(each, DwellReading)]
-        check_feeling(run, rests_of(run, stream, motion), dwells)
+        dwells = read_each_dwell(run, stream, motion, settings)
+        check_feeling(run, rests_of(run, stream, motion), list(dwells.results.values()))
     except Fault:
         return frozenset()
-    sweeps = each_sweep(run, stream, motion, settings)
-    refused = {index for index, each in {**sweeps, **readings}.items() if isinstance(each, Fault)}
-    turns = {i: Window(o.average.start_s, o.average.end_s) for i, o in sweeps.items() if not isinstance(o, Fault)}
-    spiky = {
-        i for i, window in {**turns, **{each.index: each.window for each in dwells}}.items() if _spiky(stream, window)
-    }
-    return (finished_sweeps(run) | finished_dwells(run)) - refused - spiky
+    sweeps = observe_each_sweep(run, stream, motion, settings)
+    windows = {index: dwell.window for index, dwell in dwells.results.items()}
+    for index, turn in sweeps.results.items():
+        windows[index] = Window(turn.average.start_s, turn.average.end_s)
+    spiky = {index for index, window in windows.items() if _spiky(stream, window)}
+    return (finished_sweeps(run) | finished_dwells(run)) - sweeps.faults.keys() - dwells.faults.keys() - spiky
 
 
 def _spiky(stream: Stream, window: Window) -> bool:

@@ -5,8 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.data.quantity import Quantity
 from rig.data.settings import Site
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
@@ -52,3 +54,16 @@ def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
         felt_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
         if differ > TURNED and felt_m_s2 < FELT * differ * site.gravity_m_s2:
             raise Fault("stuck_sensor", f"the accelerometer reads the same in {one.name} and {other.name}", REMEDY)
+
+
+def check_reads(readings: Array, quantity: Quantity) -> None:
+    """Raise Fault `stuck_sensor` if an axis of readings (n, 3) has one and the same value in all of them."""
+    still = np.ptp(readings, axis=0) == 0 if len(readings) else np.zeros(3, bool)
+    stuck = [int(axis) for axis in np.flatnonzero(still)]
+    if stuck:
+        axes = " and ".join(quantity.axes[axis] for axis in stuck)
+        raise Fault(
+            "stuck_sensor",
+            f"the {quantity.sensor} reads {readings[0, stuck[0]]:g} {quantity.unit} on {axes} in every sample",
+            "Check which columns hold its axes, its supply and its bus wires, then record again",
+        )

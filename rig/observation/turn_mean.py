@@ -8,17 +8,17 @@ weights then make the mean of the arm's rate: whatever they do to a ripple they 
 What is left of the readings beside lines and rate is the noise, which is white more often than not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.mean_weights import even_groups, mean_weights
-from rig.estimation.rounding import Steps, rounding_left
+from rig.estimation.mean_weights import mean_weights
+from rig.estimation.rounding import Steps
 from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
 from rig.observation.coloured_noise import MEMORIES
 from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, turning, unit_columns, waves, wide
-from rig.observation.mean import Mean
+from rig.observation.mean import Mean, weighted_means, whole
 
 SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
 UNSEEN = LineSearch(slowest=5.0)
@@ -70,35 +70,26 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation, or what one of
     its size does.
     """
-    ones = even_groups(np.zeros(len(readings), dtype=np.intp), 1)
+    ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])
     lines = _lines(readings, steady, turn)
     shaking = waves(lines.cycles, turn.share, turn.beats)
-    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))[0]
+    weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))
     columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.seen]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
     noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.unseen else MEMORIES)
-    rounding = rounding_left(readings, steps, smooth, noise.scatter)
+    (mean,) = weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
     slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
     changed = np.zeros(3)
     if slow.any():
         beside = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
-        without = mean_weights(ones, beside)[0]
+        without = mean_weights(ones, beside)
         even = _beside(np.column_stack([ones, turn.uneven_rad_s]), readings)
         left = _beside(np.column_stack([ones, beside, lines.seen]), readings)
-        by_size = _by_size(shaking[:, slow], weights - without, left)
-        changed = np.maximum(((weights - without) @ even) ** 2, by_size)
-    mean = Mean(
-        mean=weights @ readings,
-        variance=noise.in_a_mean * float(weights @ weights) + changed + rounding,
-        noise=np.sqrt(noise.scatter),
-        samples=len(readings),
-        freedom=noise.freedom,
-        cycles=lines.cycles,
-        rounding=rounding,
-    )
-    return mean, weights
+        change = (weights - without)[0]
+        changed = np.maximum((change @ even) ** 2, _by_size(shaking[:, slow], change, left))
+    return replace(mean, variance=mean.variance + changed, cycles=lines.cycles), weights[0]
 
 
 def _by_size(slow: Array, weights: Array, left: Array) -> Array:

@@ -11,9 +11,10 @@ import numpy as np
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.known_turns import Gyroscope, Mean, Turn
+from rig.observation.arm_rests import bias_drift
 from rig.observation.average import Average
 from rig.observation.csv_windows import average_of
-from rig.observation.observe import Observation, bias_drift
+from rig.observation.observe import Observation
 from rig.observation.rests import find_rests
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window, inside

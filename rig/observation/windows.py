@@ -19,8 +19,6 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.motion.steps import Dwell, Sweep
 
-MAX_TRAVEL_AT_REST_RAD = 1e-3  # of any joint, while it stands
-MIN_SAMPLES_AT_REST = 20
 Ending = TypeVar("Ending", bound=Event)
 
 
@@ -74,16 +72,6 @@ def dwelt(run: RunData) -> Iterator[Dwelt]:
     """The dwells that were begun and finished, in order."""
     for event, window in _between(run, DwellStarted, DwellFinished):
         yield Dwelt(event.dwell, window)
-
-
-def finished_sweeps(run: RunData) -> frozenset[int]:
-    """The indices of the sweeps a recording holds from start to end."""
-    return frozenset(finished.sweep.index for finished in swept(run))
-
-
-def finished_dwells(run: RunData) -> frozenset[int]:
-    """Indices of the dwells that were finished."""
-    return frozenset(each.dwell.index for each in dwelt(run))
 
 
 def _beside(run: RunData, rest: Window, superseded: Collection[int]) -> bool:

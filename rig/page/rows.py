@@ -9,11 +9,11 @@ import numpy as np
 from rig.analysis.partial_results import SoFar, Turned
 from rig.data.quantity import RATE, Unit
 from rig.data.result_file import ResultDocument
-from rig.errors import Fault
+from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
-from rig.observation.mean import ReadAtRest
+from rig.observation.mean import QuantityInDwell, ReadAtRest
 from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
 from rig.report.kinds.kind import Shown, Three
@@ -59,14 +59,11 @@ def along(axis_flange: Sequence[float] | Array) -> float:
 
 def dwell_row(read: ReadAtRest) -> Row:
     """What was read in an attitude: the size of it stands beside the one that is expected, in the unit on a screen."""
-    quantity, reading = read.quantity, read.reading
-    row: Row = {"sensor": quantity.of(read.sensor), "sweep": read.index, "by": "host", "dwell": read.dwell}
-    if isinstance(reading, Fault):
-        return {**row, "refused": str(reading)}
+    quantity, reading = read.of.quantity, read.reading
     mean, size, unit = reading.mean, float(np.linalg.norm(reading.mean)), quantity.reading
     axis, sign = nearest_axis(mean)
     return {
-        **row,
+        **_dwell(read.of),
         "towards": f"{'+' if sign > 0 else '−'}{axis} {quantity.towards}",
         "size": size / unit.size,
         "std": float(np.sqrt(mean**2 @ reading.variance)) / size / unit.size if size else None,
@@ -77,11 +74,15 @@ def dwell_row(read: ReadAtRest) -> Row:
     }
 
 
+def _dwell(of: QuantityInDwell) -> Row:
+    return {"sensor": of.quantity.of(of.sensor), "sweep": of.index, "by": "host", "dwell": of.dwell}
+
+
 def look_of(partial: SoFar) -> Look:
     """What is known of a run that goes on."""
     sensors = partial.gyroscopes
-    observations = [_sweep(name, sweep, each) for name, one in sensors.items() for sweep, each in one.sweeps.items()]
-    observations += map(dwell_row, partial.at_rest)
+    observations = [row for name, sensor in sensors.items() for row in _sweep_rows(name, sensor.sweeps)]
+    observations += _dwell_rows(partial.at_rest)
     return Look(observations, [_parameters_so_far(name, one) for name, one in sensors.items()])
 
 
@@ -90,10 +91,19 @@ def parameter_rows(result: ResultDocument) -> list[Row]:
     return [_row(each) for each in shown(result)]
 
 
-def _sweep(sensor: str, sweep: int, observation: Observation | Fault) -> Row:
-    if isinstance(observation, Observation):
-        return observation_row(sensor, observation)
-    return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(observation)}
+def _sweep_rows(sensor: str, sweeps: Attempts[int, Observation]) -> list[Row]:
+    """Return the rows of a gyroscope's sweeps in the order of the plan."""
+    rows = {index: observation_row(sensor, observation) for index, observation in sweeps.results.items()}
+    for index, fault in sweeps.faults.items():
+        rows[index] = {"sensor": sensor, "sweep": index, "by": "host", "refused": str(fault)}
+    return [row for _, row in sorted(rows.items())]
+
+
+def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
+    """Return the rows of all dwells, by sensor in the order of the plan."""
+    rows = {of: dwell_row(read) for of, read in dwells.results.items()}
+    rows |= {of: {**_dwell(of), "refused": str(fault)} for of, fault in dwells.faults.items()}
+    return [rows[of] for of in sorted(rows, key=lambda of: (of.sensor, of.index))]
 
 
 def _parameters_so_far(name: str, partial: Turned) -> Row:

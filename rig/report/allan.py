@@ -30,13 +30,12 @@ def print_at_rest(sensors: Mapping[str, SensorAtRest], *, as_json: bool) -> None
         return
     console = Console(highlight=False)
     for name, each in sensors.items():
-        for quantity, seen in each.quantities.items():
-            if isinstance(seen, Fault):
-                console.print(plain(f"{name}, {quantity}: {seen}"))
-                continue
+        for quantity, seen in each.quantities.results.items():
             console.print(_table(_titled(f"{name}, {quantity}", each), quantity, seen))
             for line in _lines(seen):
                 console.print(plain(line))
+        for quantity, fault in each.quantities.faults.items():
+            console.print(plain(f"{name}, {quantity}: {fault}"))
 
 
 def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
@@ -46,10 +45,8 @@ def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
         "sensors": {
             name: {
                 **({} if (s := each.sensor) is None else {"part": s.part, "serial_number": s.serial_number}),
-                **{
-                    quantity.name: {"error": str(seen)} if isinstance(seen, Fault) else _entry(quantity, seen)
-                    for quantity, seen in each.quantities.items()
-                },
+                **{quantity.name: _entry(quantity, seen) for quantity, seen in each.quantities.results.items()},
+                **{quantity.name: {"error": str(fault)} for quantity, fault in each.quantities.faults.items()},
             }
             for name, each in sensors.items()
         },
@@ -62,7 +59,7 @@ def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path
 
     written = []
     for name, each in sensors.items():
-        curves = {quantity: seen for quantity, seen in each.quantities.items() if isinstance(seen, AtRest)}
+        curves = each.quantities.results
         if not curves:
             continue
         with style():

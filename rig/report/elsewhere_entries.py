@@ -127,12 +127,11 @@ def _followed(increments: InIncrements) -> FollowedEntry:
 
 
 def _rates_beside(attitudes: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
-    return {
-        method: ErrorEntry(error=str(other))
-        if isinstance(other, Fault)
-        else entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
-        for method, other in attitudes.beside.items()
+    entries: dict[str, BesideEntry | ErrorEntry] = {
+        method: entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
+        for method, other in attitudes.beside.results.items()
     }
+    return entries | {method: ErrorEntry(error=str(fault)) for method, fault in attitudes.beside.faults.items()}
 
 
 def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:

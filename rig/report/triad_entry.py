@@ -1,6 +1,7 @@
 """Entries of sensors of three axes that were held still in attitudes: by an arm, or in those that a file tells."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic
 
 import numpy as np
@@ -60,7 +61,7 @@ def triad_entry(
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),
         dwells=[_dwell_entry(models, *each) for each in zip(dwells, left[0], left[1], strict=True)],
-        beside={method: _beside_entry(models, other) for method, other in result.beside.items()},
+        beside=result.beside.by_key(partial(_beside_entry, models), error_entry),
         **more,
     )  # fmt: skip
 
@@ -83,10 +84,13 @@ def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
     return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": known}
 
 
-def _beside_entry(models: Models[Any], other: TriaxialSolution | Fault) -> Entry:
-    """Another method's solution, or why it has none."""
-    if isinstance(other, Fault):
-        return ErrorEntry(error=str(other))
+def error_entry(fault: Fault) -> Entry:
+    """Return the entry of what has no solution."""
+    return ErrorEntry(error=str(fault))
+
+
+def _beside_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
+    """Return the entry of another method's solution."""
     return entry(models.beside, other, scale=scale_of(other.matrix), **{models.quantity.named("bias"): other.bias})
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rig.analysis.calibration import SensorResult
-from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.onboard_check import check_observed
 from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
@@ -23,7 +22,7 @@ from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, ProblemError, Refused
 from rig.motion.steps import Plan
 from rig.observation.acceleration import DwellReading
-from rig.observation.mean import Held, ReadAtRest
+from rig.observation.mean import Held, QuantityInDwell, ReadAtRest
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
@@ -270,11 +269,10 @@ def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead
     for name, found in outcome.accelerometers.items():
         for dwell in (*found.dwells, *(found.held_out.dwells if found.held_out else ())):
             yield _read(name, ACCELERATION, dwell, found.gravity_m_s2)
-    for name, solved in outcome.magnetometers.items():
-        if isinstance(solved, MagnetometerResult):
-            for each in solved.dwells:
-                yield _read(name, FIELD, each, solved.field_t)
+    for name, solved in outcome.magnetometers.results.items():
+        for each in solved.dwells:
+            yield _read(name, FIELD, each, solved.field_t)
 
 
 def _read(name: str, quantity: Quantity, dwell: DwellReading | Held, expected: float) -> AttitudeRead:
-    return AttitudeRead(ReadAtRest(name, quantity, dwell.index, dwell.name, dwell.reading, expected))
+    return AttitudeRead(ReadAtRest(QuantityInDwell(name, quantity, dwell.index, dwell.name), dwell.reading, expected))

@@ -23,9 +23,7 @@ def run() -> RunData:
 
 
 def rates(run: RunData) -> AtRest:
-    found = at_rest([run])["gyro"].quantities[RATE]
-    assert isinstance(found, AtRest)
-    return found
+    return at_rest([run])["gyro"].quantities.results[RATE]
 
 
 def test_random_walk_is_found_in_the_rests_between_sweeps(run: RunData) -> None:

@@ -8,10 +8,11 @@ import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.analysis.check import Check
-from rig.analysis.clock import check_clock, state_jitter
+from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.run_file import RunData
 from rig.data.settings import Uncertainty
+from rig.observation.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run

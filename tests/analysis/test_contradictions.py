@@ -10,12 +10,12 @@ from rig.analysis.analyses import calibrated
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
-from rig.analysis.cut_recording import Window
 from rig.analysis.readings import judge_readings
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.raw_readings import RawReadings
 from support.damaged_readings import (
     Damage,
     Mask,
@@ -137,11 +137,11 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
 def judged(run: RunData) -> tuple[tuple[Check, ...], Array, Array]:
     """The checks, the six parameters and their standard deviations. Raises Fault."""
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
     results = solve_observed(run.sensors, recordings, surroundings=surroundings)
     solution = results["gyro"].solution
     found = np.concatenate([solution.scale, solution.bias_rad_s])
-    checks = contradictions(recordings, results, ["gyro"], surroundings).checks
+    checks = contradictions(recordings, results, ["gyro"], surroundings, recordings[0].run.settings).checks
     return checks, found, np.sqrt(np.diag(solution.covariance))
 
 
@@ -247,7 +247,7 @@ def test_an_arm_that_vibrates_under_a_quiet_sensor_is_no_stuck_bit(rms_counts: f
         for sweep in range(6):
             swing = rms_counts * np.sqrt(2) * np.sin(2 * np.pi * 14 * time_s + rng.uniform(0, 2 * np.pi, 3))
             counts = np.round(rng.uniform(-50, 50, 3) + swing + 1.03 * rng.standard_normal((len(time_s), 3)))
-            windows.append(Window(sweep, counts.astype(np.int64), counts - counts.mean(axis=0), np.zeros(3)))
+            windows.append(RawReadings(sweep, counts.astype(np.int64), counts - counts.mean(axis=0), np.zeros(3)))
         stuck, _ = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["stuck_bit"]
         assert stuck == 0, seed
 
@@ -256,7 +256,7 @@ def test_a_low_bit_that_is_stuck_is_found_under_vibration_too() -> None:
     rng = np.random.default_rng(1)
     swing = 12 * np.sin(2 * np.pi * 14 * np.arange(520)[:, None] / 200)
     counts = np.round(swing + 5 * rng.standard_normal((520, 3))).astype(np.int64) & ~1
-    window = Window(0, counts, counts - counts.mean(axis=0), np.zeros(3))
+    window = RawReadings(0, counts, counts - counts.mean(axis=0), np.zeros(3))
     stuck, _ = judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"]
     assert stuck >= 3
 
@@ -264,9 +264,9 @@ def test_a_low_bit_that_is_stuck_is_found_under_vibration_too() -> None:
 def test_a_rest_of_few_readings_is_held_against_the_noise_of_longer_ones() -> None:
     """The run was interrupted in it: of twenty readings, half may lie close together by chance."""
     rng = np.random.default_rng(1)
-    windows = [Window(sweep, *_noisy(rng, 280), np.zeros(3)) for sweep in range(6)]
+    windows = [RawReadings(sweep, *_noisy(rng, 280), np.zeros(3)) for sweep in range(6)]
     short = np.where(np.arange(20)[:, None] % 4, 0.1, 3.0) * _noisy(rng, 20)[1]
-    windows.append(Window(-1, np.round(short).astype(np.int64), short, np.zeros(3)))
+    windows.append(RawReadings(-1, np.round(short).astype(np.int64), short, np.zeros(3)))
     spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"]
     assert spikes < limit
     short[7] = 9 * 15
@@ -275,7 +275,7 @@ def test_a_rest_of_few_readings_is_held_against_the_noise_of_longer_ones() -> No
 
 def test_a_rest_in_which_an_axis_stands_still_makes_no_sensor_without_noise() -> None:
     rng = np.random.default_rng(1)
-    windows = [Window(-1, *_noisy(rng, 280), np.zeros(3)) for _ in range(6)]
+    windows = [RawReadings(-1, *_noisy(rng, 280), np.zeros(3)) for _ in range(6)]
     windows[2].counts[:, 0] = windows[2].counts[0, 0]
     counts = [np.concatenate([window.counts for window in windows])]
     longest, limit = judge_readings(counts, windows, FALSE_ALARMS / 10)["stuck_axis"]
@@ -289,7 +289,7 @@ def test_what_a_number_in_single_precision_rounds_is_no_stuck_bit() -> None:
     said = np.float32(0.7 + 0.005 * rng.standard_normal((4000, 3))).astype(np.float64)
     counts = np.asarray(np.round(said * 2**30 / 10), dtype=np.int64)
     assert np.mean(counts & 1) < 0.45  # which it would be taken for
-    window = Window(-1, counts, counts - counts.mean(axis=0), np.zeros(3))
+    window = RawReadings(-1, counts, counts - counts.mean(axis=0), np.zeros(3))
     assert judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"][0] == 0
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings
-from rig.analysis.magnetic_field import MagnetometerResult
 from rig.estimation.magnetometer import FieldDrift
 from rig.observation.field import field_tests
 from rig.plans.recorded import RecordedRun, judged, open_run
@@ -12,9 +11,9 @@ from support.frozen import RECORDINGS
 
 
 def drift_of(run: RecordedRun) -> FieldDrift:
-    found = judged(run).magnetometers["compass"]
-    assert isinstance(found, MagnetometerResult) and found.drift is not None
-    return found.drift
+    drift = judged(run).magnetometers.results["compass"].drift
+    assert drift is not None
+    return drift
 
 
 @pytest.mark.slow

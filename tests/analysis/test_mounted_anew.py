@@ -29,8 +29,10 @@ BY_ONE_JOINT = (
 def solved(setup: Setup, seed: int, off_deg: Array) -> tuple[Array, Budget, tuple[FoundMount, ...]]:
     """(3,) errors of the scale, the budget, and the mounts that were found."""
     runs, scale = drawn_stages(seed, KIND, setup, off_deg)
-    recordings, mounts = observe_as_mounted(runs)
-    result = solve_observed(runs[0].sensors, recordings, surroundings=surroundings_of(recordings))["gyro"]
+    recordings, mounts = observe_as_mounted(runs, runs[0].settings)
+    result = solve_observed(runs[0].sensors, recordings, surroundings=surroundings_of(recordings, runs[0].settings))[
+        "gyro"
+    ]
     assert result.uncertainty is not None
     return result.scale - scale, result.uncertainty, mounts
 
@@ -71,7 +73,7 @@ def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     run = synthetic_run(Setup())
     assert "mounts" not in run.settings.document()
     assert settings_from_json(run.settings.to_json()) == run.settings
-    assert observe_as_mounted([run])[1] == ()
+    assert observe_as_mounted([run], run.settings)[1] == ()
 
 
 def test_the_mounts_are_recorded() -> None:

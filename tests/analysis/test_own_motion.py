@@ -34,7 +34,7 @@ def solved(setup: Setup, reckoning: int = 2, extension_m: tuple[float, float, fl
     made = synthetic_run(setup)
     settings = replace(made.settings.with_overrides([f"reckoning={reckoning}"]), extension_m=extension_m)
     recordings = observe_runs([replace(made, settings=settings)])
-    return solve_observed(made.sensors, recordings, surroundings=surroundings_of(recordings))["gyro"]
+    return solve_observed(made.sensors, recordings, surroundings=surroundings_of(recordings, settings))["gyro"]
 
 
 def bias_off(setup: Setup, result: SensorResult) -> Array:

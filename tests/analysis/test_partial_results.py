@@ -8,11 +8,10 @@ import pytest
 from rig.analysis.partial_results import so_far
 from rig.data.events import SweepFinished
 from rig.data.run_file import RunData
-from rig.errors import Fault
+from rig.errors.attempts import Attempts
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.arm_motion import motion_of
 from rig.observation.average import on_the_arms_clock
-from rig.observation.observe import Observation
 from rig.observation.windows import swept
 from support.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
 
@@ -32,8 +31,7 @@ def until(run: RunData, sweeps: int) -> RunData:
 def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
     for sweeps in range(1, 7):
         found = so_far([until(run, sweeps)]).gyroscopes["gyro"]
-        assert sorted(found.sweeps) == list(range(sweeps))
-        assert all(isinstance(each, Observation) for each in found.sweeps.values())
+        assert sorted(found.sweeps.results) == list(range(sweeps)) and not found.sweeps.faults
         assert isinstance(found.solution, VectorSolution) == (sweeps >= 5)
         if sweeps >= 2:  # with a rest before it
             assert found.bias_rad_s is not None
@@ -50,11 +48,11 @@ def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     times_s = on_the_arms_clock(samples, run.sensors["gyro"], motion_of(run)).time_s
     samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
     found = so_far([replace(run, samples={"gyro": samples})]).gyroscopes["gyro"]
-    refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]
-    assert [fault.name for fault in refused] == ["saturation"] and len(found.sweeps) == 6
+    assert {sweep: fault.name for sweep, fault in found.sweeps.faults.items()} == {2: "saturation"}
+    assert sorted(found.sweeps.results) == [0, 1, 3, 4, 5]
     assert isinstance(found.solution, VectorSolution)
 
 
 def test_nothing_is_told_of_a_recording_that_has_only_begun(run: RunData) -> None:
     assert so_far([replace(run, states=run.states[:2], events=())]).gyroscopes == {}
-    assert so_far([replace(run, events=())]).gyroscopes["gyro"].sweeps == {}
+    assert so_far([replace(run, events=())]).gyroscopes["gyro"].sweeps == Attempts()

@@ -25,9 +25,9 @@ AXES = np.eye(3)
 
 def held(run: RunData) -> Contradictions:
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
     results = solve_observed(run.sensors, recordings, surroundings=surroundings)
-    return contradictions(recordings, results, ["gyro"], surroundings)
+    return contradictions(recordings, results, ["gyro"], surroundings, recordings[0].run.settings)
 
 
 def later(seen: Drawn) -> Array:

@@ -21,7 +21,7 @@ Turns = tuple[tuple[Observation, ...], Solution, Seen]
 def turns() -> Turns:
     recordings = observe_recordings([synthetic_run(Setup(repeats=2))])
     observations = recordings[0].sensors["gyro"].revolutions
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
     assert surroundings is not None
     return observations, solve_six_observation(observations, "newton"), see(recordings, "gyro", surroundings)
 

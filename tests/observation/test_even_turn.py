@@ -7,8 +7,8 @@ import pytest
 
 from rig.errors import Fault
 from rig.observation.arm_motion import motion_of
+from rig.observation.arm_rests import standing
 from rig.observation.even_turn import smoothed
-from rig.observation.observe import standing
 from rig.observation.windows import rested, swept
 from support.drawn_servo import Drawn, drawn_servo
 

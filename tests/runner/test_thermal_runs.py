@@ -13,7 +13,7 @@ from rig.data.quantity import TEMPERATURE
 from rig.data.result_file import read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.thermal_events import SetMeasured, TemperatureWanted
-from rig.observation.windows import finished_sweeps
+from rig.observation.finished import finished_sweeps
 from support.commands import configuration, rig, wait_for_log
 from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started

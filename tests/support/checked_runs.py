@@ -18,14 +18,16 @@ Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings | 
 def solved(run: RunData) -> Solved:
     """What checks are made of, of a recording of one gyroscope."""
     recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
     return recordings, solve_observed(run.sensors, recordings, surroundings=surroundings), surroundings
 
 
 def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
     """With limits that are exceeded in such a share of undamaged recordings, each."""
     recordings, results, surroundings = found
-    return contradictions(recordings, results, ["gyro"], surroundings, false_alarms=rate * STATISTICS).checks
+    return contradictions(
+        recordings, results, ["gyro"], surroundings, recordings[0].run.settings, false_alarms=rate * STATISTICS
+    ).checks
 
 
 def checked(run: RunData) -> tuple[Check, ...]:

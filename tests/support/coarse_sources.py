@@ -94,7 +94,7 @@ def recorded(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -
 def stated(seen: Drawn) -> Stated:
     """What is solved of a recording, held against its truth."""
     recordings = observe_recordings([seen.run])
-    surroundings = surroundings_of(recordings)
+    surroundings = surroundings_of(recordings, seen.run.settings)
     results = solve_observed(seen.run.sensors, recordings, surroundings=surroundings)
     result = results["gyro"]
     assert result.uncertainty is not None
@@ -103,7 +103,7 @@ def stated(seen: Drawn) -> Stated:
     first_s, last_s = min(each.start_s for each in averages), max(each.end_s for each in averages)
     inside = (seen.time_s >= first_s) & (seen.time_s <= last_s)
     true = np.concatenate([seen.scale, -seen.bias_rad_s[inside].mean(axis=0)])
-    checks = contradictions(recordings, results, ["gyro"], surroundings).checks
+    checks = contradictions(recordings, results, ["gyro"], surroundings, seen.run.settings).checks
     return Stated(
         np.concatenate([result.scale, result.bias_rad_s]) - true,
         result.uncertainty.expanded,

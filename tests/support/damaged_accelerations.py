@@ -15,7 +15,6 @@ from rig.analysis.contradictions import in_reference
 from rig.analysis.magnetic_field import calibrate_magnetometers
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.run_file import RunData
-from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.windows import Window, dwelt, swept
 from rig.plans.recorded import open_run
@@ -126,8 +125,8 @@ def told_of(run: RunData) -> Told:
     recordings = observe_recordings([run])
     accelerometers = calibrate_accelerometers(recordings, run.settings)
     magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
-    refused = frozenset(each.name for each in magnetometers.values() if isinstance(each, Fault))
-    return Told(in_reference(recordings, accelerometers, magnetometers).checks, refused)
+    refused = frozenset(fault.name for fault in magnetometers.faults.values())
+    return Told(in_reference(recordings, accelerometers, magnetometers.results, run.settings).checks, refused)
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:

@@ -11,7 +11,6 @@ from rig.analysis.read_when import of_magnetometer
 from rig.data.magnetometer_entries import FieldDriftEntry, MagnetometerEntry, UniformityEntry
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
-from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, hard_iron
 from rig.report.axes import triple
 from rig.report.budget_table import assumed_lines
@@ -32,13 +31,15 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
-    on_arm = {name: _entry(outcome, name, result) for name, result in outcome.magnetometers.items()}
-    return magnetometers_elsewhere(outcome) | on_arm
+    on_arm = outcome.magnetometers
+    return {
+        **magnetometers_elsewhere(outcome),
+        **{name: _entry(outcome, name, result) for name, result in on_arm.results.items()},
+        **{name: ErrorEntry(error=str(fault)) for name, fault in on_arm.faults.items()},
+    }
 
 
-def _entry(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
-    if isinstance(result, Fault):
-        return ErrorEntry(error=str(result))
+def _entry(outcome: Outcome, name: str, result: MagnetometerResult) -> MagnetometerEntry:
     return attitudes_entry(
         OF_MAGNETOMETERS, result, result.sensor,
         model=MODEL,

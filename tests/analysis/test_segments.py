@@ -1,4 +1,4 @@
-"""Pieces of sweeps in which the arm vibrates, whole and where states are lost."""
+"""Segments of sweeps in which the arm vibrates, whole and where states are lost."""
 
 from dataclasses import replace
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.cut_recording import Pieces, cut
+from rig.analysis.segments import Segments, stack_segments
 from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
+from rig.observation.segments import segment_recordings
 from rig.observation.windows import swept
 from support.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run
 
@@ -35,23 +36,23 @@ def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
     return replace(run, states=run.states[kept])
 
 
-def pieces_of(run: RunData) -> Pieces:
+def segments_of(run: RunData) -> Segments:
     recordings = observe_recordings([run])
-    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings))["gyro"]
+    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings, run.settings))["gyro"]
     assert result.explained is not None and run.settings.site is not None
-    return cut("gyro", recordings, result, result.explained, run.settings.site)
+    return stack_segments(segment_recordings("gyro", recordings), result.explained, run.settings.site)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("lost_s", "known_rad_s"), [(0.0, 4e-5), (0.3, 8e-5)])
-def test_of_a_vibration_that_no_encoder_sees_a_piece_keeps_no_more_than_is_stated(
+def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_stated(
     lost_s: float, known_rad_s: float
 ) -> None:
     """Without states for a while the readings left are no longer even, and what is found of a line in them less."""
     run = unseen(synthetic_run(SHAKEN))
-    pieces = pieces_of(without_states(run, 3.0, 3.0 + lost_s) if lost_s else run)
-    turning = pieces.sweep >= 0
-    off = (pieces.means_rad_s + BIAS_RAD_S - pieces.rates_rad_s / SCALE)[turning]
-    variances = pieces.variances_rad2_s2[turning]
+    segments = segments_of(without_states(run, 3.0, 3.0 + lost_s) if lost_s else run)
+    turning = segments.sweep >= 0
+    off = (segments.means_rad_s + BIAS_RAD_S - segments.rates_rad_s / SCALE)[turning]
+    variances = segments.variances_rad2_s2[turning]
     assert np.sqrt(np.mean(variances)) < known_rad_s
     assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25

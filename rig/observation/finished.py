@@ -1,0 +1,19 @@
+"""Which sweeps and dwells of its plan a recording holds from start to end, and when they were. Pure."""
+
+from rig.data.run_file import RunData
+from rig.observation.windows import dwelt, swept
+
+
+def finished_sweeps(run: RunData) -> frozenset[int]:
+    """Return the indices of the sweeps a recording holds from start to end."""
+    return frozenset(finished.sweep.index for finished in swept(run))
+
+
+def finished_dwells(run: RunData) -> frozenset[int]:
+    """Return the indices of the dwells a recording holds from start to end."""
+    return frozenset(finished.dwell.index for finished in dwelt(run))
+
+
+def dwell_times_s(run: RunData) -> dict[int, tuple[float, float]]:
+    """Return when each finished dwell began and ended by the controller's clock, by its index."""
+    return {finished.dwell.index: (finished.window.start_s, finished.window.end_s) for finished in dwelt(run)}
