@@ -23,31 +23,40 @@ if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
-# Each is the module of that name in rig/commands: `add` says what it takes, `run` does it.
+# Of each its module, in which `add` says what it takes and `run` does it, and its help line.
 _COMMANDS = {
-    "run": "run the procedure the file names",
-    "plan": "dry run: every motion, its time and limits; connects to nothing",
-    "check": "connect and look; nothing moves, no program is stopped",
-    "record": "record the sensors alone, while something else turns them; nothing moves",
-    "resume": "go on with an interrupted run",
-    "station": "one part after the other: number, checks, run, verdict, label",
-    "floor": "what several rigs that share a history do now, in a browser",
-    "watch": "a recorded run in a browser, as it was",
-    "solve": "recompute the calibration from a recording",
-    "allan": "random walk and bias instability, by the Allan deviation of what was recorded at rest",
-    "reversal": "a magnetometer's own bias, from runs between which it was turned over",
-    "show": "what a finished run amounts to: values, budgets, checks",
-    "explain": "what a check, an error, a limit or a word means, and what to do",
-    "report": "the certificate of a finished run: HTML, PDF, digital certificate",
-    "verify": "who signed a certificate, when, whether it is whole, and whether a history knows it",
-    "export": "what was calibrated and recorded, in the files of other programs",
-    "history": "what the laboratory remembers: calibrations, trends, check standards",
-    "study": "Monte-Carlo studies of the papers' figures and tables; without a name, list them",
-    "board": "look at the board, read and change its stored calibrations, flash its firmware",
-    "kvh": "look at a KVH 1775",
-    "autopilot": "write a calibration into an autopilot's parameters, and bring the old ones back",
-    "lines": "look at a device that prints lines, and write its section of a configuration",
-    "world": "only the simulated laboratory, in the foreground, for any client",
+    "run": ("rig.commands.run", "run the procedure the file names"),
+    "plan": ("rig.commands.plan", "dry run: every motion, its time and limits; connects to nothing"),
+    "check": ("rig.commands.check", "connect and look; nothing moves, no program is stopped"),
+    "record": ("rig.commands.record", "record the sensors alone, while something else turns them; nothing moves"),
+    "resume": ("rig.commands.resume", "go on with an interrupted run"),
+    "station": ("rig.commands.station", "one part after the other: number, checks, run, verdict, label"),
+    "floor": ("rig.commands.floor", "what several rigs that share a history do now, in a browser"),
+    "watch": ("rig.commands.watch", "a recorded run in a browser, as it was"),
+    "solve": ("rig.commands.solve", "recompute the calibration from a recording"),
+    "allan": (
+        "rig.commands.allan",
+        "random walk and bias instability, by the Allan deviation of what was recorded at rest",
+    ),
+    "reversal": ("rig.commands.reversal", "a magnetometer's own bias, from runs between which it was turned over"),
+    "show": ("rig.commands.show", "what a finished run amounts to: values, budgets, checks"),
+    "explain": ("rig.commands.explain", "what a check, an error, a limit or a word means, and what to do"),
+    "report": ("rig.commands.report", "the certificate of a finished run: HTML, PDF, digital certificate"),
+    "verify": (
+        "rig.commands.verify",
+        "who signed a certificate, when, whether it is whole, and whether a history knows it",
+    ),
+    "export": ("rig.commands.export", "what was calibrated and recorded, in the files of other programs"),
+    "history": ("rig.commands.history", "what the laboratory remembers: calibrations, trends, check standards"),
+    "study": ("rig.commands.study", "Monte-Carlo studies of the papers' figures and tables; without a name, list them"),
+    "board": ("rig.commands.board", "look at the board, read and change its stored calibrations, flash its firmware"),
+    "kvh": ("rig.commands.kvh", "look at a KVH 1775"),
+    "autopilot": (
+        "rig.commands.autopilot",
+        "write a calibration into an autopilot's parameters, and bring the old ones back",
+    ),
+    "lines": ("rig.commands.lines", "look at a device that prints lines, and write its section of a configuration"),
+    "world": ("rig.commands.world", "only the simulated laboratory, in the foreground, for any client"),
 }
 _AT_ONCE = {  # what a command that begins by loading libraries for a second says before
     "run": "reading the configuration",
@@ -145,10 +154,10 @@ def _parser(meant: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="rig", description="Calibrate inertial sensors on a robot arm.")
     parser.add_argument("--version", action="version", version=f"rig {VERSION}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name, text in _COMMANDS.items():
+    for name, (module_name, text) in _COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)
         if name == meant:
-            module = import_module(f"rig.commands.{name}")
+            module = import_module(module_name)
             module.add(command)
             command.set_defaults(command=module.run)
     return parser

@@ -4,7 +4,6 @@ import multiprocessing
 import threading
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +26,10 @@ def plan(config: str | Path, changes: Changes | None = None, *, script: str | Pa
     one's own. Returns the plan: angles in rad, speeds in rad/s, times in s. Raises Refused by name for an error in the
     file, and for a motion that breaks a limit.
     """
-    from rig.commands.plan import planned
+    from rig.commands.plan import add, planned
     from rig.report.plan_table import print_plan
 
-    found = planned(_options("plan", [*_changed(changes), *_script(script)], config))
+    found = planned(_options("plan", add, [*_changed(changes), *_script(script)], config))
     print_plan(found, as_json=False)
     return found
 
@@ -41,9 +40,10 @@ def check(config: str | Path, changes: Changes | None = None, *, script: str | P
     Returns whether a run could start. Takes `changes` and `script` as `plan` does; raises Refused for an error in the
     file.
     """
+    from rig.commands.check import add
     from rig.commands.check import run as looked
 
-    return looked(_options("check", [*_changed(changes), *_script(script)], config)) == 0
+    return looked(_options("check", add, [*_changed(changes), *_script(script)], config)) == 0
 
 
 def run(
@@ -66,7 +66,7 @@ def run(
     """
     from rig.commands.carry_out import carry_out
     from rig.commands.endings import ending_by_interrupt
-    from rig.commands.run import begun
+    from rig.commands.run import add, begun
 
     if multiprocessing.current_process().name != "MainProcess":
         raise Refused(
@@ -78,7 +78,7 @@ def run(
         raise Refused("not_main_thread", "only the main thread hears Ctrl-C, which stops the arm", "Call it from there")
     words = [*_changed(changes), *_script(script), *([] if out is None else ["--out", str(out)])]
     words += [word for serial_number in other_boards for word in ("--other-board", serial_number)]
-    options = _options("run", words, config)
+    options = _options("run", add, words, config)
     with ending_by_interrupt(), begun(options) as (folder, found):
         moved = frozenset(options.other_board)
         carry_out(folder, found, assume_yes=yes, moved=moved, as_json=False, page=None)
@@ -100,12 +100,12 @@ def write_certificate(
     `{"certificate.customer": "Example"}`. `out` is a folder, by default the run's; `history` where the certificate is
     noted, by default the user's own. Returns the files. Raises Refused as `rig report` does.
     """
-    from rig.commands.report import documents
+    from rig.commands.report import add, documents
 
     words = [*_changed(changes), *(["--pdf"] if pdf else []), *(["--dcc"] if dcc else [])]
     words += [] if out is None else ["--out", str(out)]
     words += [] if history is None else ["--history", history]
-    files, left_out = documents(_options("report", words, _folder(of)))
+    files, left_out = documents(_options("report", add, words, _folder(of)))
     if left_out:
         raise left_out[0]
     return files
@@ -117,18 +117,17 @@ def export(of: Run | str | Path, format: str, *, out: str | Path | None = None) 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` a folder, by default one in the
     run's. Returns the files. Raises Refused `bad_option` for another format, and as `rig export` does.
     """
-    from rig.commands.export import files
+    from rig.commands.export import add, files
 
     if format not in FORMATS:
         raise Refused("bad_option", f"there is no format {format!r}", f"Choose one of: {', '.join(FORMATS)}")
     words = ["--format", format, *([] if out is None else ["--out", str(out)])]
-    return files(_options("export", words, _folder(of)))
+    return files(_options("export", add, words, _folder(of)))
 
 
-def _options(command: str, words: Sequence[str], about: str | Path) -> Namespace:
+def _options(command: str, add: Callable[[ArgumentParser], None], words: Sequence[str], about: str | Path) -> Namespace:
     """The arguments as the command takes them, so that what is not said here is as it is there."""
     parser = ArgumentParser(prog=f"rig {command}")
-    add: Callable[[ArgumentParser], None] = import_module(f"rig.commands.{command}").add
     add(parser)
     return parser.parse_args([*words, "--", str(about)])
 
