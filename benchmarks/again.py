@@ -18,7 +18,6 @@ from pathlib import Path
 
 from rig.commands.again_work import Task, solved_again
 from rig.commands.spread import Cluster, one_by_one, spread
-from rig.data.settings import RECKONING
 from rig.history.again import Answer
 from rig.history.finished import recording_of
 
@@ -43,7 +42,7 @@ def tasks(count: int, folder: Path) -> list[Task]:
         run.mkdir()
         shutil.copy(FROZEN / KINDS[i % len(KINDS)] / "six_observation" / "run.h5", run)
         places = (("this", str(run)),)
-        found.append(Task(str(i), (recording_of(run / "run.h5"),), places, (f"reckoning={RECKONING}",), None))
+        found.append(Task(str(i), (recording_of(run / "run.h5"),), places, (), None))
     return found
 
 

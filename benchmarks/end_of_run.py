@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-FIXTURE = ROOT / "tests" / "fixtures" / "af3b9f0" / "verified"
+FIXTURE = ROOT / "tests" / "fixtures" / "recordings" / "verified"
 EXPERIMENT = Path("configs") / "lsm9ds1_adis16465.yaml"
 BEFORE = "af3b9f0"
 

@@ -20,7 +20,6 @@ from rig.analysis.pieces_against_model import (
     covariance_of,
     held_pieces,
     together,
-    tolerated,
     whiten,
     whitening,
 )
@@ -68,20 +67,16 @@ class _Look:
         return Means(self.felt, self.pieces.times_s, self.pieces.sweep)
 
 
-def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance | None = None) -> Consistency:
-    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F.
-
-    Without an `allowance` every sensor is allowed what all were before, and the ways between the sweeps tell nothing.
-    """
+def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance) -> Consistency:
+    """Return every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
     felt = pieces.rates_rad_s @ matrix.T
-    scatter = tolerated(pieces, felt) if allowance is None else _allowed(pieces, allowance.off_rad_s, allowance)
+    scatter = _allowed(pieces, allowance.off_rad_s, allowance)
     bias = _wandering(pieces, felt, _steady(pieces), scatter)
     here = _Look(pieces, felt, held_pieces(pieces, scatter, bias))
-    later = here if allowance is None else _on_ways(matrix, allowance, bias)
-    whole = None if allowance is None else each_axis(here.means.sweeps)
+    later = _on_ways(matrix, allowance, bias)
     found = told_by(later.held, changes(later.pieces, later.felt), rate)
-    found |= told_by(here.held, differences(pieces, felt, whole), rate)
-    if allowance is not None and (told := later.held.most_by_one(of_one_axis(later.pieces, later.felt), rate)):
+    found |= told_by(here.held, differences(pieces, felt, each_axis(here.means.sweeps)), rate)
+    if told := later.held.most_by_one(of_one_axis(later.pieces, later.felt), rate):
         found["axis_changed"] = told
     jumped = _jumped(pieces, felt, scatter, rate)
     if jumped is not None:
@@ -89,7 +84,7 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
     sweeps = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
     ranked = unlike_the_others(here.held, sweeps, lambda sweep: of_sweep(pieces, sweep), rate)
     disturbed = {sweep: each for sweep, each in ranked if each[0] > each[1]}
-    return Consistency(found, ranked[0][1], disturbed, {} if allowance is None else dict(_told_from(here, later, rate)))
+    return Consistency(found, ranked[0][1], disturbed, dict(_told_from(here, later, rate)))
 
 
 def would_tell(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance) -> dict[str, float]:

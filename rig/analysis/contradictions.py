@@ -37,8 +37,7 @@ from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each kind of readings of a sensor, its statistics
-OF_THE_MODEL = 2  # more where they are held to the model: the ways between sweeps, the angles between axes
+SHARES = 15  # of each kind of readings of a sensor, its statistics
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +60,16 @@ def contradictions(
     recordings: Sequence[ObservedRun],
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
-    surroundings: Surroundings | None,
+    surroundings: Surroundings,
     *,
     false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
-    """What contradicts itself in these sensors' results; nothing before there was a site: such verdicts stay.
+    """Return what contradicts itself in these sensors' results.
 
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
     that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
     """
     settings = recordings[0].run.settings
-    if settings.site is None:
-        return NOTHING
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     rate = _rate(recordings[0].run, sensors, false_alarms)
@@ -81,10 +78,8 @@ def contradictions(
         if explained is None:
             continue
         pieces = cut(name, recordings, results[name], explained, settings.site)
-        allowance = None
-        if surroundings is not None and settings.checked_by_model:
-            known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
-            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
+        known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
+        allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
@@ -96,17 +91,14 @@ def contradictions(
             counts,
             pieces.windows,
             rate,
-            np.median if settings.holds_all_kinds else np.min,
             digits=digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
             frozen=max(longest_frozen(recording, name) for recording in recordings),
         )
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
-        if surroundings is not None and settings.checked_by_model:
-            stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
-            leaning = _leaning_deg(explained.solution, stated_deg, rate)
-            checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
-        if surroundings is not None:
-            told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
+        stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name)
+        leaning = _leaning_deg(explained.solution, stated_deg, rate)
+        checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
+        told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
     return Contradictions(tuple(checks), told_from)
 
 
@@ -133,15 +125,13 @@ def in_reference(
     *,
     drifting: bool = False,
 ) -> Contradictions:
-    """What contradicts itself in readings of gravity and field; nothing in recordings that hold only gyroscopes so.
+    """Return what contradicts itself in readings of gravity and field.
 
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
     steadily where it is `drifting`.
     """
     run = recordings[0].run
-    known = run.settings.uncertainty
-    if known is None or not run.settings.holds_all_kinds:
-        return NOTHING
+    known = run.settings.stated_uncertainty
     asked: dict[tuple[str, Quantity], ReadInReference] = {
         **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
            for name, each in accelerometers.items()},
@@ -161,16 +151,13 @@ def in_reference(
 
 def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
     """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
-    kinds = len(sensors)
-    if run.settings.holds_all_kinds:
-        accelerometers = run.measuring(ACCELERATION).keys() & run.settings.to_calibrate
-        kinds += len(accelerometers) + len(run.measuring(FIELD))
-    return rate_of_each(kinds, by_model=run.settings.checked_by_model, of_all=false_alarms)
+    accelerometers = run.measuring(ACCELERATION).keys() & run.settings.to_calibrate
+    return rate_of_each(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
-def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
+def rate_of_each(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
     """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
-    return coverage.rate_of_each(of_all, (SHARES + OF_THE_MODEL * by_model) * kinds)
+    return coverage.rate_of_each(of_all, SHARES * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
@@ -190,7 +177,7 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
             recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings)
-        results = solve_observed(chosen, recordings, surroundings=surroundings)
+        results = solve_observed(chosen, recordings, surroundings)
         named = contradictions(recordings, results, settings.to_calibrate, surroundings).disturbed
         named |= in_reference(recordings, calibrate_accelerometers(recordings, settings, results), {}).disturbed
     return named

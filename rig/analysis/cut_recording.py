@@ -21,7 +21,7 @@ from rig.estimation.vector_fit import Explained
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
-from rig.observation.lines import NONE, LineSearch, find_lines, fitted, swings, waves
+from rig.observation.lines import LineSearch, find_lines, fitted, swings, waves
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered_weights import noise_at_zero
@@ -50,7 +50,6 @@ class Cuts:
         return parts, max(1, parts // self.times_a_rest)
 
 
-BEFORE = Cuts(parts=4, times_a_rest=2, most=48)
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no part shows it.
 BY_MODEL = Cuts(parts=6, times_a_rest=3, most=72)
 
@@ -129,8 +128,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     """The sensor's revolutions and rests of all recordings in pieces, in the order `explained` was made from."""
     x, y, z = explained.seen.earth_rate_rad_s.tolist()  # known by the site, or found
     site = replace(site, earth_rate_rad_s=(x, y, z))
-    by_model = recordings[0].run.settings.checked_by_model
-    parts, of_rest = (BY_MODEL if by_model else BEFORE).of(len(result.observations))
+    parts, of_rest = BY_MODEL.of(len(result.observations))
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
@@ -139,10 +137,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
             _cut_turn(stream, recording.motion, turn, site=site, parts=parts, sweep=sweep)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
-        *(
-            _cut_rest(stream, recording.motion, rest, site=site, parts=of_rest, finds_lines=by_model)
-            for recording, stream, rest in rests
-        ),
+        *(_cut_rest(stream, recording.motion, rest, site=site, parts=of_rest) for recording, stream, rest in rests),
     ]
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
     seen, pieces, pull_m_s2, times_s = explained.seen, list[_Piece](), list[Array](), list[Array]()
@@ -238,14 +233,14 @@ def _cut_turn(
 
 
 def _cut_rest(
-    stream: Stream, motion: ArmMotion, average: Average, *, site: Site, parts: int, finds_lines: bool
+    stream: Stream, motion: ArmMotion, average: Average, *, site: Site, parts: int
 ) -> tuple[Window, list[_Piece]]:
-    """A rest in parts. Where it `finds_lines`, what vibrates is taken out of their means and their noise."""
+    """A rest in parts. What vibrates is taken out of their means and their noise."""
     inside = between(stream, average.start_s, average.end_s)
     parted = _parted(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), parts)
     readings = stream.readings_rad_s[parted.inside][parted.used]
     share = (parted.time_s - average.start_s) / average.duration_s
-    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share) if finds_lines else NONE
+    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share)
     lines = waves(cycles, share, AT_REST.beats)
     weights = mean_weights(parted.groups, lines)
     residual = readings - parted.groups @ (parted.averages @ readings)

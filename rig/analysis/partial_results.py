@@ -99,8 +99,7 @@ def _seen(run: RunData, name: str, motion: ArmMotion) -> _Seen:
 
 
 def _accelerations(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
-    site = run.settings.site
-    gravity_m_s2 = None if site is None else site.gravity_m_s2
+    gravity_m_s2 = run.settings.site.gravity_m_s2
     for name, each in seen.items():
         for index, dwell in each.dwells.items():
             words, reading = ("", dwell) if isinstance(dwell, Fault) else (dwell.name, dwell.reading)
@@ -109,8 +108,7 @@ def _accelerations(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRe
 
 def _fields(run: RunData, seen: Mapping[str, _Seen]) -> Iterator[ReadAtRest]:
     """What magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
-    site = run.settings.site
-    expected_t = None if site is None else site.magnetic_field_t
+    expected_t = run.settings.site.magnetic_field_t
     for name in run.measuring(FIELD):
         other = dwelt_beside(run, name, (sensor for sensor, each in seen.items() if each.dwells))
         if other is None:

@@ -12,7 +12,7 @@ from rig.analysis.surroundings import Surroundings
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Unknown, uncounted
+from rig.estimation.budget import Unknown
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_fit import Seen
@@ -54,8 +54,6 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
     ]
     seen = put_together(parts, surroundings)
-    if not run.settings.knows_sensor:
-        return seen
     averages = [average for part in parts for average in (turn.average for turn in part.turns)]
     averages += [rest for part in parts for rest in part.rests]
     return replace(seen, sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages))
@@ -84,13 +82,11 @@ def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
-        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty)
-        if settings.knows_returns
-        else None,
+        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
-        noise_freedom=by_axis(average.freedom for average in averages) if surroundings.counts_freedom else np.inf,
+        noise_freedom=by_axis(average.freedom for average in averages),
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
         roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
@@ -100,22 +96,20 @@ def _sensor_of(
     surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
-    of = name, sensor.part, sensor.range_rad_s
-    known = known_sensor(surroundings.uncertainty, of, temperature_c, sensor.unseen_change_k)
+    known = known_sensor(surroundings.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
     return replace(known, temperature_words=sensor.temperature_words)
 
 
 def known_sensor(
-    known: Uncertainty, of: tuple[str, str, float], temperature_c: Array, temperature_step_k: float
+    known: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> KnownSensor:
-    """What is stated `of` a sensor of that name, part and range (rad/s), and how warm it was in each average (N,)."""
-    name, part, full_scale_rad_s = of
+    """Return what is stated of the sensor `name` of that range, and how warm it was in each average (N,)."""
     return KnownSensor(
-        nonlinearity=known.of("nonlinearity_percent", name, part) / 100,
+        nonlinearity=known.of("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
-        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, part))),
-        scale_per_k=PPM * known.of("scale_ppm_k", name, part),
-        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, part) / 3600)),
+        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name))),
+        scale_per_k=PPM * known.of("scale_ppm_k", name),
+        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name) / 3600)),
         temperature_c=temperature_c,
         temperature_step_k=temperature_step_k,
     )
@@ -128,7 +122,7 @@ def arms_of(turns: Sequence[Observation], settings: RunSettings, mount: Array | 
     """
     extension_m = np.array(settings.extension_m) if mount is None else mount @ np.array(settings.extension_m)
     known = [turn.arm_m + extension_m if turn.arm_m is not None else np.zeros(3) for turn in turns]
-    return np.reshape(known, (-1, 3)) * settings.knows_own_motion
+    return np.reshape(known, (-1, 3))
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
@@ -210,27 +204,27 @@ def _started(recording: ObservedRun) -> datetime:
     return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
-def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
+def known_of(surroundings: Surroundings, name: str) -> Known:
     """What is known of surroundings and sensor before the Earth's rate is looked for."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return Known(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
-        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name, part) > 0,
+        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name) > 0,
         repeatability_rad=uncertainty.repeatability_std_rad,
         state_jitter_s=surroundings.state_jitter_s,
     )
 
 
 def unknown_of(
-    surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
+    surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found.
+    """Return what no recording shows of the surroundings of the sensor `name`, and the Earth's rate it found.
 
     `stamp_std_s` is as of `RecordedSensor`.
     """
     known, clock = surroundings.uncertainty, surroundings.clock
-    found = Unknown(
+    return Unknown(
         clock_std=clock.std,
         clock_freedom=clock.freedom,
         clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
@@ -243,9 +237,8 @@ def unknown_of(
         mount_rad=float(np.radians(known.mount_deg)),
         stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
+        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,
     )
-    return found if surroundings.counts_freedom else uncounted(found)

@@ -50,9 +50,8 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     and their mean is off by it.)
     """
     found = [
-        (way, stream, since_s, each.run.settings, site)
+        (way, stream, since_s, each.run.settings, each.run.settings.site)
         for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
-        if (site := each.run.settings.site) is not None
         for stream in [each.stream(name)]
         for way in _ways(each.run, stream, each.motion)
     ]

@@ -14,7 +14,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.rounding import Steps, rounding_left
 from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import LineSearch, find_lines, fitted, waves
-from rig.observation.mean import Mean
+from rig.observation.mean import Mean, mean_at_rest
 from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
 
@@ -49,6 +49,14 @@ def rest_beside_lines(readings: Array, time_s: Array, window: Window, steps: Ste
         freedom=noise.freedom,
         rounding=rounding,
     )
+
+
+def mean_of_standing(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    """Return the mean of readings (n, 3) of an arm that stands, and from when to when it is said to last."""
+    found, lasting = mean_at_rest(readings, time_s, window, steps)
+    if len(readings) >= FEWEST and lasting != window:
+        found = rest_beside_lines(readings, time_s, window, steps)
+    return found, lasting
 
 
 def swinging(residuals: Array) -> Array:

@@ -25,7 +25,7 @@ from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_motion import ArmMotion, is_sparse
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
-from rig.observation.averaging import Averaging, averaging_of
+from rig.observation.beside_lines import mean_of_standing
 from rig.observation.lines import BEATS, turning
 from rig.observation.lost_samples import lost_samples
 from rig.observation.revolution import Revolution, arm_states_lost, describe
@@ -142,9 +142,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 
 def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
-    """Raises Fault `stuck_sensor` where a sensor does not feel what the arm did, if the site is known."""
-    if run.settings.site is None:
-        return
+    """Raise Fault `stuck_sensor` where a sensor does not feel what the arm did."""
     speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
     if speeds:
         check_rests(rests, min(speeds))
@@ -153,7 +151,7 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
 
 def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """The rests in which the arm stood still for long enough, without those beside a step in `superseded`."""
-    found = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
+    found = (_rest(stream, motion, window) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 
@@ -170,8 +168,7 @@ def _revolution(
     turn = motion.turn(finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
-        averaging = averaging_of(run.settings)
-        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
+        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
     return seen
 
 
@@ -262,7 +259,7 @@ def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArra
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averaging) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     still = standing(motion, window)
     if still is None:
@@ -271,7 +268,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averagin
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     readings = stream.readings_rad_s[inside]
-    found, lasting = averaging.rested(readings, stream.time_s[inside], still, stream.steps)
+    found, lasting = mean_of_standing(readings, stream.time_s[inside], still, stream.steps)
     return _placed(averaged(stream, inside, lasting, found), motion)
 
 

@@ -21,12 +21,12 @@ from rig.data.silence import crowding
 from rig.errors import Fault, Refused
 from support.as_nobody import as_nobody
 from support.full_disk import full_disk
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.waiting import PATIENCE_S, alive, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
-RECORDING = FIXTURES / "calibration" / "run.h5"
+RECORDING = RECORDINGS / "six_observation" / "run.h5"
 TIMEOUT_S = 5.0 * crowding()
 ALONE_S = 0.8  # reading the recording takes half of that where there is a processor for it
 METADATA_BYTES = 12_000  # where a run file's first structures lie

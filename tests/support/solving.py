@@ -14,4 +14,4 @@ def solve_runs(
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
     chosen = known_estimator(estimator)  # before the work of observing
     recordings = observe_recordings(runs)
-    return solve_observed(runs[0].sensors, recordings, chosen, surroundings_of(recordings), matrix_corrected)
+    return solve_observed(runs[0].sensors, recordings, surroundings_of(recordings), chosen, matrix_corrected)
