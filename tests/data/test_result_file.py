@@ -12,7 +12,7 @@ from rig.errors import Refused
 from support.paths import DOCS, RECORDINGS
 from support.results import VERIFIED
 
-RUNS = ("calibration", "verified")
+RUNS = ("six_observation", "verified")
 
 
 @pytest.mark.parametrize("name", RUNS)

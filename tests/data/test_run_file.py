@@ -62,7 +62,7 @@ SETTINGS = RunSettings(
     home_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 0.0),
     planned_sweeps=(PlannedSweep(0, "wrist_3", "cw", 1.0, 2 * np.pi),),
     site=Site(up=(0.0, 0.0, 1.0), gravity_m_s2=9.81, earth_rate_rad_s=None),
-    uncertainty=uncertainty_of(load(CONFIGS / "demo.yaml").config),
+    uncertainty=uncertainty_of(load(CONFIGS / "lsm9ds1_adis16465.yaml").config),
 )
 SWEEP = Sweep(
     index=0,
