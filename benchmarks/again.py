@@ -18,12 +18,11 @@ from pathlib import Path
 
 from rig.commands.again_work import Task, solved_again
 from rig.commands.spread import Cluster, one_by_one, spread
-from rig.data.settings import RECKONING
 from rig.history.again import Answer
 from rig.history.finished import recording_of
 
 FROZEN = Path(__file__).parents[1] / "tests" / "fixtures" / "recordings"
-KINDS = ("rig.settings-1", "rig.settings-2", "rig.settings-7")  # the oldest, and the newest
+KINDS = ("six_observation", "resumed", "speeds")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +40,9 @@ def tasks(count: int, folder: Path) -> list[Task]:
     for i in range(count):
         run = folder / f"run {i}"
         run.mkdir()
-        shutil.copy(FROZEN / KINDS[i % len(KINDS)] / "six_observation" / "run.h5", run)
+        shutil.copy(FROZEN / KINDS[i % len(KINDS)] / "run.h5", run)
         places = (("this", str(run)),)
-        found.append(Task(str(i), (recording_of(run / "run.h5"),), places, (f"reckoning={RECKONING}",), None))
+        found.append(Task(str(i), (recording_of(run / "run.h5"),), places, (), None))
     return found
 
 

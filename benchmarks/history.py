@@ -22,7 +22,7 @@ from rig.history.finished import Finished, finished_run
 from rig.history.store import History, Selection, open_history
 
 ROOT = Path(__file__).parents[1]
-FIXTURE = ROOT / "tests" / "fixtures" / "af3b9f0" / "calibration"
+FIXTURE = ROOT / "tests" / "fixtures" / "recordings" / "six_observation"
 OF_EACH = 20  # calibrations
 FIRST = datetime(2025, 1, 1, tzinfo=UTC)
 

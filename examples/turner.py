@@ -23,11 +23,17 @@ class TurntableSection(HandSection):
     bearing: str = Field(min_length=1, max_length=40, description="which bearing it is, for the records")
 
 
+def describe(section: HandSection) -> Made:
+    """Return what recordings and documents say of the turntable."""
+    assert isinstance(section, TurntableSection)
+    return Made("turntable on a bearing", section.bearing, GEOMETRY)
+
+
 TURNTABLE_BY_HAND = replace(
     HAND,
     name="turntable_by_hand",
     section=TurntableSection,
-    meant=lambda section: Made("turntable on a bearing", section.bearing, GEOMETRY),
-    made=lambda section, report: Made("turntable on a bearing", section.bearing, GEOMETRY),
+    meant=describe,
+    made=lambda section, report: describe(section),
     words=replace(HAND.words, name="turntable that a hand turns", short="turntable", turned="the turntable"),
 )

@@ -60,9 +60,9 @@ class AccelerometerResult:
     The `movement` is all that the solution was found from.
 
     The `triad` has scale and axes by the solution alone, the `budget` all that is known of the uncertainty of scale and
-    bias, None for recordings that say nothing of it. Beside it stand the solutions from the attitudes alone, by method,
+    bias. Beside it stand the solutions from the attitudes alone, by method,
     or the Fault each ends in. `held_out`: when the attitudes were repeated. `temperature_c` is the mean of all
-    readings, in recordings of before that of the dwells.
+    readings.
     """
 
     sensor: RecordedSensor
@@ -70,7 +70,7 @@ class AccelerometerResult:
     movement: Movement
     solution: ImuSolution
     triad: Triad
-    budget: Budget | None
+    budget: Budget
     alignment: Alignment | None
     beside: Attempts[Method, TriaxialSolution]
     dwells: tuple[DwellReading, ...]
@@ -116,7 +116,7 @@ def calibrate_accelerometers(
     Raises Fault as `solve_imu` and `solve_triaxial` do, and `not_all_attitudes`, `second_order_not_seen`,
     `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
     """
-    if not settings.planned_dwells or settings.site is None:
+    if not settings.planned_dwells:
         return {}
     described = recordings[0].run.sensors
     return {
@@ -147,12 +147,12 @@ def _calibrated(
         known_gravity(site),
         second_order=settings.second_order,
     )
-    known, sheet = settings.uncertainty, None
-    movement = Movement(seen, sweeps, 0.0 if known is None else known.repeatability_std_rad)
+    known, sheet = settings.stated_uncertainty, None
+    movement = Movement(seen, sweeps, known.repeatability_std_rad)
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
     end_of_scale = sensor.channel(ACCELERATION).range
-    if settings.knows_accelerometers and known is not None and end_of_scale is not None:
-        sheet = replace(sheet_of(known, name, sensor.part, end_of_scale), temperature_words=sensor.temperature_words)
+    if end_of_scale is not None:
+        sheet = replace(sheet_of(known, name, end_of_scale), temperature_words=sensor.temperature_words)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, settings=settings)
@@ -171,7 +171,7 @@ def _calibrated(
         repeatability_rad=movement.repeatability_rad,
         own=movement.own,
         arm_turns=movement.arm_turns,
-        own_shares=OWN_SHARES if settings.finds_own_share else (movement.own_share,),
+        own_shares=OWN_SHARES,
     )
     check_mounted(solution.matrix)
     if solution.second_order_s2_m is not None:
@@ -182,15 +182,13 @@ def _calibrated(
         movement=movement,
         solution=solution,
         triad=Triad.of(solution),
-        budget=None
-        if known is None
-        else accelerometer_budget(
+        budget=accelerometer_budget(
             solution,
             movement,
             site,
             1e-3 * known.acceleration_lag_ms,
             sheet=sheet,
-            noise_freedom=_noise_freedom(used, swept) if settings.counts_freedom else None,
+            noise_freedom=_noise_freedom(used, swept),
         ),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
         beside=beside,

@@ -59,11 +59,11 @@ class Sheet:
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 
-def sheet_of(known: Uncertainty, name: str, part: str, range_m_s2: float) -> Sheet:
+def sheet_of(known: Uncertainty, name: str, range_m_s2: float) -> Sheet:
     """What is known of the accelerometer of the sensor `name`, as its data sheet or the configuration has it."""
 
     def of(what: OfSensor) -> float:
-        return known.of(what, name, part)
+        return known.of(what, name)
 
     return Sheet(
         nonlinearity_percent=of("acceleration_nonlinearity_percent"),
@@ -136,8 +136,6 @@ def with_errors(
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
     own = errors_of(sheet, pieces, sensor.unseen_change_k, second_order=settings.second_order)
-    if not settings.expects_few_disturbed:
-        own = replace(own, disturbed_odds=len(pieces) / (len(pieces) + 1), turning_odds=1 / (len(pieces) + 1))
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
     return replace(movement, own=own, arm_turns=turns)
 

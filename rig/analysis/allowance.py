@@ -82,11 +82,12 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_s
     sensor, explained = result.sensor, result.explained
     return allowed_of(
         surroundings.uncertainty,
-        (name, sensor.part, sensor.range_rad_s or 0.0),
+        name,
+        sensor.range_rad_s or 0.0,
         finds_curve=explained is not None and explained.nonlinearity is not None,
         arcs=any(each.arc_rad is not None for each in result.observations),
         jitter_s=surroundings.state_jitter_s,
-        earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
+        earth_rad_s=_earth(surroundings, name, found_earth_rate(result.earth)),
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
         stamp_s=stamp_std_s or 0.0,
@@ -95,7 +96,8 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_s
 
 def allowed_of(
     uncertainty: Uncertainty,
-    of: tuple[str, str, float],
+    name: str,
+    full_scale_rad_s: float,
     *,
     finds_curve: bool,
     arcs: bool,
@@ -105,10 +107,9 @@ def allowed_of(
     at_s: Array,
     stamp_s: float = 0.0,
 ) -> Allowed:
-    """What is allowed `of` a sensor of that name, part and range (rad/s)."""
-    name, part, full_scale_rad_s = of
+    """Return what is allowed of the sensor `name` of that range."""
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
-    cube, square = (uncertainty.of(what, name, part) / 100 / np.sqrt(3) for what in CURVE)
+    cube, square = (uncertainty.of(what, name) / 100 / np.sqrt(3) for what in CURVE)
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=uncertainty.repeatability_std_rad,
@@ -133,8 +134,8 @@ def allow(known: Allowed, segments: Segments, ways: Segments, matrix: Array) -> 
     return Allowance(patterns(segments, matrix, known), ways, patterns(ways, matrix, on_ways), unstable)
 
 
-def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:
-    unknown = unknown_of(surroundings, name, part, earth_rate)
+def _earth(surroundings: Surroundings, name: str, earth_rate: EarthRate | None) -> Array:
+    unknown = unknown_of(surroundings, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         return np.asarray(way * np.sqrt(size.clip(min=0.0)), dtype=np.float64)

@@ -4,7 +4,7 @@ sections III-A and III-B, Figs. 4 and 6. Pure.
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -45,7 +45,7 @@ class BiasDrift:
     where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
     share beside that. `anew` is each repeat for itself, or the Fault it ends in. `time_s` and `temperature_c` (R,) are
     means over each repeat, times since the first. `freedom` (3,) is that of
-    `held.std`, `slope_freedom` (3,) that of the slope's standard deviation; None where nobody counts.
+    `held.std`, `slope_freedom` (3,) that of the slope's standard deviation.
     """
 
     held: BiasByRepeat
@@ -55,8 +55,8 @@ class BiasDrift:
     temperature_c: Array
     over_temperature: BiasOverTemperature | Fault
     earth_rate_known: bool
-    freedom: Array | None
-    slope_freedom: Array | None
+    freedom: Array
+    slope_freedom: Array
 
 
 Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
@@ -83,8 +83,6 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
     Raises Fault `not_all_attitudes` with fewer than two whole repeats, and as `solve_triaxial` for the first one.
     """
     site = settings.site
-    if site is None:  # recordings of before there was one know no dwells
-        return {}
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
     for planned in settings.planned_dwells:
         repeats[planned.repeat][planned.q_rad] = planned.index
@@ -97,12 +95,7 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
         if sensor.measures(ACCELERATION):
             accelerations = _whole(_accelerations(recordings, name, sensor), table)
             drifts[name][ACCELERATION] = acceleration_drift(accelerations, site, second_order=settings.second_order)
-    return drifts if settings.counts_freedom else {name: _uncounted(each) for name, each in drifts.items()}
-
-
-def _uncounted(drifts: Mapping[Quantity, BiasDrift]) -> dict[Quantity, BiasDrift]:
-    """The drifts without degrees of freedom, as recordings of before are reckoned."""
-    return {quantity: replace(drift, freedom=None, slope_freedom=None) for quantity, drift in drifts.items()}
+    return drifts
 
 
 def _whole(stands: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:

@@ -37,9 +37,9 @@ from rig.observation.timebase import TimeBase
 class SensorResult:
     """One sensor's calibration and what it rests on.
 
-    `explained` is the vector model with gravity and a wandering bias, None for recordings of before there was a site
-    and where the vector model has no solution. The `uncertainty` is that of the chosen solution, where it is the vector
-    model's or `newton`'s; there is none of another estimator.
+    `explained` is the vector model with gravity and a wandering bias, None where it has no solution. The
+    `uncertainty` is that of the chosen solution, where it is the vector model's or `newton`'s; there is none of
+    another estimator.
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
@@ -115,8 +115,8 @@ def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS
 def solve_observed(
     sensors: Mapping[str, RecordedSensor],
     recordings: Sequence[ObservedRun],
+    surroundings: Surroundings,
     estimator: str = DEFAULT_ESTIMATOR,
-    surroundings: Surroundings | None = None,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
     """Calibrate each of `sensors` from all recordings, which were made in these `surroundings`.
@@ -137,7 +137,7 @@ def _solve_sensor(
     name: str,
     sensor: RecordedSensor,
     recordings: Sequence[ObservedRun],
-    surroundings: Surroundings | None,
+    surroundings: Surroundings,
     estimator: Estimator,
     *,
     whole_matrix: bool,
@@ -148,17 +148,13 @@ def _solve_sensor(
     mounting = np.array(sensor.mounting)
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
-    explained: Explained | Fault | None = None
     earth_rate: EarthRate | Fault | None = None
-    if surroundings is None:
-        vector_model = or_fault(lambda: solve_vector(observations, rests, mounting))
-    else:
-        seen = see(recordings, name, surroundings)
-        if surroundings.finds_earth_rate:
-            known = known_of(surroundings, name, sensor.part)
-            earth_rate = or_fault(lambda: find_earth_rate(seen, mounting, known))
-        explained = or_fault(lambda: explain(_with(earth_rate, seen), mounting))
-        vector_model = explained if isinstance(explained, Fault) else explained.solution
+    seen = see(recordings, name, surroundings)
+    if surroundings.finds_earth_rate:
+        known = known_of(surroundings, name)
+        earth_rate = or_fault(lambda: find_earth_rate(seen, mounting, known))
+    explained = or_fault(lambda: explain(_with(earth_rate, seen), mounting))
+    vector_model = explained if isinstance(explained, Fault) else explained.solution
     algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
     by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
     solution = by_name[estimator] if estimator in by_name else solve_observations(observations, estimator)
@@ -170,13 +166,13 @@ def _solve_sensor(
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
         uncertainty=None
-        if surroundings is None or not isinstance(explained, Explained)
+        if isinstance(explained, Fault)
         else _budget_of(
             solution,
             explained,
             surroundings,
-            unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate), sensor.stamp_std_s),
-            (name, sensor.part),
+            unknown_of(surroundings, name, found_earth_rate(earth_rate), sensor.stamp_std_s),
+            name,
         ),
         six_observation=six_observation,
         algorithm_1=algorithm_1,
@@ -189,13 +185,13 @@ def _solve_sensor(
 
 
 def _budget_of(
-    solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, of: tuple[str, str]
+    solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
 ) -> Budget | None:
-    """The budget of the chosen solution, of a sensor of that name and part; there is one of two estimators."""
+    """Return the budget of the chosen solution of the sensor `name`; there is one of two estimators."""
     if isinstance(solution, VectorSolution):
         return budget(explained, unknown)
     if isinstance(solution, Solution) and solution.estimator == "newton":
-        axes_rad = float(np.radians(surroundings.uncertainty.of("non_orthogonality_deg", *of)))
+        axes_rad = float(np.radians(surroundings.uncertainty.of("non_orthogonality_deg", name)))
         return six_observation_budget(explained, solution, unknown, axes_rad)
     return None
 

@@ -87,14 +87,11 @@ class ClockCheck:
         return self.std**4 / sum(found) if any(found) else np.inf
 
 
-def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool = True) -> ClockCheck:
-    """The clock of one recording's controller, held against others: against every one, or as before against near ones.
-
-    A recording of before does not say whether a crystal holds its board's clock: it is taken to, as it is built.
-    """
+def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
+    """Return what is known of the clock of one recording's controller, compared with every other clock."""
     compared = (_by_computer(recording, known), _by_crystal(recording, known))
     pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
-    far = {BY_COMPUTER: pace if holds_every else REAL_TIME, BY_CRYSTAL: np.inf if holds_every else LOCKED}
+    far = {BY_COMPUTER: pace, BY_CRYSTAL: np.inf}
     found = [each for each in compared if each is not None and abs(each.error) < far[each.by]]
     half_width = known.controller_clock_ppm * PPM
     weights = np.array([3 / half_width**2, *(1 / each.std**2 for each in found)])

@@ -18,7 +18,6 @@ from rig.analysis.pieces_against_model import (
     beyond_chance,
     covariance_of,
     together,
-    tolerated,
     whiten,
     whiten_segments,
     whitening,
@@ -40,8 +39,15 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, bias_process, likeliest
 
 # Of one gyroscope, at most; the latter with an allowance alone. Which sweep is disturbed is a check beside them.
-CHECKS = ("bias_jumped", "cw_against_ccw", "loose_mounting", "residuals", "scale_changed", "sweeps_against_rests")
-BY_ALLOWANCE = ("axis_changed",)
+CHECKS = (
+    "axis_changed",
+    "bias_jumped",
+    "cw_against_ccw",
+    "loose_mounting",
+    "residuals",
+    "scale_changed",
+    "sweeps_against_rests",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +78,16 @@ class _Look:
         return Means(self.felt, self.segments.times_s, self.segments.sweep)
 
 
-def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allowance | None = None) -> Consistency:
-    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F.
-
-    Without an `allowance` every sensor is allowed what all were before, and the ways between the sweeps tell nothing.
-    """
+def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allowance) -> Consistency:
+    """Return every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
     felt = segments.rates_rad_s @ matrix.T
-    scatter = tolerated(segments, felt) if allowance is None else _allowed(segments, allowance.off_rad_s, allowance)
+    scatter = _allowed(segments, allowance.off_rad_s, allowance)
     bias = _wandering(segments, felt, _steady(segments), scatter)
     here = _Look(segments, felt, whiten_segments(segments, scatter, bias))
-    later = here if allowance is None else _on_ways(matrix, allowance, bias)
-    whole = None if allowance is None else each_axis(here.means.sweeps)
+    later = _on_ways(matrix, allowance, bias)
     found = told_by(later.held, changes(later.segments, later.felt), rate)
-    found |= told_by(here.held, differences(segments, felt, whole), rate)
-    if allowance is not None and (told := later.held.most_by_one(of_one_axis(later.segments, later.felt), rate)):
+    found |= told_by(here.held, differences(segments, felt, each_axis(here.means.sweeps)), rate)
+    if told := later.held.most_by_one(of_one_axis(later.segments, later.felt), rate):
         found["axis_changed"] = told
     jumped = _jumped(segments, felt, scatter, rate)
     if jumped is not None:
@@ -93,7 +95,7 @@ def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allow
     sweeps = np.unique(segments.sweep[segments.sweep >= 0]).tolist()
     ranked = unlike_the_others(here.held, sweeps, lambda sweep: of_sweep(segments, sweep), rate)
     disturbed = {sweep: each for sweep, each in ranked if each[0] > each[1]}
-    return Consistency(found, ranked[0][1], disturbed, {} if allowance is None else dict(_told_from(here, later, rate)))
+    return Consistency(found, ranked[0][1], disturbed, dict(_told_from(here, later, rate)))
 
 
 def would_tell(segments: Segments, matrix: Array, rate: float, allowance: Allowance) -> dict[str, float]:

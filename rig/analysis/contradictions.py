@@ -39,9 +39,8 @@ from rig.observation.transfers import average_transfers
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 NON_ORTHOGONALITY = "non_orthogonality"
-# Of a gyroscope, by what they tell: they share the false alarms. Other kinds of readings count as many.
-OF_READINGS = (*consistency.CHECKS, DISTURBED_SWEEP, *readings.CHECKS)
-OF_THE_MODEL = (*consistency.BY_ALLOWANCE, NON_ORTHOGONALITY)  # more where they are held to the model
+# Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
+CHECKS = (*consistency.CHECKS, DISTURBED_SWEEP, *readings.CHECKS, NON_ORTHOGONALITY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +63,16 @@ def contradictions(
     recordings: Sequence[ObservedRun],
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
-    surroundings: Surroundings | None,
+    surroundings: Surroundings,
     settings: RunSettings,
     *,
     false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
-    """What contradicts itself in these sensors' results; nothing before there was a site: such verdicts stay.
+    """Return what contradicts itself in these sensors' results.
 
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
     that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
     """
-    if settings.site is None:
-        return NOTHING
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     rate = _rate(recordings[0].run, sensors, settings, false_alarms)
@@ -85,14 +82,12 @@ def contradictions(
             continue
         windows = segment_recordings(name, recordings)
         segments = stack_segments(windows, explained, settings.site)
-        allowance = None
-        if surroundings is not None and settings.checked_by_model:
-            known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
-            matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
-            transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
-            ways = with_transfers(segments, transfers, windows, explained)
-            allowance = allow(known, segments, ways, matrix)
-        found = consistency.consistency(segments, explained.solution.matrix, rate, allowance)
+        known = allowed(surroundings, name, results[name], recordings[0].run.sensors[name].stamp_std_s)
+        matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
+        transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
+        ways = with_transfers(segments, transfers, windows, explained)
+        allowance = allow(known, segments, ways, matrix)
+        found = consistency.consistency(segments, matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
@@ -103,17 +98,14 @@ def contradictions(
             counts,
             segments.readings,
             rate,
-            np.median if settings.holds_all_kinds else np.min,
             digits=readings.digits_of(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
             frozen=max(longest_frozen(recording, name) for recording in recordings),
         )
         checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
-        if surroundings is not None and settings.checked_by_model:
-            stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
-            leaning = _leaning_deg(explained.solution, stated_deg, rate)
-            checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *leaning, unit="°"))
-        if surroundings is not None:
-            told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
+        stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name)
+        leaning = _leaning_deg(explained.solution, stated_deg, rate)
+        checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *leaning, unit="°"))
+        told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
     return Contradictions(tuple(checks), told_from)
 
 
@@ -141,14 +133,12 @@ def in_reference(
     *,
     drifting: bool = False,
 ) -> Contradictions:
-    """What contradicts itself in readings of gravity and field; nothing in recordings that hold only gyroscopes so.
+    """Return what contradicts itself in readings of gravity and field.
 
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
     steadily where it is `drifting`.
     """
-    known = settings.uncertainty
-    if known is None or not settings.holds_all_kinds:
-        return NOTHING
+    known = settings.stated_uncertainty
     asked: dict[tuple[str, Quantity], ReadInReference] = {
         **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
            for name, each in accelerometers.items()},
@@ -168,17 +158,13 @@ def in_reference(
 
 def _rate(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
     """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
-    kinds = len(sensors)
-    if settings.holds_all_kinds:
-        accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
-        kinds += len(accelerometers) + len(run.measuring(FIELD))
-    return rate_of_each(kinds, by_model=settings.checked_by_model, of_all=false_alarms)
+    accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
+    return rate_of_each(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
-def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
+def rate_of_each(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
     """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
-    checks = (*OF_READINGS, *OF_THE_MODEL) if by_model else OF_READINGS
-    return coverage.rate_of_each(of_all, len(checks) * kinds)
+    return coverage.rate_of_each(of_all, len(CHECKS) * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
@@ -198,7 +184,7 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
             recordings = taken_to_reference(recordings, settings, settings.reference_c).recordings
         chosen = {name: runs[0].sensors[name] for name in settings.to_calibrate}
         surroundings = surroundings_of(recordings, settings)
-        results = solve_observed(chosen, recordings, surroundings=surroundings)
+        results = solve_observed(chosen, recordings, surroundings)
         named = contradictions(recordings, results, settings.to_calibrate, surroundings, settings).disturbed
         accelerometers = calibrate_accelerometers(recordings, settings, results)
         named |= in_reference(recordings, accelerometers, {}, settings).disturbed

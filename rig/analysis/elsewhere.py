@@ -210,10 +210,7 @@ def _vector(data: ExternalData) -> VectorSolution:
 
 def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
     method, site, asked = known_method(name), settings.site, settings.elsewhere
-    if site is None or asked is None:
-        raise Refused(
-            "no_site", "the recording does not say where it was made", "Make the recording again from the two files"
-        )
+    assert asked is not None, "of readings of others"
     placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
     found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
     rates = found.results.get(RATE)

@@ -22,9 +22,9 @@ from rig.estimation.vector_model import VectorSolution, design_matrix, regress
 
 
 def of_angles(result: SensorResult) -> Array | None:
-    """(6,) degrees of freedom of a gyroscope's non-orthogonality, then of its mounting; None where nobody counts."""
+    """(6,) degrees of freedom of a gyroscope's non-orthogonality, then of its mounting; None without a budget."""
     explained, budget = result.explained, result.uncertainty
-    if explained is None or budget is None or not budget.by_freedom:
+    if explained is None or budget is None:
         return None
     solution = explained.solution
     turned = _to_angles(solution.matrix)
@@ -34,9 +34,9 @@ def of_angles(result: SensorResult) -> Array | None:
 
 
 def of_sensitivity(result: SensorResult) -> Array | None:
-    """(3, 3) degrees of freedom of a gyroscope's sensitivity to gravity; None where nobody counts or without it."""
+    """(3, 3) degrees of freedom of a gyroscope's sensitivity to gravity; None without it or a budget."""
     explained, budget = result.explained, result.uncertainty
-    if explained is None or budget is None or not budget.by_freedom:
+    if explained is None or budget is None:
         return None
     covariance = explained.solution.g_sensitivity_covariance
     if covariance is None:
@@ -46,33 +46,31 @@ def of_sensitivity(result: SensorResult) -> Array | None:
     return _split(whole, _of_readings(whole - walk, walk, explained), budget)
 
 
-def of_acceleration_angles(result: AccelerometerResult) -> Array | None:
-    """(3,) degrees of freedom of an accelerometer's non-orthogonality; None where nobody counts."""
+def of_acceleration_angles(result: AccelerometerResult) -> Array:
+    """Return the (3,) degrees of freedom of an accelerometer's non-orthogonality."""
     return _of_axes(result, result.solution.response, result.movement.noise())
 
 
 def of_second_order(result: AccelerometerResult) -> Array | None:
-    """(3,) degrees of freedom of an accelerometer's φ; None where nobody counts or it was not looked for."""
+    """(3,) degrees of freedom of an accelerometer's φ; None where it was not looked for."""
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
     return _in_attitudes(result.budget, result.solution.response[SECOND], result.movement.noise(), std)
 
 
-def of_field_angles(result: MagnetometerResult) -> Array | None:
-    """(3,) degrees of freedom of a magnetometer's non-orthogonality; None where nobody counts."""
+def of_field_angles(result: MagnetometerResult) -> Array:
+    """Return the (3,) degrees of freedom of a magnetometer's non-orthogonality."""
     response = response_in_attitudes(result.solution, result.seen)
     return _of_axes(result, response, np.diag(result.seen.variances_m2_s4.ravel()))
 
 
-def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
-    """Degrees of freedom of the mean scale factors (3,), of bias and arm's field (6,); None where nobody counts.
+def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array]:
+    """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
     Of the latter the fewest of any run's bias: a sum of independent parts never has fewer than its scarcest.
     """
     budgets = [each.result.budget for each in reversal.runs]
-    if not all(budget.by_freedom for budget in budgets):
-        return None
     # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
     scarce = np.sum([budget.std[:3] ** 4 / budget.freedom[:3] for budget in budgets], axis=0) / len(budgets) ** 4
     with np.errstate(divide="ignore"):
@@ -80,16 +78,14 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
     return scale, np.full(6, min(float(budget.freedom[3:].min()) for budget in budgets))
 
 
-def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array | None:
+def _of_axes(result: AccelerometerResult | MagnetometerResult, response: Array, noise: Array) -> Array:
     """Degrees of freedom of the angles between the axes, from the `response` (p, n) of all that was found."""
     turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9) @ response[F]
     return _in_attitudes(result.budget, turned, noise, result.triad.non_orthogonality_std_rad)
 
 
-def _in_attitudes(budget: Budget | None, response: Array, noise: Array, std: Array) -> Array | None:
+def _in_attitudes(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
     """Degrees of freedom of `std` (q,), from the `response` (q, n) to readings with that `noise` (n, n)."""
-    if budget is None or not budget.by_freedom:
-        return None
     by_noise = np.einsum("qn,nm,qm->q", response, noise, response)
     return _split(std**2, {NOISE: by_noise, ATTITUDES: std**2 - by_noise}, budget)
 

@@ -36,6 +36,6 @@ def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
             {name: result.solution for name, result in results.items()},
             settings.limits,
             {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
-            "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule,
+            settings.stated_uncertainty.decision_rule,
         ),
     )

@@ -44,8 +44,6 @@ def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tu
 
 
 def _on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
-    if settings.site is None:
-        return
     for kind in installed_kinds():
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():
             solve = partial(_solved, kind, name, recordings, settings, settings.site)

@@ -127,7 +127,7 @@ def _swept(
     polynomials: Polynomials,
 ) -> _Swept:
     surroundings = surroundings_of(recordings, settings)
-    results = solve_observed(runs[0].measuring(RATE), recordings, estimator, surroundings, settings.matrix_corrected)
+    results = solve_observed(runs[0].measuring(RATE), recordings, surroundings, estimator, settings.matrix_corrected)
     results, polynomials = _over_temperature(results, RATE, with_rate_polynomials, polynomials)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings, settings)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
@@ -145,9 +145,9 @@ def _swept(
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *among_rates.checks,
-            *clock_checks(surroundings.clocks if surroundings is not None else ()),
+            *clock_checks(surroundings.clocks),
         ),
-        clock=None if surroundings is None else surroundings.clock,
+        clock=surroundings.clock,
         told_from=among_rates.told_from,
     )
 
@@ -182,7 +182,7 @@ def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: R
 
 
 def _decision_rule(settings: RunSettings) -> DecisionRule:
-    return "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule
+    return settings.stated_uncertainty.decision_rule
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
@@ -233,7 +233,7 @@ def _gravity_left(
     left = []
     for each, matrix in corrections.items():
         solution = results[each].vector_model if each in results else None
-        if settings.site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
+        if not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
             return None
         turns = turns_of(each, after)
         attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)

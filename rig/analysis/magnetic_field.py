@@ -80,7 +80,7 @@ def _calibrated(
     accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
     site = settings.site
-    if not settings.planned_dwells or site is None:
+    if not settings.planned_dwells:
         raise Fault(
             "no_attitudes",
             "recorded only: sweeps do not calibrate a magnetometer",
@@ -111,7 +111,7 @@ def _calibrated(
             (alike, drift),
             site,
             field_t=known.norm,
-            noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel() if settings.counts_freedom else None,
+            noise_freedom=by_axis(each.reading.freedom for each in dwells).ravel(),
         ),
         beside=attempt_each({method: partial(solve, method=method) for method in BESIDE}),
         dwells=dwells,
@@ -125,7 +125,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
     if len(tests) < 2:
         return None
     means, variances = [test.mean for test in tests], [test.variance for test in tests]
-    found = field_drift(means, variances, _comes_back_rad(settings))
+    found = field_drift(means, variances, settings.stated_uncertainty.repeatability_std_rad)
     if not found.steady:
         change_t, std_t = np.linalg.norm(found.change_t), np.linalg.norm(found.std_t)
         raise Fault(
@@ -135,15 +135,6 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
             "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
         )
     return found
-
-
-def _comes_back_rad(settings: RunSettings) -> float:
-    """How far off home, about each axis, the arm stands in a test; a half-width was taken for that before."""
-    if settings.uncertainty is None:
-        return 0.0
-    if settings.spreads_returns:
-        return settings.uncertainty.repeatability_std_rad
-    return float(np.radians(settings.uncertainty.repeatability_deg))
 
 
 def _solved(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:

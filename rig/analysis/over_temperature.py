@@ -57,8 +57,6 @@ def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings,
     Raises Fault as `over_temperature` does, and `temperature_not_recorded`.
     """
     surroundings = surroundings_of(recordings, settings)
-    if surroundings is None:
-        raise NOT_RECORDED  # by a recording of before there was a site
     moved, found = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
     for name in settings.to_calibrate:
         if not recordings[0].run.sensors[name].measures(TEMPERATURE):
@@ -95,7 +93,10 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
 
 def with_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
     """A gyroscope's calibration with what the polynomials add to its uncertainty, and these with all of its budget."""
-    budget, whole = _together(RATE, polynomials, np.r_[result.scale, result.bias_rad_s], result.uncertainty)
+    parameters = np.r_[result.scale, result.bias_rad_s]
+    if result.uncertainty is None:
+        return result, settled(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
+    budget, whole = _together(RATE, polynomials, parameters, result.uncertainty)
     return replace(result, uncertainty=budget), whole
 
 
@@ -108,13 +109,11 @@ def with_acceleration_polynomials(
 
 
 def _together(
-    quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget | None
-) -> tuple[Budget | None, OverTemperature]:
+    quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
+) -> tuple[Budget, OverTemperature]:
     """A budget of scale factors and biases (6,) with the polynomials' part, and these, whose bias is in the reading."""
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
-    if budget is None:
-        return None, settled(polynomials, values, ())
     lines = tuple(
         Line(each.name, each.kind, each.distribution, each.source, each.freedom, sign @ each.covariance @ sign)
         for each in budget.contributors

@@ -99,8 +99,7 @@ def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
 
 
 def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
-    site = run.settings.site
-    gravity_m_s2 = None if site is None else site.gravity_m_s2
+    gravity_m_s2 = run.settings.site.gravity_m_s2
     results, faults = dict[QuantityInDwell, ReadAtRest](), dict[QuantityInDwell, Fault]()
     for name, sensor in recorded.items():
         faults |= {QuantityInDwell(name, ACCELERATION, i, ""): fault for i, fault in sensor.dwells.faults.items()}
@@ -112,8 +111,7 @@ def _accelerations(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[
 
 def _fields(run: RunData, recorded: Mapping[str, _Recorded]) -> Attempts[QuantityInDwell, ReadAtRest]:
     """Return what magnetometers read in the dwells of an accelerometer whose samples the same clock stamps."""
-    site = run.settings.site
-    expected_t = None if site is None else site.magnetic_field_t
+    expected_t = run.settings.site.magnetic_field_t
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):
         dwelling = (sensor for sensor, each in recorded.items() if each.dwells.results or each.dwells.faults)

@@ -11,11 +11,6 @@ from rig.analysis.suspicion import TOLD, Statistic, Suspected, basis, explained,
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
 
-# Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
-# a common statement of nonlinearity, amounts to at a quarter of the range.
-TOLERANCE = 5e-4
-WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
-
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
@@ -88,14 +83,6 @@ def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> 
     white = whitening(covariance_of(segments, scatter, bias), segments.variances_rad2_s2.min())
     seen = whiten(white, segments.means_rad_s.T[:, :, None])[:, 0]
     return WhitenedSegments(white, seen, whiten(white, each_axis(_known(segments))))
-
-
-def tolerated(segments: Segments, felt: Array) -> Scatter:
-    """What was allowed to every sensor alike: in all of a sweep, and within it."""
-    same = (segments.sweep[:, None] == segments.sweep) & (segments.sweep >= 0)
-    speed = np.linalg.norm(felt, axis=1)
-    off = (TOLERANCE**2 + np.outer(segments.speed_std, segments.speed_std)) * same * np.outer(speed, speed)
-    return Scatter(segments.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None], np.kron(np.eye(3), off))
 
 
 def covariance_of(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:

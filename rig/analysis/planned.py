@@ -42,7 +42,7 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
         return Told({}, {})
     run = planned_run(config, _one_set(plan), turner)
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
-    rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
+    rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors))
     rates: dict[str, tuple[ToldFrom, ...]] = {}
     if run.plan.sweeps and not run.plan.stages:  # what several mountings tell together is not foretold
         turned = planned_segments(run)
@@ -60,18 +60,19 @@ def _one_set(plan: Plan) -> Plan:
 
 
 def _told_from(run: PlannedRun, name: str, sensor: SensorSection, turned: Planned, rate: float) -> tuple[ToldFrom, ...]:
-    matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
+    matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
     seen = turned.read_by(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     at_s = seen.segments.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in run.plan.sweeps]))
     allowed = allowed_of(
         run.known,
-        of,
+        name,
+        full_scale_rad_s,
         finds_curve=len(speeds) > 1,
         arcs=run.settings.has_arcs,
         jitter_s=0.0,
         earth_rad_s=any_earth_rate(known=run.site.earth_rate_rad_s is not None or run.settings.finds_earth_rate),
-        sensor=known_sensor(run.known, of, np.zeros(len(at_s)), 0.0),
+        sensor=known_sensor(run.known, name, full_scale_rad_s, np.zeros(len(at_s)), 0.0),
         at_s=at_s,
     )
     found = would_tell(seen.segments, matrix, rate, allow(allowed, seen.segments, seen.ways, matrix))

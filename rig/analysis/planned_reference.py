@@ -36,7 +36,7 @@ class PlannedAccelerometer:
     @property
     def sheet(self) -> Sheet:
         """What the data sheet lets the accelerometer do beside the model."""
-        return sheet_of(self.run.known, self.name, self.sensor.part, self.range_m_s2)
+        return sheet_of(self.run.known, self.name, self.range_m_s2)
 
 
 def planned_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:

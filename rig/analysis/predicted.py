@@ -72,12 +72,13 @@ def _budget(config: RigConfig, run: PlannedRun, made: Made, name: str, sensor: S
     )
     parts = [_part(config, each, sensor, made) for each in _stages(run)]
     seen = put_together(parts, surroundings)
-    of = name, sensor.part, float(np.radians(sensor.range_deg_s))
-    stays = known_sensor(known, of, np.full(len(seen.windows_s), ROOM_C), STEP_K)
+    stays = known_sensor(
+        known, name, float(np.radians(sensor.range_deg_s)), np.full(len(seen.windows_s), ROOM_C), STEP_K
+    )
     off_deg = SITS_OFF_DEG if seen.mount_turns_rad is None else known.mount_deg
     seen = replace(seen, means_rad_s=_read(seen, _sitting_off(off_deg) @ mounting), sensor=stays)
     explained = explain(seen, mounting, BiasProcess(0.0, 0.0, 0, stays.instability_rad_s))
-    unknown = unknown_of(surroundings, name, sensor.part, None)
+    unknown = unknown_of(surroundings, name, None)
     if not scatters:
         return budget(explained, unknown)
     turns = [turn for part in parts for turn in part.turns]
@@ -85,7 +86,7 @@ def _budget(config: RigConfig, run: PlannedRun, made: Made, name: str, sensor: S
         replace(turn, average=replace(turn.average, mean_rad_s=mean))
         for turn, mean in zip(turns, seen.means_rad_s, strict=False)  # the rests come after them
     ]
-    axes_rad = float(np.radians(known.of("non_orthogonality_deg", name, sensor.part)))
+    axes_rad = float(np.radians(known.of("non_orthogonality_deg", name)))
     return six_observation_budget(explained, solve_six_observation(read, "newton"), unknown, axes_rad)
 
 

@@ -43,7 +43,8 @@ def _budget(of: PlannedAccelerometer) -> Budget:
     scale = scale_of(matrix(read.theta))
     told = scale_and_bias(matrix(read.theta), scale, len(read.theta))
     off = AttitudeError(off_rad, 0.0)
-    spread = Spread(scale, told @ covariance @ told.T, told @ response, movement.noise(), off, 0.0, 0)
+    known = np.full(response.shape[1], np.inf)
+    spread = Spread(scale, told @ covariance @ told.T, told @ response, movement.noise(), off, 0.0, 0, known)
     lag_s = 1e-3 * run.known.acceleration_lag_ms
     return accelerometer_lines(spread, read.theta, movement, run.site, lag_s, sheet=of.sheet)
 

@@ -21,7 +21,7 @@ def reached_so_far(runs: Sequence[RunData], estimator: str) -> Reached | None:
                 return None
             surroundings = surroundings_of(recordings, settings)
             sensors = runs[0].measuring(RATE)
-            found = solve_observed(sensors, recordings, estimator, surroundings, settings.matrix_corrected)
+            found = solve_observed(sensors, recordings, surroundings, estimator, settings.matrix_corrected)
     except Fault:  # what is wrong with it, the end of the run will say
         return None
     budgets = {name: found[name].uncertainty for name in settings.to_calibrate}

@@ -5,7 +5,7 @@ readings and no two stretches alike. Where the noise is below a step none of thi
 that of the source: a count of a converter, a unit of a message that holds whole numbers, the last digit of a line.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +20,6 @@ from rig.observation.raw_readings import MEMORY, RawReadings, innovation_std
 from rig.observation.steps_that_count import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
-Usual = Callable[..., Any]  # `np.median`, `np.min`
 
 CHECKS = ("clipping", "repeated_readings", "skewed_noise", "spikes", "stuck_axis", "stuck_bit")  # of a sensor, at most
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
@@ -79,15 +78,14 @@ def judge_readings(
     counts: Sequence[NDArray[np.int64]],
     windows: Sequence[RawReadings],
     rate: float,
-    usual: Usual = np.median,
     *,
     digits: Digits = COUNTS,
     frozen: int = 0,
 ) -> Statistics:
     """Every check's statistic and limit by its name, from all readings (n, 3) of each recording and from the windows.
 
-    `rate` is that of false alarms for each, where it is not far smaller. The noise is the `usual` one of the windows,
-    the median: one in which an axis stands still does not make it a sensor without noise. `frozen` is the longest run
+    `rate` is that of false alarms for each, where it is not far smaller. The noise is the median of
+    the windows': one in which an axis stands still does not make it a sensor without noise. `frozen` is the longest run
     of equal readings of an axis that moved meanwhile.
     """
     from scipy.special import ndtri
@@ -95,7 +93,7 @@ def judge_readings(
     sure = -float(ndtri(rate / (2 * 3 * 16)))  # of a normal variable, over three axes and their bits
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [innovation_std(window.counts) for window in at_rest]
-    noise = np.asarray(usual(noises, axis=0), dtype=np.float64)
+    noise = np.asarray(np.median(noises, axis=0), dtype=np.float64)
     steps_of_noise = noise / digits.step_counts
     noisy = steps_of_noise >= 1
     spikes, of_a_bit = _spikes(windows, digits.step_counts)

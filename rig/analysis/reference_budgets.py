@@ -41,7 +41,7 @@ def accelerometer_budget(
     site: Site,
     lag_s: float,
     *,
-    noise_freedom: Array | None = None,
+    noise_freedom: Array,
     sheet: Sheet | None = None,
 ) -> Budget:
     """The budget of the solution found from the `movement`; `lag_s` is how late the sensor's own filter may be.
@@ -79,7 +79,7 @@ def magnetometer_budget(
     site: Site,
     *,
     field_t: float,
-    noise_freedom: Array | None = None,
+    noise_freedom: Array,
 ) -> Budget:
     """The budget of a solution found from what was `seen`, in tesla."""
     alike, drift = tested
@@ -101,7 +101,7 @@ def _spread(
     error: AttitudeError,
     left: tuple[float, int],
     *,
-    noise_freedom: Array | None,
+    noise_freedom: Array,
 ) -> Spread:
     """Spread of scale and bias, from the `response` (p, n) of all found; `left`: residuals' χ², its freedom."""
     scale = scale_of(solution.matrix)
@@ -155,5 +155,5 @@ def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift
     if drift is None:
         said = f"procedure.field_test_s {NOT_GIVEN}"
         return assumed("drift of the field", change_t / FIELD.bias.size, "µT", said, spread.of(patterns))
-    freedom = float(TESTED_AXES) if spread.noise_freedom is not None else np.inf
-    return Contributor("drift of the field", "A", "normal", None, "", "tests at home", freedom, spread.of(patterns))
+    tested = spread.of(patterns)
+    return Contributor("drift of the field", "A", "normal", None, "", "tests at home", float(TESTED_AXES), tested)

@@ -84,7 +84,7 @@ def of_accelerometer(
     pieces = pieces_of(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
-    flicker_m_s2 = MICRO_G_M_S2 * known.of("acceleration_bias_instability_ug", name, sensor.part)
+    flicker_m_s2 = MICRO_G_M_S2 * known.of("acceleration_bias_instability_ug", name)
     lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
     off_rad = solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(sensor.mounting), off_rad)

@@ -19,7 +19,7 @@ class Surroundings:
 
     `extension_m` (3,) is where the sensors sit, from the flange, in its frame.
     `clock` is the one that speeds are corrected by, `clocks` what every recording that is held against others says.
-    `finds_earth_rate` says that the site is not asked for the Earth's rate, `counts_freedom` as `RunSettings` does.
+    `finds_earth_rate` says that the site is not asked for the Earth's rate,
     """
 
     site: Site
@@ -29,32 +29,27 @@ class Surroundings:
     extension_m: tuple[float, float, float]
     finds_earth_rate: bool = False
     state_jitter_freedom: float = inf
-    counts_freedom: bool = True
     clocks: tuple[ClockCheck, ...] = ()
 
 
-def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings | None:
-    """Return what surrounded the sensors by a run's settings; None where those of before know no site.
+def surroundings_of(recordings: Sequence[ObservedRun], settings: RunSettings) -> Surroundings:
+    """Return what surrounded the sensors by a run's settings.
 
     The clock is that of the longest motion, which tells it best: the controller's is one quartz in all recordings, and
-    where it was another, or its computer's time was, the others tell. What was made before knows the longest alone.
+    where it was another, or its computer's time was, the others tell.
     """
-    if settings.site is None or settings.uncertainty is None:
-        return None
+    known = settings.stated_uncertainty
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    held = recordings if settings.holds_every_clock else [longest]
-    known, holds_every = settings.uncertainty, settings.holds_every_clock
-    clocks = tuple(check_clock(each, known, holds_every=holds_every) for each in held)
-    clock = next(check for each, check in zip(held, clocks, strict=True) if each is longest)
-    jitter = state_jitter(held)
+    clocks = tuple(check_clock(each, known) for each in recordings)
+    clock = next(check for each, check in zip(recordings, clocks, strict=True) if each is longest)
+    jitter = state_jitter(recordings)
     return Surroundings(
         settings.site,
-        settings.uncertainty,
+        known,
         clock,
-        jitter.std_s * (BETWEEN_TWO if settings.knows_returns else 1.0),
+        jitter.std_s * BETWEEN_TWO,
         settings.extension_m,
         settings.finds_earth_rate,
         jitter.freedom,
-        settings.counts_freedom,
-        clocks if settings.holds_every_clock else (),
+        clocks,
     )

@@ -41,7 +41,7 @@ def of_gyroscope(
     if explained is None:
         return
     means, mounting = _means(explained), np.array(result.sensor.mounting)
-    unknown = unknown_of(surroundings, name, result.sensor.part, found_earth_rate(result.earth))
+    unknown = unknown_of(surroundings, name, found_earth_rate(result.earth))
     for each in DAMAGES:
         if (size := sizes.get(each.what)) is None:
             continue

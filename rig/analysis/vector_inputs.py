@@ -11,7 +11,7 @@ from rig.analysis.surroundings import Surroundings
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Unknown, uncounted
+from rig.estimation.budget import Unknown
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_fit import Seen
@@ -89,7 +89,7 @@ def put_together(parts: Sequence[Part], surroundings: Surroundings) -> Seen:
         encoder_errors_rad_s=_encoder_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty),
         mount_turns_rad=mount_turns(mounted, len(rests), surroundings.uncertainty.mount_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
-        noise_freedom=by_axis(average.freedom for average in averages) if surroundings.counts_freedom else np.inf,
+        noise_freedom=by_axis(average.freedom for average in averages),
         ripples=np.array([*(turn.ripple for turn, _ in turns), *np.zeros(len(rests))]),
         roundings_rad_s=np.sqrt(by_axis(average.rounding_rad2_s2 for average in averages)),
     )
@@ -99,22 +99,20 @@ def _sensor_of(
     surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
-    of = name, sensor.part, sensor.range_rad_s
-    known = known_sensor(surroundings.uncertainty, of, temperature_c, sensor.unseen_change_k)
+    known = known_sensor(surroundings.uncertainty, name, sensor.range_rad_s, temperature_c, sensor.unseen_change_k)
     return replace(known, temperature_words=sensor.temperature_words)
 
 
 def known_sensor(
-    known: Uncertainty, of: tuple[str, str, float], temperature_c: Array, temperature_step_k: float
+    known: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> KnownSensor:
-    """What is stated `of` a sensor of that name, part and range (rad/s), and how warm it was in each average (N,)."""
-    name, part, full_scale_rad_s = of
+    """Return what is stated of the sensor `name` of that range, and how warm it was in each average (N,)."""
     return KnownSensor(
-        nonlinearity=known.of("nonlinearity_percent", name, part) / 100,
+        nonlinearity=known.of("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
-        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, part))),
-        scale_per_k=PPM * known.of("scale_ppm_k", name, part),
-        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, part) / 3600)),
+        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name))),
+        scale_per_k=PPM * known.of("scale_ppm_k", name),
+        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name) / 3600)),
         temperature_c=temperature_c,
         temperature_step_k=temperature_step_k,
     )
@@ -190,27 +188,27 @@ def _visits(turns: Sequence[Observation]) -> list[list[int]]:
     return found
 
 
-def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
+def known_of(surroundings: Surroundings, name: str) -> Known:
     """What is known of surroundings and sensor before the Earth's rate is looked for."""
     site, uncertainty = surroundings.site, surroundings.uncertainty
     return Known(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
-        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name, part) > 0,
+        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name) > 0,
         repeatability_rad=uncertainty.repeatability_std_rad,
         state_jitter_s=surroundings.state_jitter_s,
     )
 
 
 def unknown_of(
-    surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
+    surroundings: Surroundings, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> Unknown:
-    """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found.
+    """Return what no recording shows of the surroundings of the sensor `name`, and the Earth's rate it found.
 
     `stamp_std_s` is as of `RecordedSensor`.
     """
     known, clock = surroundings.uncertainty, surroundings.clock
-    found = Unknown(
+    return Unknown(
         clock_std=clock.std,
         clock_freedom=clock.freedom,
         clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
@@ -223,9 +221,8 @@ def unknown_of(
         mount_rad=float(np.radians(known.mount_deg)),
         stamp_std_s=stamp_std_s or 0.0,
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
+        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,
     )
-    return found if surroundings.counts_freedom else uncounted(found)

@@ -141,12 +141,10 @@ def acceleration_checks(
 ) -> tuple[Check, ...]:
     """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out.
 
-    With a budget its combined uncertainties are judged; else the solution's, relative to the stated gravity.
+    The budget's combined uncertainties are judged.
     """
-    std = np.sqrt(np.diag(result.triad.covariance)) if result.budget is None else result.budget.std
-    spreads = (_twice(std[:3]), _twice(std[3:])) if result.budget is None else _spreads(result.budget)
     held = _Held(sensor, "acceleration", limits, rule)
-    checks = held.calibration(result.triad.scale, result.bias_m_s2, std, spreads)
+    checks = held.calibration(result.triad.scale, result.bias_m_s2, result.budget.std, _spreads(result.budget))
     return checks if result.held_out is None else (*checks, held.check("verification", result.held_out.rms_m_s2))
 
 
@@ -157,7 +155,7 @@ def drift_checks(
     checks = []
     for quantity, drift in drifts.items():
         std = drift.held.largest_change_std
-        spread = _twice(std) if drift.freedom is None else _by_freedom(std, drift.freedom)
+        spread = _by_freedom(std, drift.freedom)
         checks.append(
             _Held(sensor, quantity.name, limits, rule).nearest("bias_drift", drift.held.largest_change, spread)
         )
@@ -171,8 +169,7 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
 
 def _spreads(budget: Budget) -> tuple[Spread, Spread]:
     """The spreads of scale factors and of biases; twice a standard uncertainty is taken for a normal distribution's."""
-    freedom = budget.freedom if budget.by_freedom else np.full(6, np.inf)
-    of = budget.expanded, budget.coverage_factors, freedom
+    of = budget.expanded, budget.coverage_factors, budget.freedom
     return Spread(*(each[:3] for each in of)), Spread(*(each[3:] for each in of))
 
 

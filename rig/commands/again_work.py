@@ -84,6 +84,5 @@ def _given(folder: Path, task: Task) -> Answer:
         document.verdict,
         tuple(each.name for each in document.checks if not each.passed),
         followed(document),
-        recorded.movement[0].settings.reckoning,
         left_out(recorded),
     )

@@ -14,7 +14,7 @@ from rig.commands.spread import Answered, Cluster, Processes, Solve, one_by_one,
 from rig.commands.waiting import answer_of
 from rig.config.written_file import write_new
 from rig.data.run_folder import refuse_links
-from rig.data.settings import RECKONING, known_setting
+from rig.data.settings import known_setting
 from rig.data.version import VERSION
 from rig.errors import Fault, Refused
 from rig.history.again import Answer, Outcome, Stated, compared, to_solve
@@ -73,8 +73,7 @@ def _question(options: Namespace) -> Question:
         known_setting(item)
     if options.estimator is not None:
         known_estimator(options.estimator)
-    # Older recordings keep the way of reckoning they were made with; today's method is today's way.
-    return Question(VERSION, (f"reckoning={RECKONING}", *options.overrides), options.estimator)
+    return Question(VERSION, tuple(options.overrides), options.estimator)
 
 
 def _stated(options: Namespace, selection: Selection) -> tuple[str, tuple[Stated, ...]]:

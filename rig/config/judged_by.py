@@ -1,10 +1,8 @@
 """What a recording is judged by beside limits, a row each key: its range, its usual value, and what it means.
 
-One table for the section of a configuration and for the settings that are recorded. What a row is in recordings that
-are older than itself, it says by `Before`; one that says nothing is in all of them.
+One table for the section of a configuration and for the settings that are recorded, which have every key.
 """
 
-from dataclasses import dataclass
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
@@ -30,16 +28,6 @@ OfSensor = Literal[
 ]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 OfSensors = TypeVar("OfSensors")  # a size that a configuration states of all sensors, a recording of each by its name
-
-
-@dataclass(frozen=True, eq=False)
-class Before:
-    """What a key is in recordings of before there was it."""
-
-    value: object
-
-
-SAID_OF_NONE = Before({})
 
 
 def _the_parts(what: str, unit: str | None = None) -> Any:
@@ -101,14 +89,14 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         description="error of the direction of each wrist's axis in the kinematics that are used; the usual value "
         "is 1 mrad, as for calibrated arms of this size (Slamani, Nubiola and Bonev, 2012)",
     )
-    repeatability_deg: Annotated[float, Before(0.0)] = Field(
+    repeatability_deg: float = Field(
         default=0.005,
         ge=0,
         le=5,
         description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
         "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
     )
-    thermometer_gradient_k: Annotated[float, Before(0.1)] = Field(
+    thermometer_gradient_k: float = Field(
         default=0.1,
         ge=0,
         le=20,
@@ -116,14 +104,14 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         "differ otherwise in use than in the run; the usual value is assumed, for no data sheet states it",
         json_schema_extra={"unit": "K"},
     )
-    angle_std_deg: Annotated[float | None, Before(None)] = Field(
+    angle_std_deg: float | None = Field(
         default=None,
         ge=0,
         le=5,
         description="standard deviation of a joint's angle about the angle of its encoder: for sweeps that are no "
         "whole turns. No default, for no maker of these arms states it; whole turns do not need it",
     )
-    mount_deg: Annotated[float, Before(0.0)] = Field(
+    mount_deg: float = Field(
         default=1.0,
         ge=0,
         le=10,
@@ -136,7 +124,7 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         description="how far the sensor may be from the flange's centre, or from the end of `arm.extension_mm`, "
         "along each axis, in either direction",
     )
-    acceleration_lag_ms: Annotated[float, Before(5.0)] = Field(
+    acceleration_lag_ms: float = Field(
         default=5.0,
         ge=0,
         le=100,
@@ -144,46 +132,40 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
         "half the square of the angle (in rad) that the arm turns in this time",
         json_schema_extra={"unit": "ms"},
     )
-    g_sensitivity_deg_s_g: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    g_sensitivity_deg_s_g: OfSensors = _the_parts(
         "change of a reading for 1 g, if attitudes do not determine it", "°/s/g"
     )
-    nonlinearity_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    nonlinearity_percent: OfSensors = _the_parts(
         "largest distance of a gyroscope's curve from the best straight line, in per cent of full scale, for the "
         "odd part of the curve and for the even part; used if there is only one speed",
         "%",
     )
-    asymmetry_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    asymmetry_percent: OfSensors = _the_parts(
         "even part of a gyroscope's curve, in per cent of full scale, that is allowed although one scale factor is"
         " stated for both directions; more of it fails the check `cw_against_ccw`",
         "%",
     )
-    bias_deg_s_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts("change of a gyroscope's bias for 1 K", "°/s/K")
-    scale_ppm_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
-        "change of a gyroscope's scale factor for 1 K", "ppm/K"
-    )
-    bias_instability_deg_h: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    bias_deg_s_k: OfSensors = _the_parts("change of a gyroscope's bias for 1 K", "°/s/K")
+    scale_ppm_k: OfSensors = _the_parts("change of a gyroscope's scale factor for 1 K", "ppm/K")
+    bias_instability_deg_h: OfSensors = _the_parts(
         "smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias wanders, even "
         "with the longest average",
         "°/h",
     )
-    non_orthogonality_deg: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    non_orthogonality_deg: OfSensors = _the_parts(
         "how much the angle between two axes of a gyroscope may differ from 90°"
     )
-    acceleration_nonlinearity_percent: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    acceleration_nonlinearity_percent: OfSensors = _the_parts(
         "largest distance of an accelerometer's curve from the best straight line, in per cent of "
         "`acceleration_nonlinear_over_g`",
         "%",
     )
-    acceleration_nonlinear_over_g: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    acceleration_nonlinear_over_g: OfSensors = _the_parts(
         "acceleration in either direction for which this nonlinearity is stated; 0 means the range that is set", "g"
     )
-    acceleration_bias_mg_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
-        "change of an accelerometer's bias for 1 K", "mg/K"
-    )
-    acceleration_scale_ppm_k: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
-        "change of an accelerometer's scale factor for 1 K", "ppm/K"
-    )
-    acceleration_bias_instability_ug: Annotated[OfSensors, SAID_OF_NONE] = _the_parts(
+    acceleration_bias_mg_k: OfSensors = _the_parts("change of an accelerometer's bias for 1 K", "mg/K")
+    acceleration_scale_ppm_k: OfSensors = _the_parts("change of an accelerometer's scale factor for 1 K", "ppm/K")
+    acceleration_bias_instability_ug: OfSensors = _the_parts(
         "smallest Allan deviation of an accelerometer at rest", "µg"
     )
     decision_rule: DecisionRule = Field(
@@ -205,12 +187,8 @@ class UncertaintySection(UncertaintyKeys[NonNegative | None], extra="forbid"):
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 
 
-def as_recorded(cls: type[BaseModel], document: Any) -> Any:
-    """The keys of a recording, with those it is too old for. Raises ValueError where it lacks another."""
-    if not isinstance(document, dict):
-        return document
-    of = cls.model_fields.items()
-    before = {key: each.value for key, field in of for each in field.metadata if isinstance(each, Before)}
-    if lacking := cls.model_fields.keys() - before.keys() - document.keys():
-        raise ValueError(f"lacks {', '.join(sorted(lacking))}")
-    return {**before, **document}
+def refuse_missing_keys(cls: type[BaseModel], document: Any) -> Any:
+    """Return a recording's keys as they are. Raise ValueError naming those that are missing."""
+    if isinstance(document, dict) and (missing := cls.model_fields.keys() - document.keys()):
+        raise ValueError(f"lacks {', '.join(sorted(missing))}")
+    return document

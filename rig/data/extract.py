@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.reading_process import MAX_UNPACKED, ReadingLimits, size_without_holes
-from rig.data.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, states_name
+from rig.data.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 MAX_SENSORS = 64
@@ -50,7 +50,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
     with h5py.File(path, "r", **mode) as file:
         schema = _text(file, "schema")
         if schema not in TEXTS:
-            raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
+            raise ValueError(f"its schema is {schema!r:.60}; this version of the rig reads {SCHEMA!r}")
         texts = {name: _text(file, name) for name in TEXTS[schema]}
         elsewhere = schema == SCHEMA_ELSEWHERE
         group = {} if elsewhere else _member(file, "samples", h5py.Group)
@@ -58,7 +58,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             raise ValueError(f"it announces {len(group)} sensors")
         samples = {name: _member(group, name, h5py.Dataset) for name in group}
         described = {name: {key: _plain(value) for key, value in each.attrs.items()} for name, each in samples.items()}
-        named = (states_name(schema), "events", *(TABLES if elsewhere else ()))
+        named = ("states", "events", *(TABLES if elsewhere else ()))
         rows = {f"samples/{name}": each for name, each in samples.items()}
         rows |= {name: _member(file, name, h5py.Dataset) for name in named}
         for name, dataset in rows.items():

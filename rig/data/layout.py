@@ -1,15 +1,13 @@
-"""How a run lies in HDF5 (schema "rig.run/4").
+"""How a run lies in HDF5 (schema "rig.run/1").
 
 `/samples/<sensor>` (its stamps and a column for each of its channels; the sensor's description as attributes, with the
 `channels` in JSON), `/states` (of the turner, of the type that `turner` describes: `rig.data.recorded_turner`),
 `/events` (bytes: SWMR forbids data of variable length, so an event is a line of JSON); `schema`, `config` (YAML),
-`settings`, `provenance` and `turner` (JSON) as attributes of the file. Schema "rig.run/3" has no `turner`, and `/arm`
-(ARM_STATE_DTYPE) in place of `/states`; "rig.run/2" has attributes of fixed names in place of `channels`, and
-"rig.run/1" lacks `settings` as well.
+`settings`, `provenance` and `turner` (JSON) as attributes of the file.
 
-Readings from elsewhere (schema "rig.files/1") have no `/samples` and an empty `/arm`, but the tables `/readings` and
-`/motion` (a float column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose readings, and what the
-motion tells).
+Readings from elsewhere (schema "rig.files/1") have no `/samples` and no rows in `/states`, but the tables `/readings`
+and `/motion` (a float column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose readings, and what
+the motion tells).
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,11 +23,9 @@ from rig.config.written_file import write_new
 from rig.data.checked import parsed, seen
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.recorded_turner import RecordedTurner, turner_of
-from rig.data.schema import EVENTS_DTYPE, SCHEMA, states_name
-from rig.data.sensor_of_run_2 import described_in_channels
+from rig.data.schema import EVENTS_DTYPE, SCHEMA
 from rig.motion.state import ARM_STATE_DTYPE
 
-IN_CHANNELS = (SCHEMA, "rig.run/3")
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
 
@@ -54,11 +50,11 @@ class Contents:
     @cached_property
     def sensors(self) -> dict[str, RecordedSensor]:
         """The sensors that the attributes of their samples describe, by name. Raises ValueError."""
-        return {name: recorded_sensor(self.schema, name, each) for name, each in self.described.items()}
+        return {name: recorded_sensor(name, each) for name, each in self.described.items()}
 
     @cached_property
     def turner(self) -> RecordedTurner | None:
-        """The turner that its text describes, None in a schema without one. Raises ValueError."""
+        """The turner that its text describes, None of readings from elsewhere. Raises ValueError."""
         return turner_of(self.texts["turner"]) if self.schema == SCHEMA else None
 
 
@@ -74,11 +70,9 @@ def empty(
     return Contents(schema, texts, described, samples, np.empty(0, states_dtype), np.empty(0, EVENTS_DTYPE))
 
 
-def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
-    """The sensor that the attributes of its samples describe in a file of that schema. Raises ValueError."""
+def recorded_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
+    """Return the sensor that the attributes of its samples describe. Raise ValueError naming what is wrong."""
     attributes = seen(dict(attributes))
-    if schema not in IN_CHANNELS:
-        return sensor_of(described_in_channels(name, attributes))
     channels = attributes.get("channels")
     if not isinstance(channels, str):
         raise ValueError(f"the channels of {name} are not a text")
@@ -89,7 +83,7 @@ def check_rows(contents: Contents) -> None:
     """Raises ValueError where rows are not of the type that the texts and descriptions beside them say."""
     states_dtype = contents.turner.dtype if contents.turner else ARM_STATE_DTYPE
     rows = {f"samples/{name}": (contents.samples[name], each.sample_dtype) for name, each in contents.sensors.items()}
-    rows |= {states_name(contents.schema): (contents.states, states_dtype), "events": (contents.events, EVENTS_DTYPE)}
+    rows |= {"states": (contents.states, states_dtype), "events": (contents.events, EVENTS_DTYPE)}
     rows |= {name: (table, table_dtype(table.dtype.names or ())) for name, table in contents.tables.items()}
     for name, (found, meant) in rows.items():
         if found.dtype != meant:
@@ -126,7 +120,7 @@ def _image(contents: Contents, libver: str | None) -> bytes:
 
     with h5py.File("in memory", "w", libver=libver, driver="core", backing_store=False) as file:
         file.attrs.update(schema=contents.schema, **contents.texts)
-        _dataset(file, states_name(contents.schema), contents.states, CHUNK_ROWS)
+        _dataset(file, "states", contents.states, CHUNK_ROWS)
         _dataset(file, "events", contents.events, CHUNK_BYTES)
         for name, rows in contents.tables.items():
             _dataset(file, name, rows, CHUNK_ROWS)

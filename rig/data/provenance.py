@@ -33,14 +33,12 @@ class Provenance:
     """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
 
     What turned the sensors is called the arm, whatever it is. `stored_calibrations` are those by which the board
-    corrected what it streamed, by sensor name. `arm_kinematics` is the geometry that was reckoned with; older
-    recordings do not say (None): that was the nominal arm's. `tcp_offset` is where the controller's tool centre point
-    stood in the flange's frame, which nothing is reckoned with; None where it was not told. `arm_maker` and `arm_model`
-    are those of what was found; older recordings do not say (None): any arm was taken for a UR10e. `turner_kind` is the
-    kind it is registered as, None in recordings of before there were several: an arm of Universal Robots.
-    `board_follows_crystal` is the board's own word on its clock, None where there is no board and in older recordings.
-    Files of schema "rig.run/1" do not name the script; that was an installed one. `readings_file` and `motion_file` are
-    those of readings recorded elsewhere, with no arm and no board.
+    corrected what it streamed, by sensor name. `arm_kinematics` is the geometry of the turner, None where there is
+    none. `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is
+    reckoned with; None where it was not told. `arm_maker` and `arm_model` are those of what was found,
+    `turner_kind` is the kind it is registered as. `board_follows_crystal` is the board's own word on its clock,
+    None where there is no board. `readings_file` and `motion_file` are those of readings recorded elsewhere, with
+    no arm and no board.
     """
 
     started_utc: Utc

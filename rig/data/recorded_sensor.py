@@ -42,7 +42,7 @@ class RecordedSensor:
     rate_hz: Positive
     channels: Annotated[tuple[Channel, ...], Field(min_length=1, max_length=MAX_CHANNELS)]
     mounting: Mounting = AS_THE_FLANGE
-    mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
+    mode: Literal["raw", "calibrated"] = "raw"
     clock: str | None = None
     stamp_std_s: Positive | None = None
 

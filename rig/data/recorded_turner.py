@@ -28,7 +28,7 @@ class RecordedTurner:
 
     `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
     angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
-    `Made`, zero in recordings of before.
+    `Made`.
     """
 
     kind: Kind
@@ -52,10 +52,7 @@ class RecordedTurner:
 
     def to_json(self) -> str:
         """The description as it stands in a run file."""
-        document = asdict(self)
-        if not self.reading_std_rad:
-            del document["reading_std_rad"]
-        return json.dumps(document, allow_nan=False)
+        return json.dumps(asdict(self), allow_nan=False)
 
 
 def described(document: Any) -> RecordedTurner:

@@ -30,10 +30,8 @@ from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
 from rig.data.reading_process import UnreadableFile, read_apart, size_without_holes
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner, check_joints
-from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, states_name
+from rig.data.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
 from rig.data.settings import RunSettings, settings_from_json
-from rig.data.settings_of_run_1 import settings_of_configuration
-from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 from rig.motion.state import State
@@ -181,7 +179,7 @@ class RunRecorder:
                 append(self._file["samples"][name], np.concatenate(batches))
         if pending.states:
             records = [state.to_record() for state in pending.states]
-            append(self._file[states_name(SCHEMA)], np.array(records, self._states_dtype))
+            append(self._file["states"], np.array(records, self._states_dtype))
         if pending.events:
             append(self._file["events"], np.frombuffer(b"".join(pending.events), EVENTS_DTYPE))
 
@@ -301,10 +299,7 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
 
 
 def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunSettings:
-    if "settings" in contents.texts:
-        settings = settings_from_json(contents.texts["settings"])
-    else:
-        settings = settings_of_configuration(contents.texts["config"])
+    settings = settings_from_json(contents.texts["settings"])
     if (settings.elsewhere is None) != (contents.schema != SCHEMA_ELSEWHERE):
         raise ValueError("its settings are those of other readings")
     if settings.elsewhere is not None:
@@ -314,15 +309,14 @@ def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunS
         raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
     for name, sensor in sensors.items():
         moved = sensor.measures(RATE) or sensor.measures(ACCELERATION)
-        if moved and settings.uncertainty is not None and not settings.uncertainty.knows(name, sensor.part):
-            raise ValueError(f"nothing is known of the part {quote(sensor.part)} of its sensor {name}")
+        if moved and not settings.stated_uncertainty.knows(name):
+            raise ValueError(f"its settings state no uncertainty of its sensor {quote(name)}")
     return settings
 
 
 def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
     turner = contents.turner
-    if turner is None:
-        return turner_of_provenance(provenance)
+    assert turner is not None, "its schema has the text of one"
     if provenance.arm_kinematics not in (None, turner.geometry):
         raise ValueError("its provenance has another geometry than its turner")
     return turner

@@ -5,19 +5,11 @@ Whoever reads a file as it stands there imports nothing else of the rig, for he 
 
 import numpy as np
 
-SCHEMA = "rig.run/4"
+SCHEMA = "rig.run/1"
 SCHEMA_ELSEWHERE = "rig.files/1"
 TABLES = ("readings", "motion")
 TEXTS = {
     SCHEMA: ("config", "settings", "provenance", "turner"),
     SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
-    "rig.run/3": ("config", "settings", "provenance"),
-    "rig.run/2": ("config", "settings", "provenance"),
-    "rig.run/1": ("config", "provenance"),
 }
 EVENTS_DTYPE = np.dtype("u1")
-
-
-def states_name(schema: str) -> str:
-    """The name of the dataset of states in a file of that schema."""
-    return "states" if schema == SCHEMA else "arm"

@@ -1,7 +1,7 @@
 """What a recording is judged by: recorded beside it, typed, and with a version of its own.
 
 The configuration a run was made with is kept as text, for people. Its keys may change from one version of the rig to
-the next; these do not, so that an old recording is judged as it was, or by what `rig solve --set` says instead.
+the next; these do not, so that a recording is judged as it was, or by what `rig solve --set` says instead.
 """
 
 import json
@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from rig.config.judged_by import OF_SENSORS, NonNegative, ObservationKeys, OfSensor, UncertaintyKeys, as_recorded
+from rig.config.judged_by import (
+    OF_SENSORS,
+    NonNegative,
+    ObservationKeys,
+    OfSensor,
+    UncertaintyKeys,
+    refuse_missing_keys,
+)
 from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, OfJoints, Positive, checked, parsed
@@ -29,11 +36,7 @@ if TYPE_CHECKING:
     from rig.config.models import RigConfig
     from rig.motion.steps import Dwell, Plan
 
-SCHEMA = "rig.settings/7"
-# The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found,
-# the fifth no extension, the sixth one way of reckoning.
-SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
-RECKONING = 3  # of new recordings; see `RunSettings`
+SCHEMA = "rig.settings/1"
 
 Vector3 = tuple[Finite, Finite, Finite]
 
@@ -47,9 +50,9 @@ class ObservationThresholds(ObservationKeys):
 
     @model_validator(mode="before")
     @classmethod
-    def older_too(cls, document: Any) -> Any:
-        """What a recording says, of whatever age."""
-        return as_recorded(cls, document)
+    def complete(cls, document: Any) -> Any:
+        """Return the keys of a recording. Raise ValueError where one is missing."""
+        return refuse_missing_keys(cls, document)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,16 +94,16 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
     But `angle_std_deg`, which is a standard deviation, None where nobody stated it: of a joint's angle about what its
     encoder tells.
 
-    Those of sensors stand by name: recordings of before do not say all of them, and take what is known of the part.
+    Those of sensors stand by name.
     `decision_rule` says whether a limit is held against the value alone ("simple") or against the value with its
     expanded uncertainty ("guard_band").
     """
 
     @model_validator(mode="before")
     @classmethod
-    def older_too(cls, document: Any) -> Any:
-        """What a recording says, of whatever age."""
-        return as_recorded(cls, document)
+    def complete(cls, document: Any) -> Any:
+        """Return the keys of a recording. Raise ValueError where one is missing."""
+        return refuse_missing_keys(cls, document)
 
     @property
     def angle_std_rad(self) -> float:
@@ -114,14 +117,14 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
         """Standard deviation of an angle of the arm's, each time that it comes back."""
         return float(np.radians(self.repeatability_deg) / np.sqrt(3))
 
-    def knows(self, name: str, part: str) -> bool:
-        """Whether `of` has an answer for a sensor."""
-        return part in PARTS or all(name in getattr(self, what) for what in OF_SENSORS)
+    def knows(self, name: str) -> bool:
+        """Return whether `of` has an answer for the sensor `name`."""
+        return all(name in getattr(self, what) for what in OF_SENSORS)
 
-    def of(self, what: OfSensor, name: str, part: str) -> float:
-        """What is known of a sensor of that name; what is known of the part where nothing is said of the sensor."""
-        said: dict[str, float] = getattr(self, what)
-        return said[name] if name in said else float(getattr(PARTS[part], what))
+    def of(self, what: OfSensor, name: str) -> float:
+        """Return the size that is stated for the sensor `name`."""
+        sizes: dict[str, float] = getattr(self, what)
+        return sizes[name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +170,7 @@ class PlannedSweep:
     joint_name: str
     direction: str
     speed_rad_s: Positive
-    angle_rad: Positive = 2 * np.pi  # as all were in recordings of before
+    angle_rad: Positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,25 +185,23 @@ class PlannedDwell:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
+    """What a run was to do, and how it is solved and judged.
 
-    `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
-    often the run was interrupted. `matrix_corrected` names those of them whose readings the whole matrix corrects.
-    Recordings of before there was a `site` (None) are solved as they were then: neither gravity nor the Earth's rate is
-    looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
-    beyond the noise. `second_order` says that accelerometers are looked for terms of that order, `finds_earth_rate`
-    that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
-    the extension ends on which the sensors sit, in the flange's frame. `reckoning` numbers the way of solving and
-    checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, dwells are averaged
-    as before, one of a run's is as likely disturbed as not, and a fifth of what the arm is off by is new in each; 3,
-    what docs/uncertainty.md says of today.
-    `home_q_rad` are the angles of the turner's joints, of which there may be none.
-    Readings from `elsewhere` have no home and no limits.
-
-    `mounts` are the nominal rotations from the flange's frame to the item's in the stages of the procedure, of which
-    this recording is of number `stage`, from 0; none where the item stays mounted as it is.
-
-    `reference_c` is the temperature at which a calibration over temperature is stated; None of any other.
+    - `procedure`: the procedure's name; `then_verify`: whether a verification was to follow the calibration.
+    - `observation`, `limits`, `uncertainty`: what the configuration's sections of these names state. Recordings of
+      others (`elsewhere`) have no limits and no uncertainty.
+    - `to_calibrate`: names of the sensors to calibrate; `matrix_corrected`: those of them whose readings the whole
+      matrix corrects; `reference`: the sensor whose calibration is known.
+    - `home_q_rad`: angles of the turner's joints, of which there may be none.
+    - `planned_sweeps`, `planned_dwells`: those of the whole procedure, however often the run was interrupted.
+    - `site`: where the arm stands; `finds_earth_rate`: whether the Earth's rate is to be found from the gyroscopes'
+      readings instead of taken from the site.
+    - `second_order`: whether the accelerometers' model has terms of second order.
+    - `extension_m`: end of the extension on which the sensors sit, in the flange's frame.
+    - `mounts`: nominal rotations from the flange's frame to the item's in the stages of the procedure, none if the item
+      stays mounted as it is; `stage`: number of this recording's stage, from 0.
+    - `elsewhere`: how readings of others are solved; `by_hand`: how a session by hand is solved.
+    - `reference_c`: temperature at which a calibration over temperature is stated, None of any other.
     """
 
     procedure: str
@@ -211,14 +212,13 @@ class RunSettings:
     reference: KnownReference | None
     home_q_rad: OfJoints
     planned_sweeps: tuple[PlannedSweep, ...]
+    site: Site
+    uncertainty: Uncertainty | None
     matrix_corrected: tuple[str, ...] = ()
-    site: Site | None = None
-    uncertainty: Uncertainty | None = None
     planned_dwells: tuple[PlannedDwell, ...] = ()
     second_order: bool = False
     finds_earth_rate: bool = False
     extension_m: Vector3 = (0.0, 0.0, 0.0)
-    reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
     elsewhere: Elsewhere | None = None
     mounts: tuple[Mounting, ...] = ()
     stage: Annotated[int, Field(ge=0)] = 0
@@ -231,39 +231,11 @@ class RunSettings:
         return self.mounts[self.stage] if self.mounts else AS_THE_FLANGE
 
     @property
-    def checked_by_model(self) -> bool:
-        """Whether a recording is held against itself by what is known of arm and sensor, not one tolerance."""
-        return self.reckoning >= 2
-
-    @property
-    def knows_own_motion(self) -> bool:
-        """Whether a gyroscope is taken to feel what the arm's turning makes of its place as it feels gravity."""
-        return self.reckoning >= 2
-
-    @property
-    def knows_sensor(self) -> bool:
-        """Whether what a gyroscope may do beside the model, by its data sheet, counts."""
-        return self.reckoning >= 2
-
-    @property
-    def averages_beside_lines(self) -> bool:
-        """Whether what vibrates is taken out of a mean, and of its noise, as lines."""
-        return self.reckoning >= 2
-
-    @property
-    def knows_returns(self) -> bool:
-        """Whether an arm is taken to come back to a sweep's axis a little elsewhere every time."""
-        return self.reckoning >= 2
-
-    @property
-    def counts_freedom(self) -> bool:
-        """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
-        return self.reckoning >= 2
-
-    @property
-    def holds_every_clock(self) -> bool:
-        """Whether a clock counts however far off it is, and what contradicts fails a check."""
-        return self.reckoning >= 2
+    def stated_uncertainty(self) -> Uncertainty:
+        """The uncertainty that a run states. Raise ValueError of readings of others, which state none."""
+        if self.uncertainty is None:
+            raise ValueError("its settings state no uncertainty, but those of a run do")
+        return self.uncertainty
 
     @property
     def has_arcs(self) -> bool:
@@ -278,47 +250,12 @@ class RunSettings:
         steps = self.planned_sweeps, self.planned_dwells
         return self.procedure, self.then_verify, self.home_q_rad, *steps, self.mounts, self.by_hand
 
-    @property
-    def holds_all_kinds(self) -> bool:
-        """Whether accelerometers and magnetometers are held against themselves as gyroscopes are."""
-        return self.reckoning >= 2
-
-    @property
-    def knows_accelerometers(self) -> bool:
-        """Whether accelerometers are taken to bend and to drift as their data sheets let them."""
-        return self.reckoning >= 2
-
-    @property
-    def leaves_dwells_early(self) -> bool:
-        """Whether a dwell's last readings are left out."""
-        return self.reckoning >= 2
-
-    @property
-    def dwells_beside_lines(self) -> bool:
-        """Whether what vibrates in a dwell is taken out of its noise as lines, as in a gyroscope's rest."""
-        return self.reckoning >= 3
-
-    @property
-    def finds_own_share(self) -> bool:
-        """Whether the readings tell how much of what an arm is off by is new in each dwell."""
-        return self.reckoning >= 3
-
-    @property
-    def expects_few_disturbed(self) -> bool:
-        """Whether one run in twenty is taken to have a disturbed dwell before its readings are seen, not one in two."""
-        return self.reckoning >= 3
-
-    @property
-    def spreads_returns(self) -> bool:
-        """Whether tests of the field differ by a standard deviation of where an arm comes back to, not by its bound."""
-        return self.reckoning >= 3
-
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=3`.
+        """Return the settings with other thresholds or limits: `limits.scale_std=0.001`.
 
         Or with encoders of arcs that are better or worse than was stated: `uncertainty.angle_std_deg=0.02`.
 
-        Raises Refused `unknown_setting` or `wrong_setting`, which say what can be set.
+        Raise Refused `unknown_setting` or `wrong_setting`, which say what can be set.
         """
         changed = self
         for item in overrides:
@@ -328,16 +265,7 @@ class RunSettings:
     def document(self) -> dict[str, Any]:
         """The settings as plain values, by key."""
         judging = {"observation": self.observation, "limits": self.limits, "uncertainty": self.uncertainty}
-        document = asdict(self) | {key: None if each is None else each.model_dump() for key, each in judging.items()}
-        if self.elsewhere is None:
-            del document["elsewhere"]
-        if self.by_hand is None:
-            del document["by_hand"]
-        if self.reference_c is None:
-            del document["reference_c"]
-        if not self.mounts:
-            del document["mounts"], document["stage"]
-        return document
+        return asdict(self) | {key: None if each is None else each.model_dump() for key, each in judging.items()}
 
     def to_json(self) -> str:
         """The settings as they stand in a run file."""
@@ -348,11 +276,11 @@ def settings_from_json(text: str) -> RunSettings:
     """What `to_json` wrote. Raises ValueError naming what is wrong."""
     document = parsed(text)
     schema = document.get("schema") if isinstance(document, dict) else None
-    if schema not in SCHEMAS:
-        raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
+    if schema != SCHEMA:
+        raise ValueError(f"the schema of its settings is {quote(schema)}; this version of the rig reads {SCHEMA!r}")
     settings = checked(RunSettings, document, "settings")
-    if settings.elsewhere is None and settings.limits is None:
-        raise ValueError("its settings have no limits, but those of a run have them")
+    if settings.elsewhere is None and (settings.limits is None or settings.uncertainty is None):
+        raise ValueError("its settings have no limits or no uncertainty, but those of a run have both")
     if settings.mounts and settings.stage >= len(settings.mounts):
         raise ValueError(f"its settings are of stage {settings.stage}, and there are {len(settings.mounts)} mounts")
     for mount in settings.mounts:
@@ -392,7 +320,6 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
         extension_m=config.turner.extension_m,
-        reckoning=RECKONING,
         mounts=tuple(stage.mount for stage in plan.stages),
         by_hand=by_hand_of(config.procedure) if isinstance(config.procedure, ByHandSection) else None,
         reference_c=getattr(config.procedure, "reference_c", None),
@@ -499,18 +426,16 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
     """The settings with one `section.key=value` laid over them."""
     path, value = known_setting(item), item.partition("=")[2]
     section, _, key = path.partition(".")
-    if settings.elsewhere is not None and key:
+    if settings.elsewhere is not None:
         raise Refused(
             "unknown_setting", "readings from files are not judged by thresholds or limits", f"Leave out {section}"
         )
     document = settings.document()
-    if key and document[section] is None:  # in recordings of before
-        raise Refused("unknown_setting", f"this recording states no {section}", f"Leave out {path}")
-    (document[section] if key else document)[key or section] = value.strip()
+    document[section][key] = value.strip()
     try:
         return checked(RunSettings, document, "settings")
     except ValueError as error:
-        raise Refused("wrong_setting", str(error), f"Give a number, as in {path}={'0.001' if key else 1}") from None
+        raise Refused("wrong_setting", str(error), f"Give a number, as in {path}=0.001") from None
 
 
 def setting(key: str) -> str:
@@ -520,4 +445,4 @@ def setting(key: str) -> str:
 
 def _settable() -> tuple[str, ...]:
     thresholds = (f"observation.{key}" for key in ObservationThresholds.model_fields)
-    return (*thresholds, *(f"limits.{key}" for key in LIMITS), "uncertainty.angle_std_deg", "reckoning")
+    return (*thresholds, *(f"limits.{key}" for key in LIMITS), "uncertainty.angle_std_deg")

@@ -98,7 +98,7 @@ class Movement:
 
     `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
     axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
-    `own`: what the sensor itself adds; None of recordings of before, and of sensors of which nothing is known.
+    `own`: what the sensor itself adds; None of sensors of which nothing is known.
     `arm_turns` (P, 3 N + 10 M): what P errors of the arm's do to each dwell and sweep, by δ, as `effects` counts their
     turns; None where nothing is known of the arm but that it errs. `own_share` of δ² is off anew in each dwell.
     """

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array, across
 from rig.estimation.bias_process import BiasProcess
-from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
+from rig.estimation.coverage import coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.mount_squares import of_mount_squares
 from rig.estimation.vector_fit import Explained, Seen
@@ -55,13 +55,9 @@ class Contributor:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """All contributors; independent of each other.
-
-    `by_freedom` says that U has the coverage factor of its degrees of freedom; it is 2 u for recordings of before.
-    """
+    """All contributors; independent of each other. U has the coverage factor of its degrees of freedom."""
 
     contributors: tuple[Contributor, ...]
-    by_freedom: bool = True
 
     @property
     def covariance(self) -> Array:
@@ -90,7 +86,7 @@ class Budget:
     @property
     def coverage_factors(self) -> Array:
         """(6,) coverage factors k."""
-        return coverage_factors(self.freedom) if self.by_freedom else np.full(6, COVERAGE_FACTOR)
+        return coverage_factors(self.freedom)
 
     @property
     def expanded(self) -> Array:
@@ -121,7 +117,7 @@ class Unknown:
     `mount_rad` (half of a width) how far an item sits off a stage's mount about each axis,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
     how well it was found where it was; `stamp_std_s` is that of the times of the sensor's samples. `…_freedom` are the
-    degrees of freedom of what was found from readings, `counts_freedom` says whether they make the coverage factor.
+    degrees of freedom of what was found from readings.
     """
 
     clock_std: float
@@ -136,23 +132,15 @@ class Unknown:
     clock_half_width: float | None = None
     state_jitter_freedom: float = np.inf
     earth_freedom: float = np.inf
-    counts_freedom: bool = True
     repeatability_rad: float = 0.0
     angle_std_rad: float = 0.0
     mount_rad: float = 0.0
     stamp_std_s: float = 0.0
 
 
-def uncounted(unknown: Unknown) -> Unknown:
-    """What is unknown, as recordings of before are reckoned: U is 2 u, and nobody counts degrees of freedom."""
-    return replace(
-        unknown, clock_freedom=np.inf, state_jitter_freedom=np.inf, earth_freedom=np.inf, counts_freedom=False
-    )
-
-
 def budget(explained: Explained, unknown: Unknown) -> Budget:
     """The budget of one sensor's vector solution."""
-    return Budget(tuple(_contributors(explained, unknown)), unknown.counts_freedom)
+    return Budget(tuple(_contributors(explained, unknown)))
 
 
 def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributor]:

@@ -31,8 +31,7 @@ class Spread:
     - `noise` (n, n): covariance of the readings' own.
     - `attitude_error`: how far the attitudes are off.
     - `chi_square` of what the model leaves, and its `freedom`.
-    - `noise_freedom` (n,): with how many degrees of freedom the readings' variances are known; None for recordings of
-      before, of which nobody counts them and U is 2 u.
+    - `noise_freedom` (n,): with how many degrees of freedom the readings' variances are known.
     """
 
     scale: Array
@@ -42,13 +41,11 @@ class Spread:
     attitude_error: AttitudeError
     chi_square: float
     freedom: int
-    noise_freedom: Array | None = None
+    noise_freedom: Array
 
     @property
     def known_noise(self) -> float:
         """Degrees of freedom of the noise's part in scale and bias, the fewest of the six."""
-        if self.noise_freedom is None:
-            return np.inf
         return fewest_freedom(self.response, np.diag(self.noise), self.noise_freedom)
 
     def of(self, patterns: Array) -> Array:
@@ -125,7 +122,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     if spread.freedom > 0 and beyond > 0.0:
         left = beyond * spread.covariance
         told.append(found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom)))
-    return Budget((*told, _of_size(spread.scale, size), *others), by_freedom=spread.noise_freedom is not None)
+    return Budget((*told, _of_size(spread.scale, size), *others))
 
 
 def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:

@@ -24,8 +24,6 @@ WAVES = 3  # harmonics of the angle; only the first is wanted
 VIBRATION_WAVES = 100  # in a turn: 17 Hz at 60°/s
 MIN_SAMPLES = 50
 EMPTY = 1e-9  # an arm without vibration leaves columns empty
-LINE = 0.1  # of what is left, that a line must make up to be one; of 600 white samples the highest has 0.03
-PADDED = 16  # finer than a turn's own frequencies
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +52,16 @@ def first_harmonic(
     readings_m_s2: ArrayLike,
     angle_rad: ArrayLike,
     speed_rad_s: ArrayLike,
-    coloured: Callable[[Array], float] = lambda _: 1.0,
     *,
-    swings: Callable[[Array], Array] | None = None,
+    coloured: Callable[[Array], float],
+    swings: Callable[[Array], Array],
 ) -> FirstHarmonic:
     """Reduce one whole revolution of n samples.
 
     `time_s` (n,) on the arm's clock, `readings_m_s2` (n, 3); `angle_rad`, `speed_rad_s` (n,): of the joint at these
     times, by the arm's states, the angle counted from where the attitude is known. `coloured` gives the factor by which
     the variance of a mean of residuals (n,) differs from that of white noise. `swings` gives columns (n, k) of all that
-    stands out of residuals (n, 3) as a line; None looks for one alone, as in recordings of before.
+    stands out of residuals (n, 3) as a line.
 
     Raises Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
@@ -77,11 +75,8 @@ def first_harmonic(
     mean_speed = _mean_speed(t, angle)
     uneven = _uneven(t, speed, mean_speed)
     columns = np.hstack([_waves(angle, WAVES), _of_vibration(uneven, angle, mean_speed)])
+    columns = np.hstack([columns, swings(_regression(columns, m)[1])])
     inverse, residuals = _regression(columns, m)
-    swinging = np.hstack([columns, _line(t, residuals) if swings is None else swings(residuals)])
-    without = _regression(swinging, m)
-    if swings is not None or np.sum(without[1] ** 2) < (1 - LINE) * np.sum(residuals**2):
-        columns, (inverse, residuals) = swinging, without
     size = np.linalg.norm(columns, axis=0)
     unknown = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY)
     scatter = residuals.T @ residuals / (count - unknown)
@@ -113,20 +108,6 @@ def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(columns / size, rcond=EMPTY) / size[:, None]
     return inverse, readings - columns @ (inverse @ readings)
-
-
-def _line(time_s: Array, residuals: Array) -> Array:
-    """(n, 2) cosine and sine of the frequency that is strongest in residuals (n, 3), at even times (n,)."""
-    count = len(residuals)
-    power = np.sum(np.abs(np.fft.rfft(residuals * np.hanning(count)[:, None], PADDED * count, axis=0)) ** 2, axis=1)
-    power[: PADDED * (WAVES + 1)] = 0.0  # slower ones are waves that are wanted, or drift
-    top = int(np.clip(np.argmax(power), 1, len(power) - 2))
-    before, here, after = np.log(power[top - 1 : top + 2] + np.finfo(np.float64).tiny)
-    bend = before - 2 * here + after
-    peak = top + (0.5 * (before - after) / bend if bend < 0 else 0.0)
-    step_s = (time_s[-1] - time_s[0]) / (count - 1)
-    phase = 2 * np.pi * peak / (PADDED * count * step_s) * (time_s - time_s[0])
-    return np.column_stack([np.cos(phase), np.sin(phase)])
 
 
 def _left_of_mean(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:

@@ -35,13 +35,13 @@ class Seen:
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
     own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
-    for each time they do, None in recordings of before; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
+    for each time they do; `encoder_errors_rad_s` (P, N, 3) the same of what encoders err
     at the ends of arcs, None where all sweeps are whole turns; `mount_turns_rad` (3 S, N, 3) by which rotation vectors
     an item that was mounted anew for S stages would sit off for one standard uncertainty of each of their mounts, None
     where it stayed: of the stages but the first, which the first sweep is of, then of the first; `arms_m`
     (N, 3) a way from the axis that turns to where the sensor is taken to sit, in the flange's frame, None where its own
     motion is left out. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known. `sensor` is
-    what is known of the sensor beforehand, None in recordings of before. `ripples` (N,) are how unevenly each turned,
+    what is known of the sensor beforehand, None where nothing is. `ripples` (N,) are how unevenly each turned,
     RMS as a share of its rate. `roundings_rad_s` (N, 3) is the standard uncertainty that rounding leaves in each mean.
     """
 

@@ -43,14 +43,12 @@ class Stated:
 class Given:
     """What recordings give today: the verdict, the names of failed checks, and all calibrations.
 
-    `recorded_reckoning` numbers the way of reckoning they were made with; `left_out` is what the solution does without,
-    as a sentence.
+    `left_out` is what the solution does without, as a sentence.
     """
 
     verdict: str
     failed: tuple[str, ...]
     calibrations: tuple[Followed, ...]
-    recorded_reckoning: int = 1
     left_out: str | None = None
 
 

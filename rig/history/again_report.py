@@ -40,7 +40,6 @@ COLUMNS = (
     "growth_of_u",
     "certificates_to_withdraw",
     "certificates_unconfirmed",
-    "recorded_reckoning",
     "left_out",
     "folder",
 )
@@ -180,7 +179,6 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
             "state": "solved",
             "verdict_now": answer.verdict,
             "failed_now": ", ".join(answer.failed),
-            "recorded_reckoning": answer.recorded_reckoning,
             "left_out": answer.left_out,
         }
     else:

@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.arm_rests import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream, between, steps_of
-from rig.observation.averaging import dwelling_of
+from rig.observation.beside_lines import mean_of_standing
 from rig.observation.lost_samples import lost_samples
 from rig.observation.mean import Mean
 from rig.observation.windows import Dwelt, Window, dwelt
@@ -110,7 +110,7 @@ def _dwell_reading(
     check_acceleration(stream, inside, where)
     readings = accelerations(stream, inside)
     steps = steps_of(stream.raw, stream.sensor, ACCELERATION)
-    reading, _ = dwelling_of(run.settings).rested(readings, stream.time_s[inside], window, steps)
+    reading, _ = mean_of_standing(readings, stream.time_s[inside], window, steps)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
@@ -122,9 +122,7 @@ def _dwell_reading(
 
 
 def without_leaving(run: RunData, finished: Dwelt) -> Dwelt:
-    """The dwell without its last readings, which may have felt the arm leave; recordings of before keep them."""
-    if not run.settings.leaves_dwells_early:
-        return finished
+    """Return the dwell without its last readings, which may have felt the arm leave."""
     start_s, end_s = finished.window.start_s, finished.window.end_s
     return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 

@@ -10,7 +10,7 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between
-from rig.observation.averaging import Averaging, averaging_of
+from rig.observation.beside_lines import mean_of_standing
 from rig.observation.windows import Window, rested
 
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
@@ -21,7 +21,7 @@ MIN_RESTS = 3  # to tell whether the bias drifts
 
 def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """Average the rests in which the arm stood still for long enough, but those beside a step in `superseded`."""
-    rests = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
+    rests = (_rest(stream, motion, window) for window in rested(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
@@ -67,7 +67,7 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averaging) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     """Average a rest; None if the arm did not stand still or the rest is too short to say anything."""
     still = standing(motion, window)
     if still is None:
@@ -76,5 +76,5 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, averaging: Averagin
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
     readings = stream.readings_rad_s[inside]
-    found, lasting = averaging.rested(readings, stream.time_s[inside], still, stream.steps)
+    found, lasting = mean_of_standing(readings, stream.time_s[inside], still, stream.steps)
     return place(averaged(stream, inside, lasting, found), motion)

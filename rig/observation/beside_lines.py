@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.rounding import Steps
 from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import LineSearch, find_lines, fitted, waves
-from rig.observation.mean import Mean, Noise, weighted_means, whole
+from rig.observation.mean import Mean, Noise, mean_at_rest, weighted_means, whole
 from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
 
@@ -31,6 +31,14 @@ def rest_beside_lines(readings: Array, time_s: Array, window: Window, steps: Ste
     tapered = weights(time_s, window.start_s, window.end_s)[None]
     (mean,) = weighted_means(readings, whole(readings), tapered, smooth=smooth, noise=noise, steps=steps)
     return mean
+
+
+def mean_of_standing(readings: Array, time_s: Array, window: Window, steps: Steps) -> tuple[Mean, Window]:
+    """Return the mean of readings (n, 3) of an arm that stands, and from when to when it is said to last."""
+    found, lasting = mean_at_rest(readings, time_s, window, steps)
+    if len(readings) >= FEWEST and lasting != window:
+        found = rest_beside_lines(readings, time_s, window, steps)
+    return found, lasting
 
 
 def swinging(residuals: Array) -> Array:

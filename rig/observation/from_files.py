@@ -13,7 +13,7 @@ from rig.data.motion_file import TIME, Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
 from rig.data.run_file import RunData
-from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
+from rig.data.settings import Elsewhere, ObservationThresholds, RunSettings, Site
 from rig.errors import Refused
 from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.attitude_import import read_attitudes
@@ -84,8 +84,8 @@ def recorded_in_files(
             home_q_rad=(),
             planned_sweeps=(),
             site=site,
+            uncertainty=None,
             second_order=second_order,
-            reckoning=RECKONING,
             elsewhere=asked,
             reference_c=reference_c,
         ),

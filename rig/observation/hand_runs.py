@@ -17,7 +17,6 @@ from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of, joined, nearest_face
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.motion.by_hand import FACES, Face
 from rig.observation.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT, check_readings
@@ -157,7 +156,7 @@ def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSenso
         clock_source="the board's crystal" if sensor.on_board else ITS_OWN_CLOCK,
         box_rad=said.box_rad,
         first_face=first,
-        gravity_m_s2=STANDARD_GRAVITY_M_S2 if settings.site is None else settings.site.gravity_m_s2,
+        gravity_m_s2=settings.site.gravity_m_s2,
     )
 
 

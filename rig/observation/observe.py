@@ -27,7 +27,6 @@ from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_motion import ArmMotion, is_sparse
 from rig.observation.arm_rests import bias_drift, place, rests_of
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
-from rig.observation.averaging import averaging_of
 from rig.observation.lines import BEATS, turning
 from rig.observation.lost_samples import lost_samples
 from rig.observation.revolution import Revolution, arm_states_lost, describe
@@ -142,9 +141,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 
 def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
-    """Raises Fault `stuck_sensor` where a sensor does not feel what the arm did, if the site is known."""
-    if run.settings.site is None:
-        return
+    """Raise Fault `stuck_sensor` where a sensor does not feel what the arm did."""
     speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
     if speeds:
         check_rests(rests, min(speeds))
@@ -157,8 +154,7 @@ def _revolution(
     turn = motion.turn(finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
-        averaging = averaging_of(run.settings)
-        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
+        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
     return seen
 
 

@@ -8,7 +8,7 @@ from rig.motion.steps import Sweep
 from rig.observation.acceleration import accelerations, check_acceleration
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
-from rig.observation.averaging import Averaging
+from rig.observation.beside_lines import colour_left, swinging
 from rig.observation.revolution import Revolution, describe
 
 
@@ -30,9 +30,7 @@ class SweptAcceleration:
     station: tuple[float, ...]
 
 
-def swept_acceleration(
-    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, averaging: Averaging
-) -> SweptAcceleration:
+def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution) -> SweptAcceleration:
     """What one sweep's revolution tells, beside what swings in it.
 
     Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
@@ -47,8 +45,8 @@ def swept_acceleration(
         accelerations(stream, inside)[known],
         motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
         motion.angle(sweep, time_s, 1),
-        averaging.colour,
-        swings=averaging.swings,
+        coloured=colour_left,
+        swings=swinging,
     )
     return of_turn(sweep, turn, harmonic)
 

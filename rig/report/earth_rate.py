@@ -13,11 +13,11 @@ from rig.report.entry import entry
 from rig.report.expanded import expanded, factor_words
 
 
-def earth_rate_entry(earth_rate: EarthRate | Fault, *, counts_freedom: bool) -> EarthRateEntry | ErrorEntry:
+def earth_rate_entry(earth_rate: EarthRate | Fault) -> EarthRateEntry | ErrorEntry:
     """The entry of the Earth's rate, or of why it was not found."""
     if isinstance(earth_rate, Fault):
         return ErrorEntry(error=str(earth_rate))
-    return entry(EarthRateEntry, earth_rate, freedom=earth_rate.freedom if counts_freedom else None)
+    return entry(EarthRateEntry, earth_rate)
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:

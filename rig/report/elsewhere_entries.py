@@ -139,7 +139,7 @@ def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site,
     return [
         (name, found.item, site, found.at_rest[quantity])
         for name, found in outcome.elsewhere.items()
-        if site is not None and quantity in found.at_rest
+        if quantity in found.at_rest
     ]
 
 

@@ -82,8 +82,7 @@ def _uncertain(result: SensorResult) -> dict[str, Any]:
         if explained.nonlinearity is not None:
             found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:
-        counts = result.uncertainty is not None and result.uncertainty.by_freedom
-        found["earth_rate"] = earth_rate_entry(result.earth, counts_freedom=counts)
+        found["earth_rate"] = earth_rate_entry(result.earth)
     return found
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
+from rig.analysis.surroundings import surroundings_of
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.motion.geometry import NOMINAL
@@ -18,7 +19,9 @@ MADE = replace(NOMINAL, theta_rad=(0, 0, 0, 0, 6e-4, 0), alpha_rad=(pi / 2, 0, 0
 
 def non_orthogonality(setup: Setup) -> Array:
     run = synthetic_run(setup)
-    solution = solve_observed(run.sensors, observe_recordings([run]))["gyro"].vector_model
+    recordings = observe_recordings([run])
+    solved = solve_observed(run.sensors, recordings, surroundings_of(recordings, run.settings))
+    solution = solved["gyro"].vector_model
     assert isinstance(solution, VectorSolution)
     return solution.non_orthogonality_rad
 

@@ -7,7 +7,7 @@ from rig.analysis.calibration import observe_recordings
 from rig.estimation.magnetometer import FieldDrift
 from rig.observation.field import field_tests
 from rig.plans.recorded import RecordedRun, judged, open_run
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 
 def drift_of(run: RecordedRun) -> FieldDrift:
@@ -18,7 +18,7 @@ def drift_of(run: RecordedRun) -> FieldDrift:
 
 @pytest.mark.slow
 def test_what_is_stated_of_the_arms_returns_is_a_half_width_and_no_standard_deviation() -> None:
-    recorded = open_run(RECORDINGS / "rig.settings-6" / "magnetometer")
+    recorded = open_run(RECORDINGS / "magnetometer")
     now = recorded.judged_by(["reckoning=3"])
     run = now.movement[0]
     settings = run.settings

@@ -9,12 +9,12 @@ from rig.analysis.freedom_beside import of_acceleration_angles, of_angles
 from rig.estimation.budget import NOISE, WANDERING, Budget
 from rig.estimation.reference_budget import ATTITUDES
 from rig.plans.recorded import judged, open_run
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 
 @pytest.mark.slow
 def test_a_line_that_angles_have_their_freedom_of_is_there_or_told_to_be_missing() -> None:
-    outcome = judged(open_run(RECORDINGS / "rig.settings-7" / "imu"))
+    outcome = judged(open_run(RECORDINGS / "imu"))
     (gyroscope, *_), (accelerometer, *_) = outcome.results.values(), outcome.accelerometers.values()
     assert gyroscope.uncertainty is not None and accelerometer.budget is not None
     for found in (of_angles(gyroscope), of_acceleration_angles(accelerometer)):

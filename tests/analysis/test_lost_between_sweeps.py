@@ -10,12 +10,12 @@ from rig.analysis.analyses import calibrated
 from rig.analysis.estimators import DEFAULT_ESTIMATOR
 from rig.data.run_file import read_run
 from rig.observation.windows import swept
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 
 @pytest.mark.slow
 def test_a_sample_lost_where_the_arm_moves_between_two_sweeps_fails_no_check() -> None:
-    run = read_run(RECORDINGS / "rig.settings-7" / "lines" / "run.h5")
+    run = read_run(RECORDINGS / "lines" / "run.h5")
     samples = run.samples["imu"]
     whole = calibrated([run], DEFAULT_ESTIMATOR)
     time_base = whole.recordings[0].sensors["imu"].time_base

@@ -17,11 +17,11 @@ from rig.estimation.vector_model import solve_vector_model
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
 from rig.observation.timebase import estimate_time_base
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
 
 def recorded(name: str) -> RunData:
-    return read_run(FIXTURES / "verified" / name)
+    return read_run(RECORDINGS / "verified" / name)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from rig.plans.recorded import open_run
 from support import drawn_accelerations
 from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
 from support.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 GRAVITY, FIELD_T = 9.81, 48e-6
 GRAVITY_U, FIELD_U = 3e-4, 2e-7  # expanded, k = 2
@@ -61,7 +61,9 @@ def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session
     sweeps.harmonics_m_s2[:, 1:] *= smaller[:, None, None]
     dwells = recorded_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
     solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
-    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s)
+    readings = dwells.readings_m_s2.size + sweeps.harmonics_m_s2.size
+    many = np.full(readings, np.inf)  # degrees of freedom
+    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s, noise_freedom=many)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(truth.matrix, axis=1), solution.bias_m_s2 - truth.bias_m_s2])
     return off / budget.std, budget, off / own_spread(budget)
@@ -88,7 +90,8 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
         uniformity(solution, readings, told, variances, solution.attitude_error.std_rad),
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
-    budget = magnetometer_budget(solution, Dwells(readings, variances, told), tested, site, field_t=FIELD_T)
+    seen, many = Dwells(readings, variances, told), np.full(readings.size, np.inf)
+    budget = magnetometer_budget(solution, seen, tested, site, field_t=FIELD_T, noise_freedom=many)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias - bias])
     return off / budget.std, budget, off / own_spread(budget)
@@ -189,18 +192,18 @@ def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budg
     assert np.all(budget.of("bias over temperature")[3:] > 0)
 
 
-def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing() -> None:
-    recording = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
+def test_a_sheet_is_what_the_recording_says() -> None:
+    recording = open_run(RECORDINGS / "imu").movement[0]
     known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
     range_m_s2 = sensor.channel(ACCELERATION).range
     assert known is not None and range_m_s2 is not None
-    assert sheet_of(known, "gyro", sensor.part, range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
+    assert sheet_of(known, "gyro", range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
     said = known.model_copy(update={
         "acceleration_nonlinearity_percent": {"gyro": 0.1}, "acceleration_nonlinear_over_g": {"gyro": 1.0},
         "acceleration_bias_mg_k": {"gyro": 0.2}, "acceleration_scale_ppm_k": {"gyro": 30.0},
         "acceleration_bias_instability_ug": {"gyro": 4.0},
     })  # fmt: skip
-    assert sheet_of(said, "gyro", sensor.part, range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
+    assert sheet_of(said, "gyro", range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
 @pytest.mark.parametrize(

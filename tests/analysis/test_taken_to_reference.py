@@ -15,7 +15,7 @@ from rig.observation.observed_run import observe_runs
 from rig.observation.windows import Window
 from rig.plans.recorded import open_run
 from rig.report.document import document_of
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 from support.synthetic_run import BIAS_RAD_S, SENSITIVITY, Motion, Setup, readings, run_data, sample_times, true_rate
 
 REFERENCE_C = 25.0
@@ -85,13 +85,13 @@ def test_the_settings_keep_the_reference(warmed: RunData) -> None:
 @pytest.mark.slow
 def test_an_accelerometer_in_dwells_is_taken_there_as_well() -> None:
     """A real recording's dwells, gone through at six temperatures."""
-    runs = open_run(RECORDINGS / "rig.settings-6" / "bias_drift").movement
+    runs = open_run(RECORDINGS / "bias_drift").movement
     (recording, *_), settings = observe_runs(runs), replace(runs[0].settings, reference_c=REFERENCE_C)
     (name,) = settings.to_calibrate
     first = {planned.index for planned in settings.planned_dwells if planned.repeat == 0}
     once = [dwell for dwell in recording.sensors[name].dwells if dwell.index in first]
     means = np.array([dwell.reading.mean for dwell in once])
-    forces = -np.array([dwell.attitude for dwell in once]) @ settings.site.down_m_s2  # type: ignore[union-attr]
+    forces = -np.array([dwell.attitude for dwell in once]) @ settings.site.down_m_s2
     zero = np.linalg.lstsq(np.column_stack([forces, np.ones(len(once))]), means)[0][3]
     again = []
     for number, warm in enumerate((20.0, 31.0, 42.0, 50.0, 37.0, 26.0)):

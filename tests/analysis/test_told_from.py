@@ -1,7 +1,6 @@
 """From what size on a recording contradicts itself is said beforehand, and again of what was recorded: and it is so."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -105,8 +104,3 @@ def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
     for each in will:
         assert each.size == pytest.approx(recorded[each.what].size, rel=0.6), each.what
         assert each.unit == recorded[each.what].unit
-
-
-def test_a_recording_of_before_says_nothing_of_it() -> None:
-    run = drawn(1, KINDS["ADIS16465"]).run
-    assert not held(replace(run, settings=replace(run.settings, reckoning=1))).told_from["gyro"]

@@ -7,14 +7,14 @@ import pytest
 
 from rig.analysis.analyses import calibrated
 from rig.data.run_file import read_run
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 WANDERS_S, IN_S = 3e-3, 7.0
 
 
 def failed(stamp_std_s: float | None) -> set[str]:
     """The checks that fail where times of samples wander by 3 ms, and so much is stated of them."""
-    run = read_run(RECORDINGS / "rig.settings-7" / "lines" / "run.h5")
+    run = read_run(RECORDINGS / "lines" / "run.h5")
     samples, sensor = run.samples["imu"].copy(), run.sensors["imu"]
     time_us = samples["board_time_us"].astype(np.float64)
     samples["board_time_us"] = np.rint(time_us + 1e6 * WANDERS_S * np.sin(2e-6 * np.pi * time_us / IN_S))

@@ -99,8 +99,8 @@ def test_the_guard_band_keeps_the_expanded_uncertainty_away_from_the_limit() -> 
 def test_an_uncertainty_known_from_few_readings_keeps_a_wider_guard_at_the_same_risk() -> None:
     std = np.array([0.001, 0.001, 0.001, 4e-4, 4e-4, 4e-4])
     scarce = Budget((Contributor("noise", "A", "normal", None, "", "", 5.0, np.diag(std**2)),))
-    before = replace(scarce, by_freedom=False)
-    wide, twice = (judge({"gyro": GOOD}, LIMITS, {"gyro": each}, "guard_band")[2] for each in (scarce, before))
+    sure = Budget((Contributor("noise", "A", "normal", None, "", "", np.inf, np.diag(std**2)),))
+    wide, twice = (judge({"gyro": GOOD}, LIMITS, {"gyro": each}, "guard_band")[2] for each in (scarce, sure))
     assert wide.guard == pytest.approx(2.649 * 4e-4, rel=1e-3)  # t of five degrees of freedom, EA-4/02, annex E
     assert twice.guard == pytest.approx(8e-4)
     assert wide.coverage_factor == pytest.approx(2.649, rel=1e-3) and twice.coverage_factor == 2.0

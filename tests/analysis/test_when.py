@@ -23,7 +23,7 @@ from rig.report.certificate.statements import Stated
 from rig.report.document import document_of
 from rig.report.validity_words import load_words, when_words
 from support.certified import LABORATORY, read
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 from support.synthetic_run import Setup, synthetic_run
 
 COUNTS_PER_K = 16
@@ -98,7 +98,7 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
 
 @pytest.mark.slow
 def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
-    run = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
+    run = open_run(RECORDINGS / "imu").movement[0]
     result = calibrated([warming(run)])
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
     assert entry.found_at is not None and entry.temperature_c is not None

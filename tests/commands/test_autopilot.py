@@ -36,7 +36,7 @@ def own_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def result(folder: Path) -> Path:
     """A result that passed, as of the autopilot's IMU."""
-    frozen = ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-7" / "imu" / "result.json"
+    frozen = ROOT / "tests" / "fixtures" / "recordings" / "imu" / "result.json"
     document = json.loads(frozen.read_text(encoding="utf-8"))
     for kind in ("sensors", "accelerometers"):
         (entry, *_) = document[kind].values()

@@ -13,7 +13,7 @@ import rig
 from rig.cli import main
 from rig.errors import Refused
 from rig.motion.steps import Rest
-from support.paths import CONFIGS, DEMO, FIXTURES
+from support.paths import CONFIGS, DEMO, RECORDINGS
 from support.waiting import PATIENCE_S
 from support.worlds import World, hardware
 
@@ -48,7 +48,7 @@ def test_a_certificate_and_an_export_are_written_and_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RIG_HISTORY", "off")
-    folder = Path(shutil.copytree(FIXTURES / "verified", tmp_path / "run"))
+    folder = Path(shutil.copytree(RECORDINGS / "verified", tmp_path / "run"))
     run = rig.load(folder)
     written = rig.write_certificate(run, {"certificate.customer": "Sons & Co: all"})
     assert written == [folder / "certificate.html"]

@@ -17,13 +17,12 @@ from rig.report.exports.formats import OF_READINGS, writer_of_readings
 from rig.report.exports.recorded import exported
 from rig.runner.readings import ReadingsFile
 from support.commands import rig_here
-from support.frozen import RECORDINGS
 from support.full_disk import full_disk
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
 
-RUN = FIXTURES / "calibration"
+RUN = RECORDINGS / "six_observation"
 EXAMPLES = ROOT / "docs" / "examples"
 SOLVE = ("solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv"), "--out", "OUT")
 REPORT = ("report", str(RUN), "--history", "off", "--out", "OUT")
@@ -62,7 +61,7 @@ def test_readings_are_exported_whole_or_not_at_all(name: str, tmp_path: Path) ->
 
 def test_a_recording_that_cannot_be_made_plain_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.h5"
-    before = (RECORDINGS / "rig.settings-7" / "by_hand" / "run.h5").read_bytes()
+    before = (RECORDINGS / "by_hand" / "run.h5").read_bytes()
     path.write_bytes(before)
 
     def laid_out(*given: Any, **named: Any) -> None:

@@ -19,7 +19,7 @@ from rig.station.words import line
 from support.commands import configuration, rig
 from support.kept_rows import forge
 from support.past_runs import FIRST, finished
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 
 
 @pytest.fixture
@@ -50,11 +50,11 @@ def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: py
     bad = Path(place).parent / "bad"
     bad.mkdir()
     (bad / "result.json").write_text("{}", encoding="utf-8")
-    assert main(["history", "import", str(FIXTURES), str(bad)]) == 1
+    assert main(["history", "import", str(RECORDINGS), str(bad)]) == 1
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == "2 entered, 0 there already, 1 refused"
     assert f"{bad}: not_a_result" in printed.err
-    assert "0 entered, 2 there already, 0 refused" in told(capsys, "import", FIXTURES)
+    assert "0 entered, 2 there already, 0 refused" in told(capsys, "import", RECORDINGS)
     assert "LSM9DS1-CI" in told(capsys) and "ADIS16465-001" in told(capsys, "list")
 
 
@@ -62,7 +62,7 @@ def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: py
 def test_a_recording_without_a_result_is_solved_on_request(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path(place).parent / "run"
     folder.mkdir()
-    shutil.copy(FIXTURES / "calibration" / "run.h5", folder)
+    shutil.copy(RECORDINGS / "six_observation" / "run.h5", folder)
     told(capsys, "import", folder, status=1)
     assert "1 entered" in told(capsys, "import", "--solve", folder)
     assert not (folder / "result.json").exists()
@@ -71,7 +71,7 @@ def test_a_recording_without_a_result_is_solved_on_request(place: str, capsys: p
 @pytest.mark.slow
 def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path(place).parent / "run"
-    shutil.copytree(FIXTURES / "verified", folder)
+    shutil.copytree(RECORDINGS / "verified", folder)
     told(capsys, "import", folder)
     assert "5 ok, 0 changed, 0 missing" in told(capsys, "verify")
     recording = bytearray((folder / "verify.h5").read_bytes())
@@ -82,7 +82,7 @@ def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.Cap
     (folder / "verify.h5").unlink()
     assert f"missing: {folder / 'verify.h5'}" in told(capsys, "verify", status=1)
     moved = folder.rename(folder.with_name("archive"))
-    shutil.copytree(FIXTURES / "verified", moved, dirs_exist_ok=True)
+    shutil.copytree(RECORDINGS / "verified", moved, dirs_exist_ok=True)
     assert f"missing: {folder}" in told(capsys, "verify", status=1)
     told(capsys, "import", moved)
     assert "5 ok, 0 changed, 0 missing" in told(capsys, "verify")
@@ -157,7 +157,7 @@ def test_a_configuration_names_the_history(year: str, capsys: pytest.CaptureFixt
 def test_a_certificate_is_remembered_with_who_ran_the_rig(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     """That of the run when it is entered, amended ones when they are made; one of a simulated laboratory says so."""
     folder = Path(place).parent / "run"
-    shutil.copytree(FIXTURES / "verified", folder)
+    shutil.copytree(RECORDINGS / "verified", folder)
     demo = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
     said = "history: {operator: A. Person, note: 'after [the] move'}\n"
     (folder / "config.yaml").write_text(f"{demo}{said}", encoding="utf-8")
@@ -191,26 +191,26 @@ def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypat
     (tmp_path / "file").write_text("", encoding="utf-8")
     for broken in (str(tmp_path / "file" / "history.sqlite"), f"postgresql://rig@/x?host={tmp_path}", "what://ever"):
         monkeypatch.setenv("RIG_HISTORY", broken)
-        event, beside = remember(FIXTURES / "verified", HistorySection())
+        event, beside = remember(RECORDINGS / "verified", HistorySection())
         assert isinstance(event, NotRemembered) and beside == ()
     monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "history.sqlite"))
     event, _ = remember(tmp_path / "nothing", HistorySection())
     assert isinstance(event, NotRemembered)
-    event, _ = remember(FIXTURES / "verified", HistorySection())
+    event, _ = remember(RECORDINGS / "verified", HistorySection())
     assert isinstance(event, Remembered) and event.numbers == (1, 2) and event.usual
     named = str(tmp_path / "named.sqlite")
     monkeypatch.setenv("RIG_HISTORY", "")
-    event, _ = remember(FIXTURES / "verified", HistorySection(url=named))
+    event, _ = remember(RECORDINGS / "verified", HistorySection(url=named))
     assert event is not None and (line(event) or "").endswith(f"(rig history show 1 --history {named})")
     monkeypatch.delenv("RIG_HISTORY")
-    assert remember(FIXTURES / "verified", HistorySection(off=True)) == (None, ())
+    assert remember(RECORDINGS / "verified", HistorySection(off=True)) == (None, ())
 
 
 @pytest.mark.thorough
 @pytest.mark.slow
 def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The last calibration of the same simulated sensor was half a year ago, and another, on another board."""
-    told(capsys, "import", FIXTURES / "calibration")
+    told(capsys, "import", RECORDINGS / "six_observation")
     folder = Path(place).parent
     other = {"sensors": {"gyro": {"bias_rad_s": [0.2, 0.1, -0.1]}}, "board": {"unique_id": "f" * 24}}
     config = configuration(folder, {"world": other, "limits": {"bias_rad_s": 1}})

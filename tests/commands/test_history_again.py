@@ -20,10 +20,10 @@ from support.clusters import killable_cluster, local_cluster
 from support.commands import rig_here
 from support.kept_recordings import certified, keep
 from support.past_runs import finished
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.waiting import alive, wait_for
 
-VERIFIED = FIXTURES / "verified"
+VERIFIED = RECORDINGS / "verified"
 
 
 @pytest.fixture
@@ -143,7 +143,7 @@ def test_another_estimator_moves_what_it_moves_and_answers_are_not_mixed(history
     done = rig_here("history", "again", "--estimator", "newton", "--of-u", "0.01")
     assert done.returncode == 1
     (row,) = rows()
-    solved = rig_here("solve", "run", "--estimator", "newton", "--set", "reckoning=2", "--json")
+    solved = rig_here("solve", "run", "--estimator", "newton", "--json")
     document = ResultDocument.model_validate_json(solved.stdout)
     (now,) = (each for each in followed(document)[0].parameters if each.name == row["parameter"])
     assert float(row["now"]) == now.value and float(row["now_expanded"]) == now.expanded

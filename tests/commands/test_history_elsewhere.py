@@ -24,7 +24,7 @@ from rig.station.events import NotRemembered
 from support.commands import rig_here
 from support.frozen_database import freezing_at
 from support.past_runs import finished
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 from support.postgres import postgresql
 from support.waiting import PATIENCE_S
 
@@ -38,7 +38,7 @@ def heard() -> Iterator[tuple[int, socket.socket]]:
 
 
 def folder_that_names(url: str, folder: Path) -> Path:
-    shutil.copytree(FIXTURES / "calibration", folder)
+    shutil.copytree(RECORDINGS / "six_observation", folder)
     demo = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
     (folder / "config.yaml").write_text(f"{demo}history: {{url: '{url}'}}\n", encoding="utf-8")
     return folder
@@ -99,7 +99,7 @@ def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
 def test_a_run_waits_four_seconds_for_a_server_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RIG_HISTORY")
     with heard() as (port, _):
-        event, _ = remember(FIXTURES / "verified", HistorySection(url=f"postgresql://rig@127.0.0.1:{port}/x"))
+        event, _ = remember(RECORDINGS / "verified", HistorySection(url=f"postgresql://rig@127.0.0.1:{port}/x"))
     assert isinstance(event, NotRemembered) and "has not answered within 4 s" in event.why
 
 
@@ -114,9 +114,9 @@ def test_a_database_that_freezes_in_an_entry_costs_four_seconds_and_no_end_of_a_
         with open_history(url):
             pass
         with freezing_at(b"INSERT INTO run", url) as (relay, frozen):
-            event, _ = remember(FIXTURES / "verified", HistorySection(url=relay))
+            event, _ = remember(RECORDINGS / "verified", HistorySection(url=relay))
             assert frozen.is_set() and isinstance(event, NotRemembered) and "has not answered within 4 s" in event.why
-        shutil.copytree(FIXTURES / "verified", tmp_path / "run")
+        shutil.copytree(RECORDINGS / "verified", tmp_path / "run")
         with freezing_at(b"FROM run", url) as (relay, frozen):
             done = subprocess.run(
                 [sys.executable, "-m", "rig", "report", tmp_path / "run", "--history", relay],

@@ -16,7 +16,7 @@ from rig.history.store import open_history
 from rig.plans.recorded import judged, open_run
 from rig.report.document import document_of
 from support.commands import rig_here
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
 Document = dict[str, Any]
 
@@ -24,7 +24,7 @@ Document = dict[str, Any]
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "history.sqlite"))
-    return Path(shutil.copytree(FIXTURES / "calibration", tmp_path / "run"))
+    return Path(shutil.copytree(RECORDINGS / "six_observation", tmp_path / "run"))
 
 
 def claims(folder: Path, change: Callable[[Document], None]) -> None:
@@ -35,7 +35,7 @@ def claims(folder: Path, change: Callable[[Document], None]) -> None:
 
 @pytest.fixture(scope="module")
 def given() -> ResultDocument:
-    return document_of(judged(open_run(FIXTURES / "calibration"), DEFAULT_ESTIMATOR))
+    return document_of(judged(open_run(RECORDINGS / "six_observation"), DEFAULT_ESTIMATOR))
 
 
 def runs(folder: Path) -> int:

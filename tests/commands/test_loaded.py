@@ -11,7 +11,7 @@ import pytest
 
 from rig.history.store import open_history
 from support.past_runs import finished
-from support.paths import DEMO, FIXTURES
+from support.paths import DEMO, RECORDINGS
 
 # What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
 SLOW = ("h5py", "scipy", "rtde_control", "rtde_receive", "rtde_io", "matplotlib", "uvicorn", "distributed", "joblib")
@@ -65,7 +65,7 @@ def test_what_the_history_knows_is_told_without_them(words: tuple[str, ...], pla
 
 @pytest.mark.slow
 def test_a_report_is_written_without_them(place: Path) -> None:
-    run = shutil.copytree(FIXTURES / "calibration", place / "run")
+    run = shutil.copytree(RECORDINGS / "six_observation", place / "run")
     assert loaded("report", run) == ([], [])
 
 

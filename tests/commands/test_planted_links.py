@@ -10,7 +10,7 @@ import pytest
 from firmware_host.emulator.flash_memory import FlashMemory
 from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.waiting import PATIENCE_S, alive, wait_for
 from support.warm import started
 
@@ -55,7 +55,7 @@ def test_a_run_does_not_begin_where_its_client_would_write_through_a_link(tmp_pa
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    return Path(shutil.copytree(FIXTURES / "calibration", tmp_path / "run"))
+    return Path(shutil.copytree(RECORDINGS / "six_observation", tmp_path / "run"))
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from rig.report.certificate import pdf
 from rig.report.rounding import rounded
 from support.certified import everything, result, reversal
 from support.commands import rig
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 from support.waiting import PATIENCE_S
 
 SIMULATED = "Simulated laboratory: no real item was calibrated"
@@ -41,7 +41,9 @@ def test_page_and_digital_certificate_lie_in_the_run_folder(run: Path, capsys: p
 
 
 def test_a_result_alone_has_a_certificate_that_states_nothing(tmp_path: Path) -> None:
-    assert main(["report", str(FIXTURES / "verified" / "result.json"), "--out", str(tmp_path / "new" / "folder")]) == 0
+    assert (
+        main(["report", str(RECORDINGS / "verified" / "result.json"), "--out", str(tmp_path / "new" / "folder")]) == 0
+    )
     assert "Calibration record" in (tmp_path / "new" / "folder" / "certificate.html").read_text(encoding="utf-8")
 
 

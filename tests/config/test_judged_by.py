@@ -2,7 +2,7 @@
 
 import json
 
-from rig.config.judged_by import OF_SENSORS, SAID_OF_NONE, ObservationKeys, UncertaintyKeys
+from rig.config.judged_by import OF_SENSORS, ObservationKeys, UncertaintyKeys
 from rig.config.load import load
 from rig.data.settings import settings_from_json, settings_of
 from rig.plans.phase import first_phase
@@ -23,7 +23,3 @@ def test_every_threshold_and_every_uncertainty_is_configured_and_recorded_under_
     sizes_recorded = {key: of_each if key in OF_SENSORS else 0.5 for key in sizes}
     assert recorded["uncertainty"] == {**sizes_recorded, "decision_rule": "guard_band"}
     assert settings_from_json(made.to_json()) == made
-
-
-def test_a_size_of_each_sensor_is_named_where_its_row_is() -> None:
-    assert [key for key, row in UncertaintyKeys.model_fields.items() if SAID_OF_NONE in row.metadata] == [*OF_SENSORS]

@@ -16,17 +16,18 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrated
+from rig.data.layout import Contents, lay_out
 from rig.data.run_file import read_run
 from rig.data.silence import crowding
 from rig.errors import Fault, Refused
 from support.as_nobody import as_nobody
 from support.full_disk import full_disk
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.waiting import PATIENCE_S, alive, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 
-RECORDING = FIXTURES / "calibration" / "run.h5"
+RECORDING = RECORDINGS / "six_observation" / "run.h5"
 TIMEOUT_S = 5.0 * crowding()
 ALONE_S = 0.8  # reading the recording takes half of that where there is a processor for it
 METADATA_BYTES = 12_000  # where a run file's first structures lie
@@ -118,8 +119,11 @@ def test_a_sound_recording_is_read_however_little_of_a_processor_there_is() -> N
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who has opened what")
 def test_a_signal_ends_the_reading(recording: Path) -> None:
+    with h5py.File(recording) as file:
+        whole = Contents(file.attrs["schema"], dict(file.attrs), {}, {}, file["states"][:], file["events"][:])
+    lay_out(recording, whole, swmr=True)
     data = bytearray(recording.read_bytes())
-    data[11] |= 0x05
+    data[11] |= 0x05  # as one is left that is still being written
     recording.write_bytes(data[:5000])
     interrupted_while_it_reads(recording, "solve", recording)
 
@@ -169,6 +173,15 @@ def attribute(name: str, value: object, place: str = "/") -> Callable[[h5py.File
     return change
 
 
+def of_channel(key: str, value: object) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        attributes = file["samples/gyro"].attrs
+        first, *others = json.loads(attributes["channels"])
+        attributes["channels"] = json.dumps([{**first, key: value}, *others])
+
+    return change
+
+
 def without(name: str) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         del file[name]
@@ -193,11 +206,11 @@ def number(file: h5py.File, name: str) -> None:
 
 
 def linked(file: h5py.File, name: str) -> None:
-    file[name] = h5py.ExternalLink("/dev/zero", "/arm")
+    file[name] = h5py.ExternalLink("/dev/zero", "/states")
 
 
 def announced(file: h5py.File) -> None:
-    file["arm"].resize((10**12,))
+    file["states"].resize((10**12,))
 
 
 def events(change: Callable[[dict[str, Any]], object]) -> Callable[[h5py.File], None]:
@@ -228,7 +241,7 @@ def provenance(**changes: object) -> Callable[[h5py.File], None]:
 SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "a sensor without samples": (instead("samples/gyro", lambda file, name: None), "no samples of gyro"),
     "no sensors": (without("samples"), "it has no samples"),
-    "no arm": (without("arm"), "it has no arm"),
+    "no states": (without("states"), "it has no states"),
     "another schema": (attribute("schema", "rig.run/9"), r"schema is 'rig\.run/9'"),
     "a number for a schema": (attribute("schema", 3), "its schema is not a text"),
     "a number for a configuration": (attribute("config", 3), "its config is not a text"),
@@ -247,18 +260,18 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "mounting of one row": (attribute("mounting", [1.0, 0.0, 0.0], "samples/gyro"), r"sensor\.mounting"),
     "mounting of zeros": (attribute("mounting", np.zeros((3, 3)), "samples/gyro"), "no rotation"),
     "mounting of text": (attribute("mounting", "+x", "samples/gyro"), r"sensor\.mounting"),
-    "a negative sensitivity": (attribute("sensitivity_rad_s_per_count", -1.0, "samples/gyro"), "unit_per_count"),
-    "a sensitivity of text": (attribute("sensitivity_rad_s_per_count", "low", "samples/gyro"), "unit_per_count"),
-    "a sensitivity that is none": (attribute("sensitivity_rad_s_per_count", np.nan, "samples/gyro"), "unit_per_count"),
+    "a negative sensitivity": (of_channel("unit_per_count", -1.0), "unit_per_count"),
+    "a sensitivity of text": (of_channel("unit_per_count", "low"), "unit_per_count"),
+    "a sensitivity that is none": (of_channel("unit_per_count", None), "unit_per_count"),
     "an unknown mode": (attribute("mode", "cooked", "samples/gyro"), r"sensor\.mode"),
     "a part of nothing": (attribute("part", h5py.Empty("f8"), "samples/gyro"), "not_a_run_file"),
     "samples of numbers": (instead("samples/gyro", rows("f8")), "the description of gyro has no part"),
-    "arm states in two dimensions": (instead("arm", rows("f8", (2, 3))), "arm holds float64 in 2 dimensions"),
-    "a group for the arm": (instead("arm", lambda file, name: file.create_group(name)), "arm is not a dataset"),
+    "states in two dimensions": (instead("states", rows("f8", (2, 3))), "states holds float64 in 2 dimensions"),
+    "a group of states": (instead("states", lambda file, name: file.create_group(name)), "states is not a dataset"),
     "a dataset for the samples": (instead("samples", rows("u1")), "samples is not a group"),
     "events of text": (instead("events", rows("f4")), "events holds float32"),
-    "an external link": (instead("arm", linked), "arm is a link to somewhere else"),
-    "10^12 rows": (announced, "arm announces 1000000000000 rows and holds"),
+    "an external link": (instead("states", linked), "states is a link to somewhere else"),
+    "10^12 rows": (announced, "states announces 1000000000000 rows and holds"),
     "an event that is a number": (instead("events", number), "event 1 cannot be understood"),
     "an unknown event": (events(lambda line: line.update(name="sweep_danced")), "no event 'sweep_danced'"),
     "an event without a time": (events(lambda line: line.pop("host_time_s")), "host_time_s"),

@@ -9,15 +9,15 @@ import pytest
 
 from rig.data.result_file import SIZE_MAX_BYTES, read_result, schema_text
 from rig.errors import Refused
-from support.paths import DOCS, FIXTURES
+from support.paths import DOCS, RECORDINGS
 from support.results import VERIFIED
 
-RUNS = ("calibration", "verified")
+RUNS = ("six_observation", "verified")
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_what_was_written_by_the_first_version_is_read_and_written_again_byte_by_byte(name: str) -> None:
-    file = FIXTURES / name / "result.json"
+    file = RECORDINGS / name / "result.json"
     assert read_result(file).text() + "\n" == file.read_text(encoding="utf-8")
 
 
@@ -32,7 +32,7 @@ def test_results_satisfy_the_committed_schema(name: str) -> None:
     schema = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(schema)
-    document = json.loads((FIXTURES / name / "result.json").read_text(encoding="utf-8"))
+    document = json.loads((RECORDINGS / name / "result.json").read_text(encoding="utf-8"))
     validator.validate(document)
     del document["checks"][0]["unit"]
     with pytest.raises(jsonschema.ValidationError, match="unit"):

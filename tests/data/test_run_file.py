@@ -18,6 +18,7 @@ import pytest
 from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.config.limits import Limits
+from rig.config.load import load
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.events import (
     BoardNotObserved,
@@ -33,12 +34,12 @@ from rig.data.events import (
 from rig.data.quantity import FIELD, RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder, make_plain, read_run
-from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings
+from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings, Site, uncertainty_of
 from rig.errors import Fault, Refused
 from rig.motion.state import ARM_STATE_DTYPE, ArmState
 from rig.motion.steps import Sweep
 from support.forked import forked
-from support.paths import ROOT
+from support.paths import CONFIGS, ROOT
 from support.results import VERIFIED
 from support.synthetic_run import PROVENANCE as SYNTHETIC
 from support.synthetic_run import UR
@@ -59,7 +60,9 @@ SETTINGS = RunSettings(
     to_calibrate=("gyro",),
     reference=None,
     home_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 0.0),
-    planned_sweeps=(PlannedSweep(0, "wrist_3", "cw", 1.0),),
+    planned_sweeps=(PlannedSweep(0, "wrist_3", "cw", 1.0, 2 * np.pi),),
+    site=Site(up=(0.0, 0.0, 1.0), gravity_m_s2=9.81, earth_rate_rad_s=None),
+    uncertainty=uncertainty_of(load(CONFIGS / "lsm9ds1_adis16465.yaml").config),
 )
 SWEEP = Sweep(
     index=0,

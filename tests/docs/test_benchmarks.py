@@ -35,7 +35,7 @@ SHORT = {
 LONGER = {
     "again": ("--recordings", "3"),
     "efficiency": (),
-    "end_of_run": ("--fixture", "--rounds", "1"),
+    "end_of_run": ("--rounds", "1"),
     "framing": ("1000",),
     "history": ("--calibrations", "2000"),
     "page": ("0.5",),

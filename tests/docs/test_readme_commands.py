@@ -13,7 +13,7 @@ from support.commands import rig_here
 from support.paths import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-FROZEN = ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-7" / "verified"
+FROZEN = ROOT / "tests" / "fixtures" / "recordings" / "verified"
 # Commands of the README's blocks that move an arm, or install: where they are run, or that they need hardware.
 ELSEWHERE = {
     "make demo": "tests/installation/test_wheel.py",

@@ -40,10 +40,9 @@ def test_of_two_equal_parts_the_one_that_is_known_counts_by_nothing() -> None:
     assert effective_freedom([[0.0], [0.0]], [[10.0], [3.0]]) == np.inf  # of nothing at all
 
 
-def test_each_value_of_a_budget_has_its_own_coverage_factor_and_recordings_of_before_have_two() -> None:
+def test_each_value_of_a_budget_has_its_own_coverage_factor() -> None:
     found = Contributor("found", "A", "normal", None, "", "", 6.0, np.diag([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     known = Contributor("known", "B", "rectangular", 1.0, "", "", np.inf, np.diag([0.0, 0.0, 1.0, 1.0, 1.0, 1.0]))
     both = Budget((found, known))
     assert both.coverage_factors == pytest.approx([2.52, 2.52, 2.11, 2.0, 2.0, 2.0], abs=0.005)
     assert both.expanded == pytest.approx(both.coverage_factors * both.std)
-    assert Budget((found, known), by_freedom=False).expanded == pytest.approx(2 * both.std)

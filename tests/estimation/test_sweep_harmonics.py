@@ -1,5 +1,6 @@
 """From a revolution's samples to mean, cosine and sine: ripple, encoder steps, a clock that errs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,11 +8,12 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.accelerometer_model import DELAY, LEVER, NO_DWELLS, Movement, jacobian, predicted
+from rig.estimation.arrays import Array
 from rig.estimation.imu import solve_imu
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_model import BIAS, REFERENCE
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
-from rig.observation.coloured_noise import noise_left
+from rig.observation.beside_lines import colour_left, swinging
 from support.arm_attitudes import crooked_arm
 from support.arm_sweeps import (
     MICRO_G,
@@ -40,7 +42,13 @@ def sampling(density_ug: float, vibration: float = 0.05) -> Sampling:
 
 
 def reduced(samples: Samples) -> FirstHarmonic:
-    return first_harmonic(samples.time_s, samples.readings_m_s2, samples.angle_rad, samples.speed_rad_s)
+    return reduced_with(samples, samples.readings_m_s2, lambda _: 1.0)
+
+
+def reduced_with(samples: Samples, readings_m_s2: Array, coloured: Callable[[Array], float]) -> FirstHarmonic:
+    return first_harmonic(
+        samples.time_s, readings_m_s2, samples.angle_rad, samples.speed_rad_s, coloured=coloured, swings=swinging
+    )
 
 
 def revolution(seed: int, density_ug: float, vibration: float = 0.05, sweep: int = 3) -> Samples:
@@ -115,9 +123,7 @@ def test_the_stated_covariance_is_the_scatter() -> None:
 def test_coloured_noise_widens_the_covariance() -> None:
     samples = revolution(1, 300.0)
     white = reduced(samples)
-    wide = first_harmonic(
-        samples.time_s, samples.readings_m_s2, samples.angle_rad, samples.speed_rad_s, coloured=lambda _: 4.0
-    )
+    wide = reduced_with(samples, samples.readings_m_s2, lambda _: 4.0)
     np.testing.assert_allclose(wide.covariance_m2_s4, 4 * white.covariance_m2_s4)
 
 
@@ -131,7 +137,7 @@ def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> N
         samples = revolution(seed, 23.0)
         wave = 2400 * MICRO_G * np.sin(2 * np.pi * (14.0 * samples.time_s + rng.uniform()))
         shaken = samples.readings_m_s2 + wave[:, None] * np.array([0.65, 0.0, -0.76])
-        found = first_harmonic(samples.time_s, shaken, samples.angle_rad, samples.speed_rad_s, noise_left)
+        found = reduced_with(samples, shaken, colour_left)
         off = (found.harmonic_m_s2 - still).ravel()
         squares.append(off @ np.linalg.solve(found.covariance_m2_s4, off) / 9)
         np.testing.assert_allclose(found.noise_m_s2, sampling(23.0).noise_m_s2, rtol=0.15)

@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from support.commands import configuration, python
-from support.frozen import RECORDINGS
-from support.paths import CONFIGS, ROOT
+from support.paths import CONFIGS, RECORDINGS, ROOT
 from support.waiting import PATIENCE_S
 
 EXAMPLES = ROOT / "examples"
@@ -19,9 +18,8 @@ pytestmark = pytest.mark.slow
 
 
 def recorded(folder: Path) -> Path:
-    """Return a copy of a frozen recording, the newest of its kind."""
-    *_, newest = sorted(RECORDINGS.glob("*/six_observation"))
-    return Path(shutil.copytree(newest, folder / "run"))
+    """Return a copy of a frozen recording."""
+    return Path(shutil.copytree(RECORDINGS / "six_observation", folder / "run"))
 
 
 def test_every_example_is_run_here() -> None:

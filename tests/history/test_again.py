@@ -31,7 +31,7 @@ def history(tmp_path: Path) -> Iterator[History]:
 
 
 def given(run: Finished, verdict: str = "pass") -> Given:
-    return Given(verdict, (), followed(run.document), 1)
+    return Given(verdict, (), followed(run.document))
 
 
 def again(history: History, answers: Sequence[tuple[Finished, Answer]], of_u: float = 0.1) -> list[Compared]:
@@ -166,7 +166,7 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
     certified(history, hostile, "RIG-1")
     answers: dict[str, Answer] = {
         run.content_sha256: given(run),
-        hostile.content_sha256: Given("fail", ("gyro.scale_std",), followed(finished(1, scaled(U)).document), 1),
+        hostile.content_sha256: Given("fail", ("gyro.scale_std",), followed(finished(1, scaled(U)).document)),
     }
     outcome = compared(stated_results(history, Selection()), answers, 0.1)
     rows = list(csv.DictReader(io.StringIO(again_csv(outcome))))

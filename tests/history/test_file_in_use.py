@@ -24,7 +24,7 @@ from rig.station.events import NotRemembered, Remembered
 from support.commands import rig, rig_here
 from support.kept_rows import as_of_another_process, forge
 from support.past_runs import finished
-from support.paths import CONFIGS, FIXTURES, ROOT
+from support.paths import CONFIGS, RECORDINGS, ROOT
 from support.postgres import postgresql
 from support.waiting import wait_for
 
@@ -172,12 +172,12 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
         forging.setattr("support.kept_rows.as_of_another_process", lambda: None)
         exchange(file)
     before = {each.name: each.read_bytes() for each in file.parent.iterdir()}
-    event, _ = remember(FIXTURES / "verified", config.history)  # and ends
+    event, _ = remember(RECORDINGS / "verified", config.history)  # and ends
     assert isinstance(event, NotRemembered) and name in event.why
     assert name in (remembered(config, frozenset()).silent or "")
     assert {each.name: each.read_bytes() for each in file.parent.iterdir()} == before
     as_of_another_process()
-    event, _ = remember(FIXTURES / "verified", config.history)
+    event, _ = remember(RECORDINGS / "verified", config.history)
     assert isinstance(event, Remembered)
 
 
@@ -262,6 +262,6 @@ print(type(event).__name__, late)
 
 @pytest.mark.slow
 def test_the_time_in_which_a_history_has_to_answer_counts_no_imports(file: Path) -> None:
-    command = [sys.executable, "-c", IMPORTS, str(CONFIGS / "ci.yaml"), str(FIXTURES / "verified")]
+    command = [sys.executable, "-c", IMPORTS, str(CONFIGS / "ci.yaml"), str(RECORDINGS / "verified")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "Remembered []", done.stdout + done.stderr

@@ -7,9 +7,9 @@ import pytest
 from rig.cli import main
 from rig.data.result_file import ResultDocument, read_result
 from rig.history.recomputed import not_given
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
-DRIFT = RECORDINGS / "rig.settings-6" / "bias_drift"
+DRIFT = RECORDINGS / "bias_drift"
 
 
 def drifting() -> ResultDocument:

@@ -25,7 +25,7 @@ from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
 from support.kept_rows import drop_triggers, forge
 from support.past_runs import finished
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 from support.postgres import postgresql
 
 ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
@@ -69,7 +69,7 @@ def test_no_row_is_changed_taken_away_or_replaced(place: str) -> None:
 
 def run_folder(folder: Path) -> Path:
     """A run with its certificate, header and configuration."""
-    shutil.copytree(FIXTURES / "verified", folder)
+    shutil.copytree(RECORDINGS / "verified", folder)
     shutil.copy(CONFIGS / "demo.yaml", folder / "config.yaml")
     (folder / "calibration.h").write_text("#define KX 1.01f\n", encoding="utf-8")
     document = finished_run(folder).document

@@ -28,7 +28,7 @@ from rig.history.store import History, Selection, open_history
 from rig.report.budget_entry import budget_entry
 from rig.report.kinds.registry import followed
 from support.past_runs import FIRST, finished
-from support.paths import DEMO, FIXTURES
+from support.paths import DEMO, RECORDINGS
 
 ISSUED = Issued(
     "RIG-20250106-AAAAAAAAAAAA", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),)
@@ -42,14 +42,14 @@ def history(tmp_path: Path) -> Iterator[History]:
 
 
 def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
-    run = finished_run(FIXTURES / "verified")
+    run = finished_run(RECORDINGS / "verified")
     entered = history.enter(run)
     assert entered.new
     (kept,) = history.kept()
     assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
     assert [each.name for each in kept.recordings] == ["run.h5", "verify.h5"]
     found = history.of_run(entered.run_id)
-    stated = followed(read_result(FIXTURES / "verified"))
+    stated = followed(read_result(RECORDINGS / "verified"))
     assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
         (s.part, s.serial_number, s.estimator, s.temperature_c) for s in stated
     ]
@@ -57,8 +57,8 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
 
 
 def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
-    sensor = read_result(FIXTURES / "verified").sensors["gyro"]
-    mean = {each.name: each for each in followed(read_result(FIXTURES / "verified"))[0].parameters}["k"]
+    sensor = read_result(RECORDINGS / "verified").sensors["gyro"]
+    mean = {each.name: each for each in followed(read_result(RECORDINGS / "verified"))[0].parameters}["k"]
     assert mean.value == pytest.approx(sum(sensor.scale) / 3)
     variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
     assert mean.std_statistical == pytest.approx(variance**0.5)
@@ -315,7 +315,7 @@ def test_a_history_that_may_only_be_read_is_read_and_nothing_is_laid_beside_it(
     """In somebody else's folder, or on a medium that takes no more."""
     file = tmp_path / "history.sqlite"
     with open_history(str(file)) as history:
-        history.enter(finished_run(FIXTURES / "verified"))
+        history.enter(finished_run(RECORDINGS / "verified"))
     before = file.read_bytes()
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everywhere
     with open_history(str(file)) as history:
@@ -334,7 +334,7 @@ def test_a_history_that_is_only_read_while_another_writes_it_is_as_that_one_left
     with closing(sqlite3.connect(file)) as another:
         another.execute("SELECT count(*) FROM run").fetchall()  # who has it open too, so that the log stays
         with open_history(str(file)) as written:
-            written.enter(finished_run(FIXTURES / "verified"))
+            written.enter(finished_run(RECORDINGS / "verified"))
         assert file.with_name(f"{file.name}-wal").stat().st_size > 0
         monkeypatch.setattr(os, "access", lambda *_: False)
         with open_history(str(file)) as history:

@@ -7,9 +7,9 @@ import pytest
 
 import rig
 from rig.errors import Refused
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 
-IMU = ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-7" / "imu"
+IMU = ROOT / "tests" / "fixtures" / "recordings" / "imu"
 MAGNETOMETER = IMU.parent / "magnetometer"
 
 
@@ -32,7 +32,7 @@ def test_a_gyroscope_turns_at_the_speed_of_the_sweep_once_it_is_corrected(gyro: 
 
 
 def test_where_only_scale_factors_are_corrected_it_is_k_times_reading_and_bias() -> None:
-    gyro = rig.load_result(FIXTURES / "verified")["gyro"]
+    gyro = rig.load_result(RECORDINGS / "verified")["gyro"]
     readings = np.array([[0.1, -0.2, 0.3], [1.0, 2.0, np.nan]])
     corrected = gyro.apply(readings)
     np.testing.assert_allclose(corrected[0], gyro.scale * (readings[0] + gyro.bias))
@@ -70,7 +70,7 @@ def test_degrees_are_refused_with_what_to_do(gyro: rig.Calibration) -> None:
 
 
 def test_a_sensor_whose_range_nobody_said_takes_what_some_part_could_read() -> None:
-    gyro = rig.load_result(IMU.parents[1] / "rig.files-1" / "sweeps")
+    gyro = rig.load_result(IMU.parents[1] / "sweeps")
     (calibration,) = gyro.values()
     assert np.isfinite(calibration.apply(np.array([[0.0, 60.0, 0.0]]))).all()
     with pytest.raises(Refused, match=r"wrong_unit: .*no such sensor reads more"):
@@ -102,7 +102,7 @@ def test_u_is_that_of_the_budget(gyro: rig.Calibration) -> None:
 
 
 def test_a_result_that_is_loaded_is_the_one_that_is_solved() -> None:
-    result = rig.load_result(FIXTURES / "verified" / "result.json")
+    result = rig.load_result(RECORDINGS / "verified" / "result.json")
     assert result.verdict == "pass" and result["gyro"].name == "gyro"
     assert result.to_dict()["schema"] == "rig.result/1"
     with pytest.raises(Refused, match="no_result"):

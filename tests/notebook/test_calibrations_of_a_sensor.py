@@ -11,7 +11,7 @@ from rig.cli import main
 from rig.errors import Refused
 from rig.history.store import open_history
 from support.past_runs import FIRST, finished
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 
 MOVED = (1.0103, 0.99, 1.0)
 
@@ -61,13 +61,13 @@ def test_changes_between_two_results_are_those_of_the_command_line(
 
 @pytest.mark.slow
 def test_a_run_is_solved_to_be_compared() -> None:
-    run, result = rig.load(FIXTURES / "verified"), rig.load_result(FIXTURES / "verified")
+    run, result = rig.load(RECORDINGS / "verified"), rig.load_result(RECORDINGS / "verified")
     same = rig.changes(result, run)
     assert set(same) == {"gyro", "reference"}
     assert all(change.normalised_error < 1e-3 for each in same.values() for change in each.changes)
 
 
 def test_runs_without_a_sensor_in_common_are_not_compared() -> None:
-    other = rig.load_result(ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-6" / "kvh1775")
+    other = rig.load_result(ROOT / "tests" / "fixtures" / "recordings" / "kvh1775")
     with pytest.raises(Refused, match="not_comparable: the first is of lsm9ds1"):
-        rig.changes(rig.load_result(FIXTURES / "verified"), other)
+        rig.changes(rig.load_result(RECORDINGS / "verified"), other)

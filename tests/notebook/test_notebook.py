@@ -11,14 +11,14 @@ import rig
 from rig.data.result_file import ResultDocument, read_result
 from rig.errors import Refused
 from rig.observation.windows import swept
-from support.paths import DOCS, FIXTURES
+from support.paths import DOCS, RECORDINGS
 from support.stated import SHARE, differences
 from support.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
 def run() -> rig.Run:
-    return rig.load(FIXTURES / "verified")
+    return rig.load(RECORDINGS / "verified")
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
 
 
 def test_the_result_is_that_of_the_run(result: rig.Result) -> None:
-    then, document = read_result(FIXTURES / "verified"), result.to_dict()
+    then, document = read_result(RECORDINGS / "verified"), result.to_dict()
     now = ResultDocument.model_validate(document)
     assert differences(then, now) == []
     gyro = now.sensors["gyro"]
@@ -75,7 +75,7 @@ def test_another_estimator_and_another_threshold(run: rig.Run) -> None:
 def test_two_sensors_beside_each_other(run: rig.Run) -> None:
     beside = rig.compare(run, "gyro", "reference")
     assert beside.before is not None and beside.after is not None
-    then = read_result(FIXTURES / "verified").verification["gyro"]
+    then = read_result(RECORDINGS / "verified").verification["gyro"]
     assert then.before is not None
     np.testing.assert_allclose(beside.after.movement.rms_rad_s, then.after.movement.rms_rad_s, rtol=SHARE)
     np.testing.assert_allclose(beside.before.movement.rms_rad_s, then.before.movement.rms_rad_s, rtol=SHARE)

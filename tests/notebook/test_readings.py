@@ -8,20 +8,18 @@ import pytest
 
 import rig
 from rig.errors import Refused
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS
 from support.waiting import PATIENCE_S
-
-RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"
 
 
 @pytest.fixture(scope="module")
 def imu() -> rig.Readings:
-    return rig.load(RECORDINGS / "rig.settings-7" / "imu")["gyro"]
+    return rig.load(RECORDINGS / "imu")["gyro"]
 
 
 @pytest.fixture(scope="module")
 def magnetic() -> rig.Run:
-    return rig.load(RECORDINGS / "rig.settings-7" / "magnetometer")
+    return rig.load(RECORDINGS / "magnetometer")
 
 
 @pytest.mark.slow
@@ -77,7 +75,7 @@ def test_nothing_loads_pandas_before_a_table_is_asked_for() -> None:
     program = (
         "import sys, rig\n"
         "for name in rig.__all__: assert getattr(rig, name).__doc__ or name == '__version__', name\n"
-        f"result = rig.load_result({str(FIXTURES / 'verified')!r}); result['gyro'].apply([[0.1, 0.2, 0.3]])\n"
+        f"result = rig.load_result({str(RECORDINGS / 'verified')!r}); result['gyro'].apply([[0.1, 0.2, 0.3]])\n"
         "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.turners.ur.driver')"
         " if name in sys.modules])"
     )

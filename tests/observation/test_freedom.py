@@ -7,8 +7,8 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.rounding import Steps
-from rig.observation.coloured_noise import left_by_correlations, left_of
-from rig.observation.mean import even_mean, mean_at_rest
+from rig.observation.coloured_noise import left_of
+from rig.observation.mean import mean_at_rest
 from rig.observation.tapered_weights import freedom_at_zero, noise_at_zero, vibrates
 from rig.observation.windows import Window
 
@@ -63,5 +63,3 @@ def test_white_readings_have_one_less_than_there_are_and_a_vibration_costs_most_
     assert vibrates(shaking)
     found, _ = mean_at_rest(shaking, time_s, Window(0.0, 6.0), Steps(1e-6))
     assert np.all(found.freedom < 100)
-    before = even_mean(quiet, Steps(1e-6), left_by_correlations)
-    assert np.all(np.isinf(before.freedom)), "of recordings of before nobody counts them"

@@ -13,7 +13,7 @@ from rig.estimation.by_hand.session import Handled, Move, Rest, Told
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
 from rig.observation.hand_runs import NotCounted, turned_face
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 SECOND_US = 1_000_000
 
@@ -79,7 +79,7 @@ def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
 
 
 def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
-    run = read_run(RECORDINGS / "rig.settings-7" / "by_hand" / "run.h5")
+    run = read_run(RECORDINGS / "by_hand" / "run.h5")
     channels = run.sensors["gyro"].channels
     told = tuple(replace(each, type="<f8") if each.quantity == "acceleration" else each for each in channels)
     sensor = replace(run.sensors["gyro"], channels=told)
@@ -99,7 +99,7 @@ def test_more_rests_than_memory_has_room_for_are_refused() -> None:
     ("step", "name"), [(0, "duplicated_samples"), (-1, "board_clock_restarted"), (10**9, "impossible_times")]
 )
 def test_stamps_that_no_clock_gives_are_refused(step: int, name: str) -> None:
-    run = read_run(RECORDINGS / "rig.settings-7" / "by_hand" / "run.h5")
+    run = read_run(RECORDINGS / "by_hand" / "run.h5")
     samples = run.samples["gyro"].copy()
     samples["board_time_us"] = 2_000_000_000 + step * np.arange(len(samples))
     with pytest.raises(Fault, match=f"{name}: "):

@@ -18,7 +18,7 @@ from rig.page.rows import look_of
 from rig.runner.phases import observations_of
 from support.paths import ROOT
 
-RECORDED = ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-4" / "magnetometer"
+RECORDED = ROOT / "tests" / "fixtures" / "recordings" / "magnetometer"
 
 pytestmark = pytest.mark.slow
 

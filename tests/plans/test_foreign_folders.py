@@ -14,7 +14,7 @@ import rig as public
 from rig.errors import Refused
 from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 
 OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
 
@@ -29,7 +29,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def foreign(elsewhere: None, tmp_path: Path) -> Path:
     """A finished run's folder, by a script of its sender's own that leaves a trace where it is executed."""
     folder = tmp_path / "came by e-mail"
-    shutil.copytree(FIXTURES / "calibration", folder)
+    shutil.copytree(RECORDINGS / "six_observation", folder)
     text = f"open({str(tmp_path / 'trace')!r}, 'w').close()\n" + OWN.read_text(encoding="utf-8")
     said = {"script": "theirs.py", "script_sha256": hashlib.sha256(text.encode()).hexdigest()}
     (folder / "script.py").write_text(text, encoding="utf-8")
@@ -69,7 +69,7 @@ def test_nothing_that_reads_a_run_executes_its_script(
 
 @pytest.mark.slow
 def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path) -> None:
-    done, before = rig_here("solve", foreign, "--json"), rig_here("solve", FIXTURES / "calibration", "--json")
+    done, before = rig_here("solve", foreign, "--json"), rig_here("solve", RECORDINGS / "six_observation", "--json")
     assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr and before.stderr == ""
     numbers, expected = json.loads(done.stdout)["sensors"]["gyro"], json.loads(before.stdout)["sensors"]["gyro"]
     assert numbers["scale"] == expected["scale"]

@@ -1,7 +1,7 @@
-"""Recordings of every schema and kind still open, and solve to the numbers that were stored with them."""
+"""Recordings of every kind open, and solve to the numbers that were stored with them."""
 
 from collections.abc import Callable, Iterator
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -9,20 +9,14 @@ import pytest
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
-from rig.data.schema import TEXTS
-from rig.data.settings import RECKONING, SCHEMAS
 from rig.plans.recorded import RecordedRun, judged, open_run
 from rig.plans.registry import installed
 from rig.report.document import document_of
-from support.frozen import frozen, schemas
-from support.paths import FIXTURES
+from support.frozen import frozen
+from support.paths import RECORDINGS
 from support.stated import SHARE, differences
 
 FREEZE = "freeze one, as CONTRIBUTING.md says"
-
-
-def _reckoned(way: int, run: RecordedRun) -> bool:
-    return run.movement[0].settings.reckoning == way
 
 
 KINDS: dict[str, Callable[[RecordedRun], bool]] = {
@@ -37,7 +31,6 @@ KINDS: dict[str, Callable[[RecordedRun], bool]] = {
     "resumed": lambda run: len(run.raw) > 1,
     "verified": lambda run: bool(run.raw and run.corrected),
     "a reference beside": lambda run: run.movement[0].settings.reference is not None,
-    **{f"reckoning {way}": partial(_reckoned, way) for way in range(1, RECKONING + 1)},
     "the Earth's rate found": lambda run: run.movement[0].settings.finds_earth_rate,
 }
 
@@ -52,7 +45,7 @@ def opened(folder: Path) -> RecordedRun:
 
 
 def named(folder: Path) -> str:
-    return "/".join(folder.parts[-2:])
+    return folder.name
 
 
 @pytest.mark.slow
@@ -61,11 +54,6 @@ def named(folder: Path) -> str:
 def test_a_frozen_recording_solves_to_its_numbers(folder: Path) -> None:
     found = document_of(judged(opened(folder)))
     assert differences(read_result(folder), found) == []
-
-
-def test_every_schema_that_is_read_has_a_frozen_recording() -> None:
-    kept = {schema for folder in frozen() for schema in schemas(folder)}
-    assert {*TEXTS, *SCHEMAS} - kept == set(), FREEZE
 
 
 @pytest.mark.slow
@@ -94,7 +82,7 @@ def otherwise(result: ResultDocument) -> Iterator[ResultDocument]:
 
 
 def test_a_number_that_moved_by_a_hundred_thousandth_of_its_uncertainty_is_told() -> None:
-    result = read_result(FIXTURES / "calibration")
+    result = read_result(RECORDINGS / "six_observation")
     assert differences(result, result) == []
     for other in otherwise(result):
         assert differences(result, other) != []

@@ -130,7 +130,7 @@ def reached(of: Run, seed: int) -> Reached:
         )
         runs, sensors, estimator = on_servo.runs, on_servo.runs[0].sensors, "newton"
     seen = observe_recordings(runs)
-    found = solve_observed(sensors, seen, estimator, surroundings_of(seen, seen[0].run.settings))["gyro"]
+    found = solve_observed(sensors, seen, surroundings_of(seen, seen[0].run.settings), estimator)["gyro"]
     assert found.uncertainty is not None
     return Reached.by({"gyro": found.uncertainty})
 
@@ -175,7 +175,7 @@ def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
     each = RUNS[0]
     noisy = synthetic_run(Setup(noise_rad_s=10 * noise_of(each)))
     seen = observe_recordings([noisy])
-    found = solve_observed(noisy.sensors, seen, "vector", surroundings_of(seen, seen[0].run.settings))["gyro"]
+    found = solve_observed(noisy.sensors, seen, surroundings_of(seen, seen[0].run.settings))["gyro"]
     assert found.uncertainty is not None
     assert Reached.by({"gyro": found.uncertainty}).scale > 2 * predicted_of(each).scale
 

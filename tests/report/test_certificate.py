@@ -36,7 +36,7 @@ from support.certified import (
     reversal,
     with_accelerometer,
 )
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 
 CLAUSES = [
     *(f"7.8.2.1{letter}" for letter in "abcdefghijlmnop"),
@@ -72,7 +72,7 @@ def kinds() -> dict[str, ResultDocument]:
             update=none | {"bias_drift": whole.bias_drift, "accelerometers": whole.accelerometers}
         ),
         "everything": whole,
-        "verification": read_result(FIXTURES / "verified").model_copy(update={"sensors": {}}),
+        "verification": read_result(RECORDINGS / "verified").model_copy(update={"sensors": {}}),
     }
 
 
@@ -135,7 +135,7 @@ def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
 
 def test_noise_is_not_called_uncertainty() -> None:
     """A result of before there were budgets makes no certificate."""
-    found = certificate(read_result(FIXTURES / "calibration"))
+    found = certificate(read_result(RECORDINGS / "six_observation"))
     page = read(found)
     assert found.title == "Calibration record"
     assert any("uncertainty is not known" in mark for mark in found.marks)
@@ -274,7 +274,7 @@ def test_time_is_traceable_only_through_a_reference_that_is_named_and_was_compar
 
 
 def test_before_and_after_of_a_verified_run_are_as_found_and_as_left() -> None:
-    document = read_result(FIXTURES / "verified")
+    document = read_result(RECORDINGS / "verified")
     page = read(certificate(document))
     before, after = document.verification["gyro"].before, document.verification["gyro"].after
     assert before is not None
@@ -391,7 +391,7 @@ def test_a_sensor_with_a_port_of_its_own_is_on_no_board() -> None:
 
 
 def test_a_verification_alone_is_reported_as_that() -> None:
-    document = read_result(FIXTURES / "verified").model_copy(update={"sensors": {}})
+    document = read_result(RECORDINGS / "verified").model_copy(update={"sensors": {}})
     found = certificate(document)
     assert found.title == "Verification report"
     assert len(found.marks) == 1 and "Simulated" in found.marks[0]  # as that run was

@@ -27,7 +27,7 @@ from support.certified import (
     with_accelerometer,
 )
 from support.dcc_rules import rule_faults, schema_faults
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 HOSTILE = "a <b>&amp;\x00\x1b[31m ]]> \"'  "
@@ -74,7 +74,7 @@ def test_ptb_s_rules_find_nothing_wrong(stated: Stated) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("stated", [LABORATORY, SILENT], ids=["said", "unsaid"])
 def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
-    verified = read_result(FIXTURES / "verified").verification
+    verified = read_result(RECORDINGS / "verified").verification
     xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified}), stated))
     assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 9, 3, 3, 6, 3, 3, 3]
     assert rule_faults(xml) == []
@@ -269,7 +269,7 @@ def half_known() -> ResultDocument:
 @pytest.mark.parametrize(
     ("refused", "why"),
     [
-        (lambda: certificate(read_result(FIXTURES / "calibration")), "only the noise part of the uncertainty"),
+        (lambda: certificate(read_result(RECORDINGS / "six_observation")), "only the noise part of the uncertainty"),
         (lambda: certificate(result().model_copy(update={"sensors": {}})), "calibrated nothing"),
         (lambda: certificate(stated=Stated()), "country is not stated"),
         (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),

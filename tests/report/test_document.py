@@ -18,18 +18,18 @@ from rig.motion.geometry import NOMINAL
 from rig.report.document import document_of
 from rig.report.entry import entry
 from rig.report.table import print_result
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.synthetic_run import Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
+    return calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
 @pytest.mark.slow
 def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
-    old = json.loads((FIXTURES / "calibration" / "result.json").read_text(encoding="utf-8"))
+    old = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
     new = json.loads(document_of(outcome).text())
     assert list(new) == list(old)
     assert list(new["provenance"]) == list(old["provenance"])
@@ -57,7 +57,7 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
 
 @pytest.mark.slow
 def test_a_reference_has_no_solution_of_the_board() -> None:
-    found = calibrated([read_run(FIXTURES / "verified" / "run.h5")])
+    found = calibrated([read_run(RECORDINGS / "verified" / "run.h5")])
     sensors = json.loads(document_of(found).text())["sensors"]
     assert (sensors["gyro"]["role"], "board" in sensors["gyro"]) == ("calibrate", True)
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)

@@ -14,10 +14,10 @@ from rig.report.checks_page import page_text
 from rig.report.ending import ending
 from rig.report.entry import entry
 from rig.report.glossary_page import page_text as glossary_text
-from support.ended_runs import ONE, RECORDINGS, failed, of_three_parts
-from support.paths import DOCS, FIXTURES
+from support.ended_runs import ONE, failed, of_three_parts
+from support.paths import DOCS, RECORDINGS
 
-FROZEN = sorted(path.parent for path in RECORDINGS.glob("*/*/result.json"))
+FROZEN = sorted(path.parent for path in RECORDINGS.glob("*/result.json"))
 RUN = Path("runs/2026-11-25T10-00-00Z-imu")
 SINCE = ("since 2026-11-23 (no. 1): scale factor of x changed by +0.4 %, 12 U; 3 more", "else nothing changed")
 COPYABLE = ("certificate: ", "everything: ")
@@ -116,7 +116,7 @@ def test_what_came_near_its_limit_is_named() -> None:
 
 
 def test_a_reference_is_no_result_of_the_run() -> None:
-    text = " ".join(" ".join(ended(read_result(FIXTURES / "verified"))).split())
+    text = " ".join(" ".join(ended(read_result(RECORDINGS / "verified"))).split())
     assert "reference" not in text.partition("checks passed")[0]
     assert "gyro against reference: RMS at most 0." in text and " rad/s before, 0." in text
 
@@ -167,7 +167,7 @@ def test_a_name_that_nobody_knows_is_answered_with_those_like_it(capsys: pytest.
 
 
 def shown(capsys: pytest.CaptureFixture[str], *options: str) -> str:
-    assert main(["show", str(FIXTURES / "verified"), *options]) == 0
+    assert main(["show", str(RECORDINGS / "verified"), *options]) == 0
     return capsys.readouterr().out
 
 
@@ -179,13 +179,13 @@ def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFi
     assert shown(capsys, "--all").count("\n") > budget.count("\n") + checks.count("\n") - 4
     assert all(each.splitlines()[-1] == "verdict: PASS" for each in (short, budget, checks))
     assert "reference (known)" in budget and "reference (known)" not in shown(capsys, "--sensor", "gyro")
-    assert main(["show", str(FIXTURES / "verified"), "--sensor", "nobody"]) == 2
+    assert main(["show", str(RECORDINGS / "verified"), "--sensor", "nobody"]) == 2
     assert "Choose one of: gyro, reference" in capsys.readouterr().err
 
 
 @pytest.mark.slow
 def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.CaptureFixture[str]) -> None:
-    again = ["solve", str(FIXTURES / "verified")]
+    again = ["solve", str(RECORDINGS / "verified")]
     assert main(again) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("gyroscope gyro ") and len(lines) <= 12 and lines[-1] == "verdict: PASS"
@@ -195,7 +195,7 @@ def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.Capt
     assert "checks of gyro" in whole and "non-orthogonality" in whole and whole.splitlines()[-1] == "verdict: PASS"
     assert main([*again, "--set", "limits.scale_deviation=0.01"]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert f"rig solve {FIXTURES / 'verified'} --set limits.scale_deviation=VALUE" in said
+    assert f"rig solve {RECORDINGS / 'verified'} --set limits.scale_deviation=VALUE" in said
 
 
 def test_checks_that_failed_stand_first_and_rounding_is_not_printed(

@@ -30,8 +30,7 @@ from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
 from rig.report.exports.recorded import WithMotion, exported
 from support.certified import accelerometer, everything, result
-from support.frozen import RECORDINGS
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
 GRAVITY_M_S2 = 9.81
 
@@ -59,7 +58,7 @@ def sensed() -> ResultDocument:
 
 @pytest.fixture(scope="module")
 def recordings() -> tuple[WithMotion, ...]:
-    return tuple(map(WithMotion, observe_runs(open_run(FIXTURES / "calibration").movement)))
+    return tuple(map(WithMotion, observe_runs(open_run(RECORDINGS / "six_observation").movement)))
 
 
 def felt(document: ResultDocument, rate_flange: Array, up_flange: Array) -> tuple[Array, Array]:
@@ -98,7 +97,7 @@ def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument
 def test_imucal_of_a_gyroscope_alone_leaves_accelerations_as_they_are() -> None:
     from imucal import CalibrationInfo
 
-    old = read_result(FIXTURES / "calibration")
+    old = read_result(RECORDINGS / "six_observation")
     found = CalibrationInfo.from_json(*imucal_files(calibrations(old)).values())
     force, _ = found.calibrate(np.ones((1, 3)), np.ones((1, 3)), "m/s^2", "rad/s")
     np.testing.assert_array_equal(force, np.ones((1, 3)))
@@ -133,7 +132,7 @@ def test_kalibr_s_noise_is_that_of_rests_over_the_root_of_the_rate(sensed: Resul
     assert found["gyroscope_noise_density"] == pytest.approx(0.035 / 238**0.5, rel=0.05)
     assert found["accelerometer_noise_density"] == pytest.approx(0.02 / 200**0.5)
     assert "Lost: gyroscope_random_walk, accelerometer_random_walk" in text
-    alone = kalibr_files(calibrations(read_result(FIXTURES / "calibration")))["gyro_imu.yaml"]
+    alone = kalibr_files(calibrations(read_result(RECORDINGS / "six_observation")))["gyro_imu.yaml"]
     assert "accelerometer_noise_density" not in yaml.safe_load(alone)
     assert "Lost: accelerometer_noise_density" in alone
 
@@ -161,7 +160,7 @@ def test_autopilots_correct_accelerometers_as_the_result_does(sensed: ResultDocu
 
 
 def test_autopilots_correct_a_magnetometer_to_the_size_that_the_result_makes_it() -> None:
-    document = read_result(RECORDINGS / "rig.settings-6" / "magnetometer")
+    document = read_result(RECORDINGS / "magnetometer")
     ((_, found),) = document.magnetometers.items()
     assert isinstance(found, MagnetometerEntry)
     px4, ardupilot = parameters_of(document)
@@ -176,13 +175,13 @@ def test_autopilots_correct_a_magnetometer_to_the_size_that_the_result_makes_it(
 
 
 def test_a_file_without_gyroscopes_leaves_their_calibration_at_boot_alone() -> None:
-    document = read_result(RECORDINGS / "rig.settings-6" / "magnetometer")
+    document = read_result(RECORDINGS / "magnetometer")
     text = ardupilot_files(calibrations(document))["ardupilot.param"]
     assert "COMPASS_OFS_X" in text and "INS_GYR" not in text.replace("# ", "")
 
 
 def test_sensors_keep_their_numbers_when_one_before_them_was_not_calibrated(sensed: ResultDocument) -> None:
-    field = read_result(RECORDINGS / "rig.settings-6" / "magnetometer").magnetometers["compass"]
+    field = read_result(RECORDINGS / "magnetometer").magnetometers["compass"]
     fields = {"inner": ErrorEntry(error="no field"), "outer": field}
     two = {"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"]), "magnetometers": fields}
     document = sensed.model_copy(update={**two, "accelerometers": {"b": sensed.accelerometers["gyro"]}})
@@ -261,7 +260,7 @@ def test_csv_solves_to_the_same_calibration(
     solving = ["solve", str(tmp_path / "gyro.csv"), "--sweeps", str(tmp_path / "gyro_sweeps.csv"), "--json"]
     assert main(solving) == 0
     again = json.loads(capsys.readouterr().out)["sensors"]["imu"]
-    first = read_result(FIXTURES / "calibration").sensors["gyro"]
+    first = read_result(RECORDINGS / "six_observation").sensors["gyro"]
     std = np.sqrt(np.diag(first.covariance))
     off = np.array([*again["scale"], *again["bias_rad_s"]]) - np.array([*first.scale, *first.bias_rad_s])
     assert np.all(np.abs(off) < std)  # the arm's vibration is noise there
@@ -345,7 +344,7 @@ def test_accelerations_are_exported_beside_the_rates(recordings: tuple[WithMotio
     assert message.linear_acceleration_covariance[0] == 0  # nothing stood still in attitudes: not known
 
 
-BY_HAND, ELSEWHERE = RECORDINGS / "rig.settings-7" / "by_hand", RECORDINGS / "rig.files-1"
+BY_HAND, ELSEWHERE = RECORDINGS / "by_hand", RECORDINGS
 
 
 @pytest.mark.slow
@@ -408,6 +407,6 @@ def test_readings_of_a_file_are_a_ros_2_bag_where_a_gyroscope_is_among_them(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_by_the_command_line(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", str(FIXTURES / "calibration"), "--format", name, "--out", str(tmp_path / "made")]) == 0
+    assert main(["export", str(RECORDINGS / "six_observation"), "--format", name, "--out", str(tmp_path / "made")]) == 0
     told = [Path(line) for line in capsys.readouterr().out.splitlines()]
     assert told and all(path.exists() for path in told)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rig.cli import main
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 UNCERTAIN = re.compile("std|expanded|covariance|budget|limit")
 
@@ -26,7 +26,7 @@ def made(value: Any, number: float, place: str = "") -> Any:
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0.0, 5e-324, 1e-300])
 def test_uncertainties_of_nothing_are_shown(number: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    run = Path(shutil.copytree(RECORDINGS / "rig.settings-7" / "six_observation", tmp_path / "run"))
+    run = Path(shutil.copytree(RECORDINGS / "six_observation", tmp_path / "run"))
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     (run / "result.json").write_text(json.dumps(made(result, number)), encoding="utf-8")
     assert main(["show", str(run), "--all"]) == 0

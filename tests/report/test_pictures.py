@@ -21,7 +21,7 @@ from rig.report.kinds.finding import Finding
 from rig.report.kinds.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_ATTITUDES, OF_SAMPLES
 from rig.report.printed_budget import printed_budget
 from support.certified import accelerometer, certificate, everything, magnetometer, read, result
-from support.frozen import RECORDINGS
+from support.paths import RECORDINGS
 
 
 def bars(picture: Residuals) -> np.ndarray:
@@ -43,7 +43,7 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
 
 
 def test_bars_of_results_of_before_are_called_what_they_are() -> None:
-    sensor = read_result(RECORDINGS / "rig.settings-6" / "imu").sensors["gyro"]
+    sensor = read_result(RECORDINGS / "imu").sensors["gyro"]
     picture = residuals(Finding("gyro", RATE, sensor))
     assert picture is not None and picture.of == OF_SAMPLES
     assert "which holds vibration" in picture.of
@@ -66,7 +66,7 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
 
 @pytest.mark.slow
 def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so() -> None:
-    document = document_of(judged(open_run(RECORDINGS / "rig.settings-6" / "magnetometer"), DEFAULT_ESTIMATOR))
+    document = document_of(judged(open_run(RECORDINGS / "magnetometer"), DEFAULT_ESTIMATOR))
     (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
     assert isinstance(field, MagnetometerEntry)
     pictures = (
@@ -87,7 +87,7 @@ def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so()
 def test_frozen_attitudes_agree_with_their_bars() -> None:
     """By noise alone most of them seemed to have failed."""
     for name, kind in (("imu", "accelerometers"), ("magnetometer", "magnetometers")):
-        document = read_result(RECORDINGS / "rig.settings-6" / name)
+        document = read_result(RECORDINGS / name)
         for found in getattr(document, kind).values():
             picture = attitude_residuals(Finding("imu", ACCELERATION if kind == "accelerometers" else FIELD, found))
             assert picture.within >= 0.85 * len(picture.points)
@@ -131,6 +131,6 @@ def filled(document: ResultDocument) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["imu", "verified", "bias_drift", "everything"])
 def test_no_sheet_but_the_last_is_left_half_empty(kind: str) -> None:
-    document = everything() if kind == "everything" else read_result(RECORDINGS / "rig.settings-6" / kind)
+    document = everything() if kind == "everything" else read_result(RECORDINGS / kind)
     *before, _ = filled(document)
     assert before and min(before) > 0.7

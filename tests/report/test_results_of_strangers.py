@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from rig.cli import main
-from support.paths import ROOT
+from support.paths import RECORDINGS
 
-RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"
 OBEYED = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e]|<script>alert")
 HOSTILE = '\x1b[31m\x9b2J\x07\u202e<script>alert(1)</script>"{{7*7}}\r'
 
@@ -35,7 +34,7 @@ def texts_replaced(value: Any, keys: frozenset[str]) -> None:
 @pytest.mark.slow
 def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     keys = frozenset({"serial_number", "rig_version", "arm_model", "what", "source", "reference"})
-    folder = forged("rig.settings-7/imu", lambda document: texts_replaced(document, keys), tmp_path)
+    folder = forged("imu", lambda document: texts_replaced(document, keys), tmp_path)
     assert main(["show", "--all", str(folder)]) == 0
     assert main(["report", str(folder)]) == 0
     printed = capsys.readouterr()
@@ -75,7 +74,7 @@ def test_what_contradicts_itself_is_refused_by_its_place(
 
 def test_a_key_that_stands_twice_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One reader takes the first verdict, another the last."""
-    folder = forged("rig.settings-7/six_observation", lambda document: None, tmp_path)
+    folder = forged("six_observation", lambda document: None, tmp_path)
     text = (folder / "result.json").read_text(encoding="utf-8")
     (folder / "result.json").write_text(text.replace("{", '{"verdict": "fail", ', 1), encoding="utf-8")
     assert main(["show", str(folder)]) == 2
@@ -92,5 +91,5 @@ def test_a_size_that_a_later_version_finds_is_left_out(tmp_path: Path, capsys: p
     def forge(document: Any) -> None:
         document["sensors"]["gyro"]["by_hand"]["sizes"][0]["name"] = "tremor_rad"
 
-    assert main(["show", "--all", str(forged("rig.settings-7/by_hand", forge, tmp_path))]) == 0
+    assert main(["show", "--all", str(forged("by_hand", forge, tmp_path))]) == 0
     assert "by hand: " in capsys.readouterr().out

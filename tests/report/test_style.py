@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
 
 @pytest.mark.thorough
@@ -18,7 +18,7 @@ def test_a_matplotlibrc_in_the_working_folder_changes_nothing(tmp_path: Path) ->
         folder = tmp_path / name
         folder.mkdir()
         (folder / "matplotlibrc").write_text(settings, encoding="utf-8")
-        command = [sys.executable, "-P", "-m", "rig", "allan", str(FIXTURES / "calibration"), "--plot", "."]
+        command = [sys.executable, "-P", "-m", "rig", "allan", str(RECORDINGS / "six_observation"), "--plot", "."]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr

@@ -15,13 +15,13 @@ from rig.data.run_file import read_run
 from rig.report import writers
 from rig.station.events import DocumentWritten, RunEvent
 from support.full_disk import full_disk
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 from support.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
+    return calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
 def test_the_folder_holds_header_certificate_and_result(outcome: Outcome, tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", RUN, str(FIXTURES / "calibration" / "run.h5"), str(folder)],
+        [sys.executable, "-c", RUN, str(RECORDINGS / "six_observation" / "run.h5"), str(folder)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(house), str(ROOT)])},
         cwd=house,
         capture_output=True,

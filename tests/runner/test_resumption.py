@@ -53,7 +53,7 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
 
 @pytest.mark.slow
 def test_a_sweep_that_only_the_accelerometer_contradicts_is_repeated() -> None:
-    sound = damaged_accelerations.readings_of("rig.settings-6/imu", "gyro")
+    sound = damaged_accelerations.readings_of("imu", "gyro")
     damaged = damaged_accelerations.offset(0.02, lambda seen: seen.sweep(4))(sound)
     script = installed_script("imu")
     before, run = (by_script(each.recording(), script) for each in (sound, damaged))

@@ -115,7 +115,14 @@ def _budgeted(found: EntryT, size: KnownSize) -> EntryT:
     noise = np.linalg.cholesky(np.array(found.covariance))
     exact = AttitudeError(0.0, 0.0)
     spread = Spread(
-        np.array(found.scale), np.array(found.covariance), noise, np.eye(6), exact, chi_square=0.0, freedom=0
+        np.array(found.scale),
+        np.array(found.covariance),
+        noise,
+        np.eye(6),
+        exact,
+        chi_square=0.0,
+        freedom=0,
+        noise_freedom=np.full(6, np.inf),
     )
     budget = reference_budget(spread, size)
     combined = tuple(map(tuple, budget.covariance.tolist()))

@@ -4,22 +4,22 @@ from collections.abc import Sequence
 
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.check import Check
-from rig.analysis.contradictions import FALSE_ALARMS, OF_READINGS, OF_THE_MODEL, contradictions
+from rig.analysis.contradictions import CHECKS, FALSE_ALARMS, contradictions
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.data.run_file import RunData
 from rig.observation.observed_run import ObservedRun
 
-STATISTICS = len(OF_READINGS) + len(OF_THE_MODEL)  # of a gyroscope
+STATISTICS = len(CHECKS)  # of a gyroscope
 RATE = FALSE_ALARMS / STATISTICS  # of each
 
-Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings | None]
+Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
 
 
 def solved(run: RunData) -> Solved:
     """What checks are made of, of a recording of one gyroscope."""
     recordings = observe_recordings([run])
     surroundings = surroundings_of(recordings, recordings[0].run.settings)
-    return recordings, solve_observed(run.sensors, recordings, surroundings=surroundings), surroundings
+    return recordings, solve_observed(run.sensors, recordings, surroundings), surroundings
 
 
 def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:

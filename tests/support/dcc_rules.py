@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from support.paths import FIXTURES, ROOT
+from support.paths import ROOT
 
 FILES = {
     "https://ptb.de/si/v2.1.0/SI_Format.xsd": "SI-2.1.0.xsd",
@@ -19,7 +19,11 @@ FILES = {
 }
 REMARKS = {"warning", "information"}
 MAIN = "dcc-3.2.1.xsd"
-PLACES = [Path(os.environ.get("RIG_DCC_SCHEMAS", "")), FIXTURES.parent / "dcc", ROOT.parent / "shared" / "dcc"]
+PLACES = [
+    Path(os.environ.get("RIG_DCC_SCHEMAS", "")),
+    ROOT / "tests" / "fixtures" / "dcc",
+    ROOT.parent / "shared" / "dcc",
+]
 
 
 def schema_faults(xml: bytes) -> list[str]:

@@ -1,15 +1,14 @@
 """Results of runs that nobody made, for how runs end: of one sensor and of six, with checks that failed."""
 
 from rig.data.result_file import ResultDocument, read_result
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
-RECORDINGS = FIXTURES.parent / "recordings"
-ONE = read_result(RECORDINGS / "rig.settings-6" / "verified")
+ONE = read_result(RECORDINGS / "verified")
 
 
 def of_three_parts() -> ResultDocument:
     """Three gyroscopes and three accelerometers, with every check of each."""
-    one = read_result(RECORDINGS / "rig.settings-7" / "imu")
+    one = read_result(RECORDINGS / "imu")
     names = ("lsm9ds1", "mpu9250", "adis16465")
     checks = [
         check.model_copy(update={"sensor": name, "name": check.name.replace("gyro.", f"{name}.")})

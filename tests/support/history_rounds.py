@@ -19,7 +19,7 @@ import h5py
 
 from rig.history.store import open_history
 from support.commands import configuration, rig_here
-from support.paths import FIXTURES, ROOT
+from support.paths import RECORDINGS, ROOT
 from support.waiting import wait_for
 from support.warm import started
 
@@ -211,7 +211,7 @@ def _sleep_until(moment_s: float) -> None:
 def recorded(folder: Path) -> Path:
     """A recording of a sensor that is called as the folder, which is solved when it is imported."""
     folder.mkdir()
-    shutil.copy(FIXTURES / "calibration" / "run.h5", folder)
+    shutil.copy(RECORDINGS / "six_observation" / "run.h5", folder)
     with h5py.File(folder / "run.h5", "r+") as file:
         file["samples"]["gyro"].attrs["serial_number"] = folder.name
     return folder

@@ -16,7 +16,7 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from support.paths import CONFIGS, FIXTURES
+from support.paths import CONFIGS, RECORDINGS
 
 FIRST = datetime(2026, 1, 1, tzinfo=UTC)
 PARTS = 4
@@ -29,7 +29,7 @@ def tell(**said: object) -> None:
 def run_folder(folder: Path, serial_number: str, second: int) -> Path:
     """A finished run of that sensor: a short result, and a recording that nobody solves."""
     folder.mkdir(parents=True)
-    result = json.loads((FIXTURES / "calibration" / "result.json").read_text(encoding="utf-8"))
+    result = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
     result["sensors"]["gyro"] |= {"serial_number": serial_number, "observations": [], "rests": []}
     moment = (FIRST + timedelta(seconds=second)).isoformat()
     result["provenance"] |= {"started_utc": moment, "solved_utc": moment}

@@ -15,15 +15,15 @@ from rig.data.schema import EVENTS_DTYPE, SCHEMA
 from rig.observation.observed_run import observe_run
 from rig.observation.windows import dwelt
 from rig.plans.recorded import open_run
-from support.frozen import RECORDINGS
 from support.inclinometer import INCLINATION
+from support.paths import RECORDINGS
 
 SCALE, BIAS_RAD, PER_COUNT, NOISE_RAD = np.array([1.02, 0.97]), np.array([0.004, -0.007]), 1e-5, 2e-4
 
 
 def write(folder: Path) -> None:
     """The frozen recording's samples, and those of an inclinometer by the board's clock."""
-    run = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
+    run = open_run(RECORDINGS / "imu").movement[0]
     observed = observe_run(run, run.settings.observation)
     tilt = RecordedSensor("tilt2", "I-1", 100.0, (Channel(INCLINATION.name, "tilt", "<i4", PER_COUNT, 0.0, 10**6),))
     beside = run.samples["gyro"]

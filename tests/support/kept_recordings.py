@@ -11,9 +11,9 @@ from rig.data.result_file import ResultDocument
 from rig.history.finished import Finished, compact, finished_run
 from rig.history.issued import Issued
 from rig.history.store import History
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
-CALIBRATION = FIXTURES / "calibration"  # the quickest to solve: a twentieth of a second
+CALIBRATION = RECORDINGS / "six_observation"  # the quickest to solve: a twentieth of a second
 Change = Callable[[ResultDocument], ResultDocument]
 
 

@@ -8,4 +8,4 @@ DEMO = CONFIGS / "demo.yaml"
 DOCS = ROOT / "docs"
 FIRMWARE = ROOT / "firmware_host" / "firmware"
 IMAGE = FIRMWARE / "image"
-FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"  # runs recorded by the rig of that commit
+RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"  # frozen: see support.frozen

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from rig.data.result_file import ResultDocument, SensorEntry, read_result
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 
-VERIFIED = read_result(FIXTURES / "verified")
+VERIFIED = read_result(RECORDINGS / "verified")
 SENSOR, REFERENCE = VERIFIED.sensors["gyro"], VERIFIED.sensors["reference"]
 
 

@@ -14,6 +14,5 @@ def solve_runs(
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
     chosen = known_estimator(estimator)  # before the work of observing
     recordings = observe_recordings(runs)
-    return solve_observed(
-        runs[0].sensors, recordings, chosen, surroundings_of(recordings, runs[0].settings), matrix_corrected
-    )
+    surroundings = surroundings_of(recordings, runs[0].settings)
+    return solve_observed(runs[0].sensors, recordings, surroundings, chosen, matrix_corrected)

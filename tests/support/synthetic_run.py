@@ -17,12 +17,12 @@ from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFin
 from rig.data.provenance import Provenance
 from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import settings_of
-from rig.data.turner_of_run_3 import turner_of_provenance
 from rig.estimation.arrays import Array
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate
-from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.state import ARM_FIELDS, ARM_STATE_DTYPE, JOINT_NAMES
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer
 from rig.plans.six_sweeps import plan_six_observation
 from rig.world.site import Site
@@ -48,7 +48,7 @@ PROVENANCE = Provenance(
     firmware_version="0.2.0",
     sensor_serial_numbers={"gyro": "LSM9DS1-001"},
 )
-UR = turner_of_provenance(PROVENANCE)
+UR = RecordedTurner("ur", "Universal Robots", "UR10e", JOINT_NAMES, NOMINAL, ARM_FIELDS)
 SCALE = (1.1771, 1.1554, 1.1440)
 BIAS_RAD_S = (0.0077, -0.0100, -0.0051)
 SENSITIVITY = float(np.radians(8.75e-3))
@@ -228,7 +228,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
         motion.config,
         motion.settings,
         provenance,
-        turner_of_provenance(provenance),
+        replace(UR, geometry=provenance.arm_kinematics or NOMINAL),
         {"gyro": replace(SENSOR, part=setup.part)},
         {"gyro": samples},
         arm,

@@ -9,7 +9,7 @@ from rig.data.result_file import ResultDocument, read_result, write_result
 from rig.data.run_folder import RESULT
 from rig.page.replay import ended
 from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
-from support.paths import FIXTURES
+from support.paths import RECORDINGS
 from support.told_runs import ABOUT, moving, planned
 
 PARTS = {
@@ -18,7 +18,7 @@ PARTS = {
     "adis16465": "adis16465 ADIS16465-00042",
 }
 SIX = replace(ABOUT, folder="runs/2026-11-22T16-00-00Z-imu", procedure="imu", parts=PARTS)
-IMU = FIXTURES.parent / "recordings" / "rig.settings-6" / "imu"
+IMU = RECORDINGS / "imu"
 
 
 def six_moving(until_s: float) -> Iterator[RunEvent]:

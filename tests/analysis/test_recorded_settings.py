@@ -1,0 +1,25 @@
+"""A recording is judged by the settings it was recorded with, or by those that the user gives instead."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+
+from rig.analysis.analyses import calibrated
+from rig.data.run_file import RunData, read_run
+from support.paths import RECORDINGS
+
+RECORDING = RECORDINGS / "six_observation" / "run.h5"
+
+
+def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> None:
+    changed = Path(shutil.copy(RECORDING, tmp_path))
+    with h5py.File(changed, "r+") as file:
+        file.attrs["config"] = file.attrs["config"].replace("rest_s:", "pause_s:") + "\nlighting: {colour: red}\n"
+    assert calibrated([read_run(changed)]).checks == calibrated([read_run(RECORDING)]).checks
+
+
+def test_another_limit_gives_another_verdict() -> None:
+    run: RunData = read_run(RECORDING)
+    assert calibrated([run]).passed
+    assert not calibrated([run.judged_by(["limits.scale_std=1e-6"])]).passed
