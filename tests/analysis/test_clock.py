@@ -10,6 +10,7 @@ from rig.analysis.analyses import calibrated
 from rig.analysis.check import Check
 from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
+from rig.config.judged_by import OF_SENSORS, UncertaintySection
 from rig.data.run_file import RunData
 from rig.data.settings import Uncertainty
 from rig.observation.arm_clock import state_jitter
@@ -18,14 +19,7 @@ from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = Uncertainty(
-    controller_clock_ppm=50.0,
-    computer_clock_ppm=1.0,
-    crystal_ppm=20.0,
-    axis_deg=0.06,
-    sensor_offset_mm=50.0,
-    decision_rule="simple",
-)
+KNOWN = Uncertainty(**{**UncertaintySection().model_dump(), **{what: {} for what in OF_SENSORS}})
 
 
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"

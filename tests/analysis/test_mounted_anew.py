@@ -71,7 +71,7 @@ def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() ->
 
 def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     run = synthetic_run(Setup())
-    assert "mounts" not in run.settings.document()
+    assert run.settings.mounts == ()
     assert settings_from_json(run.settings.to_json()) == run.settings
     assert observe_as_mounted([run], run.settings)[1] == ()
 

@@ -216,9 +216,9 @@ def test_a_recording_full_of_holes_is_refused(foreign: Path) -> None:
 @pytest.mark.parametrize(("time_s", "name"), [(3e7, "impossible_times"), (float("nan"), "not_finite")])
 def test_a_recording_that_claims_to_last_for_a_year_is_not_replayed(foreign: Path, time_s: float, name: str) -> None:
     with h5py.File(foreign / "run.h5", "r+") as file:
-        last = file["arm"][-1]
+        last = file["states"][-1]
         last["time_s"] = time_s
-        file["arm"][-1] = last
+        file["states"][-1] = last
     refused = rig_here("watch", foreign, "--page-address", "127.0.0.1:0")
     assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr
 

@@ -6,12 +6,10 @@ sheet: so p-values of checks that know as much, and no more, are uniform.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rig.config.judged_by import OF_SENSORS
 from rig.config.sensor_catalogue import PARTS
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import RATE
@@ -24,7 +22,7 @@ from rig.estimation.nonlinearity import CUBE_MISSED
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
 from rig.motion.steps import Sweep, Transfer
 from support.drawn_ripple import Ripple
-from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
+from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times, sizes_of
 
 WRISTS = (3, 4, 5)
 WAVE_SHARE = 0.3  # as the solver has it
@@ -141,9 +139,7 @@ def drawn(
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
     run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
-    nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}  # is stated of this sensor beside what is of its kind
-    of_its_kind = known.model_copy(update=nothing)
-    settings = replace(run.settings, uncertainty=of_its_kind)
+    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
     return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
 
 

@@ -3,12 +3,10 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rig.config.judged_by import OF_SENSORS
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.stage_section import rotation_by
@@ -18,7 +16,7 @@ from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.motion.geometry import flange_attitude, flange_pose, flange_rate
 from rig.plans.six_sweeps import plan_six_observation
 from support.drawn_recording import Kind, _beside_the_encoders, _counts, _felt, _looked_at_late, _wandering
-from support.synthetic_run import Motion, Setup, run_data, sample_times
+from support.synthetic_run import Motion, Setup, run_data, sample_times, sizes_of
 
 QUARTER_TURNS = (
     "{instruction: as it is}",
@@ -68,8 +66,8 @@ def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[l
         felt, scale = _felt(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
         read = felt + bias + _wandering(len(time_s), kind, own) + kind.noise_rad_s * own.standard_normal(felt.shape)
         run = _looked_at_late(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
-        nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}
-        settings = replace(run.settings, uncertainty=known.model_copy(update=nothing))
+        sizes = sizes_of({"gyro": kind.sensor.part})
+        settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
         runs.append(replace(run, sensors={"gyro": kind.sensor}, settings=settings))
     return runs, scale
 

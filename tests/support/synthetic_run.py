@@ -4,14 +4,17 @@ The arm follows the rig's own plan with trapezoid ramps and a ripple locked to t
 its own epoch and rate; readings follow g = K (m + b) with mounting error, noise, quantisation and saturation.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
+from rig.config.judged_by import OF_SENSORS, OfSensor
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
+from rig.config.sensor_catalogue import PARTS
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.provenance import Provenance
@@ -206,6 +209,11 @@ def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array
         m += force_g @ mounted.T @ np.array(setup.g_sensitivity_rad_s_per_g).T
     counts: Array = np.clip(np.round(m / SENSITIVITY), -32768, 32767)
     return counts
+
+
+def sizes_of(parts: Mapping[str, str]) -> dict[OfSensor, dict[str, float]]:
+    """Return what `uncertainty` states of sensors of these parts, by name, where the configuration says nothing."""
+    return {what: {name: float(getattr(PARTS[part], what)) for name, part in parts.items()} for what in OF_SENSORS}
 
 
 def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> RunData:

@@ -17,6 +17,7 @@ from support.synthetic_run import (
     readings,
     run_data,
     sample_times,
+    sizes_of,
     true_rate,
 )
 
@@ -73,4 +74,7 @@ def recording(
         samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
         corrected = with_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
         sensors["gyro"] = replace(corrected, mode="calibrated")
-    return replace(run, sensors=sensors, samples=samples)
+    known = run.settings.stated_uncertainty
+    sizes = sizes_of({name: sensor.part for name, sensor in sensors.items()})
+    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
+    return replace(run, sensors=sensors, samples=samples, settings=settings)
