@@ -5,26 +5,17 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
-from rig.data.result_file import ResultDocument, read_result
+from rig.data.result_file import read_result
 from rig.history.recomputed import not_given
 from support.paths import RECORDINGS
 
 DRIFT = RECORDINGS / "bias_drift"
 
 
-def drifting() -> ResultDocument:
-    """A result that says whose bias it is that drifts."""
-    document = read_result(DRIFT)
-    whose = {"part": "lsm9ds1", "serial_number": "LSM9DS1-CI", "full_scale": 8.7}
-    drifts = {
-        name: {quantity: each.model_copy(update=whose) for quantity, each in of.items()}
-        for name, of in document.bias_drift.items()
-    }
-    return document.model_copy(update={"bias_drift": drifts})
-
-
-def test_what_an_older_result_does_not_follow_is_not_missed() -> None:
-    assert not_given(read_result(DRIFT), drifting()) == []
+def test_a_quantity_that_a_claim_does_not_follow_is_not_missed() -> None:
+    """The program that wrote it may not have followed that yet."""
+    given = read_result(DRIFT)
+    assert not_given(given.model_copy(update={"bias_drift": {}}), given) == []
 
 
 @pytest.fixture

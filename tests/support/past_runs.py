@@ -54,12 +54,16 @@ def document(
 ) -> ResultDocument:
     """The result, its checks those of scale and bias alone."""
     assert isinstance(SENSOR.vector_model, VectorEntry)
+    without_gravity = {"g_sensitivity_rad_s_per_m_s2": None, "g_sensitivity_std_rad_s_per_m_s2": None}
     sensor = SENSOR.model_copy(
         update={
             "serial_number": serial_number,
             "scale": tuple(map(float, scale)),
             "bias_rad_s": tuple(map(float, bias_rad_s)),
             "covariance": tuple(map(tuple, np.diag(STD**2).tolist())),
+            "covariance_combined": None,
+            "budget": None,
+            "vector_model": SENSOR.vector_model.model_copy(update=without_gravity),
             "observations": (),
             "rests": (),
         }
