@@ -14,6 +14,7 @@ from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
 from rig.errors import Fault, or_fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.bias_over_temperature import BiasOverTemperature, bias_over_temperature
@@ -43,14 +44,14 @@ class BiasDrift:
     `held`: scale, axes and reference are those of the first repeat (accelerometers), or nominal (gyroscopes). A
     gyroscope's bias has what a scale that is not nominal makes of the Earth's rate in it, and all of the Earth's rate
     where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
-    share beside that. `anew` is each repeat for itself, or the Fault it ends in. `time_s` and `temperature_c` (R,) are
+    share beside that. `anew` is each repeat for itself, by its index. `time_s` and `temperature_c` (R,) are
     means over each repeat, times since the first. `freedom` (3,) is that of
     `held.std`, `slope_freedom` (3,) that of the slope's standard deviation.
     """
 
     held: BiasByRepeat
     common_std: Array
-    anew: tuple[Anew | Fault, ...]
+    anew: Attempts[int, Anew]
     time_s: Array
     temperature_c: Array
     over_temperature: BiasOverTemperature | Fault
@@ -207,7 +208,7 @@ def _drift(
     return BiasDrift(
         held=held,
         common_std=common_std,
-        anew=tuple(or_fault(partial(_anew, solve, repeat)) for repeat in range(len(repeats))),
+        anew=attempt_each({repeat: partial(_anew, solve, repeat) for repeat in range(len(repeats))}),
         time_s=times - times[0],
         temperature_c=temperatures,
         over_temperature=slope,

@@ -16,7 +16,7 @@ from rig.analysis.vector_inputs import see
 from rig.config.stage_section import rotation_by
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
-from rig.errors import Fault, or_fault
+from rig.errors.attempts import attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained, explain
 from rig.observation.observed_run import ObservedRun
@@ -62,11 +62,11 @@ def _found(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[Fo
     if len(stages) < 2 or (surroundings := surroundings_of(recordings, settings)) is None:
         return ()
     run = recordings[0].run
-    told = [
-        or_fault(partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting)))
+    attempts = {
+        name: partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting))
         for name in settings.to_calibrate
-    ]
-    explained = [each for each in told if not isinstance(each, Fault)]
+    }
+    explained = list(attempt_each(attempts).results.values())
     if not explained:
         return ()
     best = min(explained, key=lambda each: float(np.trace(each.mounts_covariance)))

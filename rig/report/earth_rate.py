@@ -6,17 +6,14 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_types import ErrorEntry
-from rig.errors import Fault
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import DEG_H, EarthRate
 from rig.report.entry import entry
 from rig.report.expanded import expanded, factor_words
 
 
-def earth_rate_entry(earth_rate: EarthRate | Fault) -> EarthRateEntry | ErrorEntry:
-    """The entry of the Earth's rate, or of why it was not found."""
-    if isinstance(earth_rate, Fault):
-        return ErrorEntry(error=str(earth_rate))
+def earth_rate_entry(earth_rate: EarthRate) -> EarthRateEntry:
+    """Return the entry of the Earth's rate."""
     return entry(EarthRateEntry, earth_rate)
 
 

@@ -19,6 +19,7 @@ from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.report.budget_table import heading_of
 from rig.report.certificate import dcc_results
 from rig.report.entry import counted
+from rig.report.error_entry import error_entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.kinds.finding import Finding
@@ -41,6 +42,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
 def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) -> DriftEntry:
     """The bias of that sensor by repeat, in SI units."""
     held, slope = drift.held, drift.over_temperature
+    anew = drift.anew.by_key(_anew, error_entry)
     return DriftEntry(
         unit=quantity.unit,
         repeats=tuple(
@@ -48,7 +50,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
                 time_s=float(drift.time_s[repeat]),
                 temperature_c=_known(float(drift.temperature_c[repeat])),
                 held=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
-                anew=_anew(drift.anew[repeat]),
+                anew=anew[repeat],
             )
             for repeat in range(len(held.bias))
         ),
@@ -82,9 +84,7 @@ def _known(temperature_c: float) -> float | None:
     return None if np.isnan(temperature_c) else temperature_c
 
 
-def _anew(anew: Anew | Fault) -> BiasEntry | ErrorEntry:
-    if isinstance(anew, Fault):
-        return ErrorEntry(error=str(anew))
+def _anew(anew: Anew) -> BiasEntry:
     return BiasEntry(bias=_vector(anew.bias), std=_vector(anew.std))
 
 
