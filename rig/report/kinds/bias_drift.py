@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.bias_drift import Anew, BiasDrift
+from rig.analysis.bias_drift import SLOPE, Anew, BiasDrift
 from rig.analysis.outcome import Outcome
 from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
 from rig.data.installed_kinds import quantities
@@ -13,7 +13,6 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry, Vector3
-from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.report.budget_table import heading_of
@@ -62,8 +61,8 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         ),
         false_alarm=FALSE_ALARM,
         largest_change=_vector(held.largest_change),
-        over_temperature=ErrorEntry(error=str(slope))
-        if isinstance(slope, Fault)
+        over_temperature=error_entry(drift.faults[SLOPE])
+        if slope is None
         else SlopeEntry(
             slope=_vector(slope.slope),
             std=_vector(slope.std),
