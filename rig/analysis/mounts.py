@@ -59,9 +59,9 @@ def observe_as_mounted(
 def _found(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[FoundMount, ...]:
     """The mounts of all stages but the first, by the sensor to calibrate that tells them best; none where none does."""
     stages = list(dict.fromkeys(each.run.settings.stage for each in recordings))
-    if len(stages) < 2 or (surroundings := surroundings_of(recordings, settings)) is None:
+    if len(stages) < 2:
         return ()
-    run = recordings[0].run
+    surroundings, run = surroundings_of(recordings, settings), recordings[0].run
     attempts = {
         name: partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting))
         for name in settings.to_calibrate

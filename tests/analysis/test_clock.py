@@ -11,21 +11,13 @@ from rig.analysis.check import Check
 from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
 from rig.data.run_file import RunData
-from rig.data.settings import Uncertainty
 from rig.observation.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = Uncertainty(
-    controller_clock_ppm=50.0,
-    computer_clock_ppm=1.0,
-    crystal_ppm=20.0,
-    axis_deg=0.06,
-    sensor_offset_mm=50.0,
-    decision_rule="simple",
-)
+KNOWN = synthetic_run(Setup()).settings.uncertainty  # 50 ppm of the controller, 1 of the computer, 20 of the crystal
 
 
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"
