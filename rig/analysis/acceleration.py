@@ -259,7 +259,7 @@ def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAccelera
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:
     """How a gyroscope and its accelerometer are aligned, in the flange's axes; None without a vector solution."""
     vector = gyroscope.vector_model
-    if isinstance(vector, Fault):
+    if vector is None:
         return None
     to_flange = np.kron(np.eye(3), mounting.T)  # of the rows of F
     return alignment(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.calibration import SensorResult
 from rig.analysis.consistency import Allowance
 from rig.analysis.segments import Segments
 from rig.analysis.surroundings import Surroundings
@@ -87,7 +87,7 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult, stamp_s
         finds_curve=explained is not None and explained.nonlinearity is not None,
         arcs=any(each.arc_rad is not None for each in result.observations),
         jitter_s=surroundings.state_jitter_s,
-        earth_rad_s=_earth(surroundings, name, found_earth_rate(result.earth)),
+        earth_rad_s=_earth(surroundings, name, result.earth),
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
         stamp_s=stamp_std_s or 0.0,

@@ -4,7 +4,7 @@ sections III-A and III-B, Figs. 4 and 6. Pure.
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,8 @@ from rig.analysis.triad import known_gravity
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.bias_over_temperature import BiasOverTemperature, bias_over_temperature
@@ -26,6 +27,7 @@ from rig.observation.mean import by_axis
 from rig.observation.observed_run import ObservedRun
 
 FEWEST_REPEATS = 2
+SLOPE = "over_temperature"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +45,21 @@ class BiasDrift:
     `held`: scale, axes and reference are those of the first repeat (accelerometers), or nominal (gyroscopes). A
     gyroscope's bias has what a scale that is not nominal makes of the Earth's rate in it, and all of the Earth's rate
     where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
-    share beside that. `anew` is each repeat for itself, or the Fault it ends in. `time_s` and `temperature_c` (R,) are
-    means over each repeat, times since the first. `freedom` (3,) is that of
-    `held.std`, `slope_freedom` (3,) that of the slope's standard deviation.
+    share beside that. `anew` is each repeat for itself, by its index. `time_s` and `temperature_c` (R,) are means over
+    each repeat, times since the first. `freedom` (3,) is that of `held.std`, `slope_freedom` (3,) that of the slope's
+    standard deviation. `faults` say by the name SLOPE why there is no slope.
     """
 
     held: BiasByRepeat
     common_std: Array
-    anew: tuple[Anew | Fault, ...]
+    anew: Attempts[int, Anew]
     time_s: Array
     temperature_c: Array
-    over_temperature: BiasOverTemperature | Fault
+    over_temperature: BiasOverTemperature | None
     earth_rate_known: bool
     freedom: Array
     slope_freedom: Array
+    faults: Mapping[str, Fault] = field(default_factory=dict)
 
 
 Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
@@ -202,18 +205,20 @@ def _drift(
 ) -> BiasDrift:
     times = np.array([np.mean([each.time_s for each in repeat]) for repeat in repeats])
     temperatures = np.array([np.mean([each.temperature_c for each in repeat]) for repeat in repeats])
-    slope = or_fault(partial(bias_over_temperature, held.bias, held.std, temperatures, times))
+    faults = dict[str, Fault]()
+    slope = attempt(faults, SLOPE, partial(bias_over_temperature, held.bias, held.std, temperatures, times))
     freedom = np.minimum(held.freedom, np.min([_noise_freedom(repeat) for repeat in repeats], axis=0))
     return BiasDrift(
         held=held,
         common_std=common_std,
-        anew=tuple(or_fault(partial(_anew, solve, repeat)) for repeat in range(len(repeats))),
+        anew=attempt_each({repeat: partial(_anew, solve, repeat) for repeat in range(len(repeats))}),
         time_s=times - times[0],
         temperature_c=temperatures,
         over_temperature=slope,
         earth_rate_known=earth_rate_known,
         freedom=freedom,
-        slope_freedom=freedom if isinstance(slope, Fault) else np.minimum(slope.freedom, freedom),
+        slope_freedom=freedom if slope is None else np.minimum(slope.freedom, freedom),
+        faults=faults,
     )
 
 

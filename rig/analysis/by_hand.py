@@ -1,6 +1,6 @@
 """A gyroscope that a hand turned on a table: what its readings alone tell. Pure."""
 
-from rig.analysis.calibration import SensorResult
+from rig.analysis.calibration import ALGORITHM_1, NEWTON, SensorResult
 from rig.analysis.correction import Correction, matrix_correction
 from rig.data.motion_file import Columns, Item
 from rig.data.quantity import ACCELERATION, RATE
@@ -34,13 +34,14 @@ def result_by_hand(sensor: RecordedSensor | Item, solution: HandSolution, correc
         vector_model=solution.turned,
         explained=None,
         uncertainty=solution.budget,
-        six_observation=NO_SWEEPS,
-        algorithm_1=NO_SWEEPS,
+        six_observation=None,
+        algorithm_1=None,
         observations=(),
         rests=(),
         time_bases=(),
         corrected_by=corrected_by,
         by_hand=solution,
+        faults=dict.fromkeys((NEWTON, ALGORITHM_1), NO_SWEEPS),
     )
 
 

@@ -1,7 +1,7 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -13,7 +13,8 @@ from rig.analysis.vector_inputs import known_of, see, unknown_of
 from rig.data.motion_file import Item
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.errors import Fault, Refused, or_fault
+from rig.errors import Fault, Refused
+from rig.errors.attempts import attempt
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Unknown, budget
@@ -32,6 +33,8 @@ from rig.observation.observe import Observation
 from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 
+VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "earth_rate"
+
 
 @dataclass(frozen=True, slots=True)
 class SensorResult:
@@ -42,25 +45,26 @@ class SensorResult:
     another estimator.
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
-    `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
-    each recording that took part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is what
-    the sensor found of the Earth's rate, or the Fault for which it did not, None where it was not to. `by_hand`
-    is there where a hand turned it.
+    `six_observation` (exact) and `algorithm_1`, the paper's own. There is one time base for each recording that took
+    part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is the Earth's rate as the sensor
+    estimates it, None where it was not to. `by_hand` is there where a hand turned it. `faults` say why there is none of
+    these, by the estimator's name (VECTOR, NEWTON, ALGORITHM_1) and EARTH_RATE.
     """
 
     sensor: RecordedSensor | Item
     solution: Estimate
-    vector_model: VectorSolution | TurnedSolution | Fault
+    vector_model: VectorSolution | TurnedSolution | None
     explained: Explained | None
     uncertainty: Budget | None
-    six_observation: Solution | Fault
-    algorithm_1: Solution | Fault
+    six_observation: Solution | None
+    algorithm_1: Solution | None
     observations: tuple[Observation, ...]
     rests: tuple[Average, ...]
     time_bases: tuple[TimeBase, ...]
     corrected_by: Correction
-    earth: EarthRate | Fault | None = None
+    earth: EarthRate | None = None
     by_hand: HandSolution | None = None
+    faults: Mapping[str, Fault] = field(default_factory=dict)
 
     @property
     def serial_number(self) -> str:
@@ -148,30 +152,31 @@ def _solve_sensor(
     mounting = np.array(sensor.mounting)
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
-    earth_rate: EarthRate | Fault | None = None
+    faults = dict[str, Fault]()
+    earth_rate: EarthRate | None = None
     seen = see(recordings, name, surroundings)
     if surroundings.finds_earth_rate:
         known = known_of(surroundings, name)
-        earth_rate = or_fault(lambda: find_earth_rate(seen, mounting, known))
-    explained = or_fault(lambda: explain(_with(earth_rate, seen), mounting))
-    vector_model = explained if isinstance(explained, Fault) else explained.solution
-    algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
-    by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
-    solution = by_name[estimator] if estimator in by_name else solve_observations(observations, estimator)
-    if isinstance(solution, Fault):
-        raise solution
+        earth_rate = attempt(faults, EARTH_RATE, lambda: find_earth_rate(seen, mounting, known))
+    explained = attempt(faults, VECTOR, lambda: explain(_with(earth_rate, seen), mounting))
+    vector_model = None if explained is None else explained.solution
+    algorithm_1 = attempt(faults, ALGORITHM_1, lambda: solve_six_observation(observations, "algorithm_1"))
+    solutions: dict[str, Estimate | None] = {VECTOR: vector_model, NEWTON: six_observation, ALGORITHM_1: algorithm_1}
+    solution = solutions[estimator] if estimator in solutions else solve_observations(observations, estimator)
+    if solution is None:
+        raise faults[estimator]
     return SensorResult(
         sensor=sensor,
         solution=solution,
         vector_model=vector_model,
-        explained=explained if isinstance(explained, Explained) else None,
+        explained=explained,
         uncertainty=None
-        if isinstance(explained, Fault)
+        if explained is None
         else _budget_of(
             solution,
             explained,
             surroundings,
-            unknown_of(surroundings, name, found_earth_rate(earth_rate), sensor.stamp_std_s),
+            unknown_of(surroundings, name, earth_rate, sensor.stamp_std_s),
             name,
         ),
         six_observation=six_observation,
@@ -181,6 +186,7 @@ def _solve_sensor(
         time_bases=tuple(part.time_base for part in parts),
         corrected_by=_correction(solution, whole_matrix=whole_matrix),
         earth=earth_rate,
+        faults=faults,
     )
 
 
@@ -196,15 +202,9 @@ def _budget_of(
     return None
 
 
-def found_earth_rate(earth_rate: EarthRate | Fault | None) -> EarthRate | None:
-    """The Earth's rate that was found; None where it was not, for whatever reason."""
-    return earth_rate if isinstance(earth_rate, EarthRate) else None
-
-
-def _with(earth_rate: EarthRate | Fault | None, seen: Seen) -> Seen:
-    """What was found counts; else what the site says, if it says anything."""
-    found = found_earth_rate(earth_rate)
-    return seen if found is None else replace(seen, earth_rate_rad_s=found.rate_rad_s)
+def _with(earth_rate: EarthRate | None, seen: Seen) -> Seen:
+    """Return what is explained with the Earth's rate that was estimated; else with what the site says, if anything."""
+    return seen if earth_rate is None else replace(seen, earth_rate_rad_s=earth_rate.rate_rad_s)
 
 
 def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:

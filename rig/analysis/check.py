@@ -69,14 +69,14 @@ def fitness(
     return Check(name if piece is None else f"{name}.{piece}", value, limit, unit, means)
 
 
-def unsolved_checks(faults: Iterable[tuple[str, str, object]]) -> Iterator[Check]:
+def unsolved_checks(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
     """Yield the checks that fail: of a sensor, its quantity and the Fault for which this has no solution.
 
     Of what was only recorded there is none: sweeps do not calibrate a magnetometer, and the size of the field is what
-    asks for that. Neither is there one of what is no Fault.
+    asks for that.
     """
     for sensor, quantity, fault in faults:
-        if isinstance(fault, Fault) and fault.name not in ONLY_RECORDED:
+        if fault.name not in ONLY_RECORDED:
             yield fitness(sensor, quantity, "unsolved", 1.0, 0.0)
 
 

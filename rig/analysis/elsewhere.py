@@ -8,7 +8,15 @@ import numpy as np
 
 from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.by_hand import solved_by_hand
-from rig.analysis.calibration import SensorResult, solve_observations, solve_six_observation, solve_vector
+from rig.analysis.calibration import (
+    ALGORITHM_1,
+    NEWTON,
+    VECTOR,
+    SensorResult,
+    solve_observations,
+    solve_six_observation,
+    solve_vector,
+)
 from rig.analysis.check import Check, fitness, unsolved_checks
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
@@ -20,7 +28,8 @@ from rig.analysis.sweeps_agree import check_agree, contradiction, counted, rows_
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings
-from rig.errors import Fault, Refused, or_fault
+from rig.errors import Fault, Refused
+from rig.errors.attempts import attempt
 from rig.estimation import known_turns, triaxial
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.estimate import Estimate
@@ -96,8 +105,7 @@ def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
 
     And every quantity that was to be solved, and is not. No configuration states limits of anything else.
     """
-    found = (*sensor.unsolved.items(), *((each.quantity, each.found) for each in sensor.of_kinds))
-    yield from unsolved_checks((name, quantity.name, each) for quantity, each in found)
+    yield from unsolved_checks((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if sensor.rates is not None else known_turns.MAX_CONDITION
         yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
@@ -125,11 +133,11 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
         )
     if reference_c is not None:
         data, polynomials = files_to_reference(data, reference_c)
-    solution = solve_swept(data, chosen)
+    solution, faults = solve_swept(data, chosen), dict[str, Fault]()
     vector = (
         solution
         if isinstance(solution, VectorSolution | TurnedSolution)
-        else or_fault(lambda: counted(_vector(data), data))
+        else attempt(faults, VECTOR, lambda: counted(_vector(data), data))
     )
     gyroscope = SensorResult(
         sensor=read.item,
@@ -138,8 +146,8 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
         explained=None,
         uncertainty=budget_of(solution, data),
         # Three sweeps may do for the vector model, not for the six observations.
-        six_observation=or_fault(lambda: solve_six_observation(data.sweeps, "newton")),
-        algorithm_1=or_fault(lambda: solve_six_observation(data.sweeps, "algorithm_1")),
+        six_observation=attempt(faults, NEWTON, lambda: solve_six_observation(data.sweeps, "newton")),
+        algorithm_1=attempt(faults, ALGORITHM_1, lambda: solve_six_observation(data.sweeps, "algorithm_1")),
         observations=data.sweeps,
         rests=data.rests,
         time_bases=(),
@@ -148,6 +156,7 @@ def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None)
             if isinstance(solution, VectorSolution | TurnedSolution)
             else diagonal_correction(solution.scale)
         ),
+        faults=faults,
     )
     by_turns = data.turned if isinstance(solution, TurnedSolution) else None
     if polynomials is not None:
@@ -247,12 +256,13 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
         vector_model=solution,
         explained=None,
         uncertainty=solution.budget,
-        six_observation=NO_SWEEPS,
-        algorithm_1=NO_SWEEPS,
+        six_observation=None,
+        algorithm_1=None,
         observations=(),
         rests=(),
         time_bases=() if clock is None else (clock,),
         corrected_by=matrix_correction(solution),
+        faults=dict.fromkeys((NEWTON, ALGORITHM_1), NO_SWEEPS),
     )
 
 

@@ -10,7 +10,8 @@ from rig.data.motion_file import Item
 from rig.data.quantity import Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import attempt
 from rig.observation.observed_run import ObservedRun
 from rig.observation.placed_on_arm import placements_on_arm
 
@@ -25,17 +26,18 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """What was `found` of a `sensor` by its name, or the Fault for which nothing was."""
+    """What was `found` of a `sensor` by its name, None where nothing was: the `fault` says why."""
 
     name: str
     sensor: RecordedSensor | Item
     quantity: Quantity
-    found: OfKind | Fault
+    found: OfKind | None
+    fault: Fault | None = None
 
     @property
     def checks(self) -> tuple[Check, ...]:
         """The solver's checks; none where nothing was found."""
-        return () if isinstance(self.found, Fault) else self.found.checks
+        return () if self.found is None else self.found.checks
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
@@ -45,9 +47,10 @@ def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tu
 
 def _on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
     for kind in installed_kinds():
+        faults = dict[str, Fault]()
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():
             solve = partial(_solved, kind, name, recordings, settings, settings.site)
-            yield KindFound(name, sensor, kind.quantity, or_fault(solve))
+            yield KindFound(name, sensor, kind.quantity, attempt(faults, name, solve), faults.get(name))
 
 
 def _solved(

@@ -104,7 +104,7 @@ def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Ou
 def _unsolved(magnetometers: Attempts[str, MagnetometerResult], of_kinds: Sequence[KindFound]) -> Iterator[Check]:
     """The checks of what was to be calibrated and is not."""
     yield from unsolved_checks((name, FIELD.name, each) for name, each in magnetometers.faults.items())
-    yield from unsolved_checks((each.name, each.quantity.name, each.found) for each in of_kinds)
+    yield from unsolved_checks((kind.name, kind.quantity.name, kind.fault) for kind in of_kinds if kind.fault)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

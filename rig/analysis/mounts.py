@@ -16,7 +16,7 @@ from rig.analysis.vector_inputs import see
 from rig.config.stage_section import rotation_by
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
-from rig.errors import Fault, or_fault
+from rig.errors.attempts import attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained, explain
 from rig.observation.observed_run import ObservedRun
@@ -59,14 +59,14 @@ def observe_as_mounted(
 def _found(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[FoundMount, ...]:
     """The mounts of all stages but the first, by the sensor to calibrate that tells them best; none where none does."""
     stages = list(dict.fromkeys(each.run.settings.stage for each in recordings))
-    if len(stages) < 2 or (surroundings := surroundings_of(recordings, settings)) is None:
+    if len(stages) < 2:
         return ()
-    run = recordings[0].run
-    told = [
-        or_fault(partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting)))
+    surroundings, run = surroundings_of(recordings, settings), recordings[0].run
+    attempts = {
+        name: partial(explain, see(recordings, name, surroundings), np.array(run.sensors[name].mounting))
         for name in settings.to_calibrate
-    ]
-    explained = [each for each in told if not isinstance(each, Fault)]
+    }
+    explained = list(attempt_each(attempts).results.values())
     if not explained:
         return ()
     best = min(explained, key=lambda each: float(np.trace(each.mounts_covariance)))

@@ -13,7 +13,7 @@ import numpy as np
 from rig.analysis.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RunData
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
 from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
@@ -27,17 +27,20 @@ from rig.observation.observe import Observation, observe_each_sweep, observe_sen
 from rig.observation.observed_run import times_s
 from rig.observation.timebase import TimeBase
 
+NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
+
 
 @dataclass(frozen=True, slots=True)
 class Turned:
     """What a run tells of a gyroscope yet: its finished sweeps by index, observed or refused.
 
-    The `solution` is the vector model's, or the Fault that says what is missing yet. `bias_rad_s` (3,) is that of the
-    rests alone, with its standard deviation, None without rests.
+    The `solution` is the vector model's, None as long as the fault `missing` says what it lacks. `bias_rad_s` (3,) is
+    that of the rests alone, with its standard deviation, None without rests.
     """
 
     sweeps: Attempts[int, Observation]
-    solution: VectorSolution | Fault
+    solution: VectorSolution | None
+    missing: Fault | None
     bias_rad_s: tuple[Array, Array] | None
 
 
@@ -76,15 +79,22 @@ def so_far(runs: Sequence[RunData]) -> SoFar:
         at_rest = at_rest.updated(_accelerations(run, recorded)).updated(_fields(run, recorded))
     return SoFar(
         {
-            name: Turned(
-                attempts,
-                _solution(attempts.results, rests[name], np.array(runs[-1].sensors[name].mounting)),
-                _bias(rests[name]),
-            )
+            name: _turned(attempts, rests[name], np.array(runs[-1].sensors[name].mounting))
             for name, attempts in sweeps.items()
         },
         at_rest,
     )
+
+
+def _turned(sweeps: Attempts[int, Observation], rests: Sequence[Average], mounting: Array) -> Turned:
+    observations = [observation for _, observation in sorted(sweeps.results.items())]
+    solution, missing = None, NO_SWEEP_YET if not observations else None
+    if observations:
+        try:
+            solution = solve_vector(observations, rests, mounting)
+        except Fault as fault:
+            missing = fault
+    return Turned(sweeps, solution, missing, _bias(rests))
 
 
 def _observe(run: RunData, name: str, motion: ArmMotion) -> _Recorded:
@@ -145,13 +155,6 @@ def _observe_sweeps(
     except Fault as fault:  # of the sensor as a whole
         return all_failed(finished_sweeps(run), fault), ()
     return sweeps.updated(Attempts({turn.sweep: turn for turn in sensor.revolutions})), sensor.rests
-
-
-def _solution(sweeps: Mapping[int, Observation], rests: Sequence[Average], mounting: Array) -> VectorSolution | Fault:
-    observations = [observation for _, observation in sorted(sweeps.items())]
-    if not observations:
-        return Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
-    return or_fault(partial(solve_vector, observations, rests, mounting))
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.calibration import SensorResult
 from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
@@ -41,7 +41,7 @@ def of_gyroscope(
     if explained is None:
         return
     means, mounting = _means(explained), np.array(result.sensor.mounting)
-    unknown = unknown_of(surroundings, name, found_earth_rate(result.earth))
+    unknown = unknown_of(surroundings, name, result.earth)
     for each in DAMAGES:
         if (size := sizes.get(each.what)) is None:
             continue

@@ -1,6 +1,7 @@
 """Attempts that stand side by side, of which some succeed: the one form that a Fault has as a value.
 
-What cannot go on raises its Fault. Where others of its kind go on, `attempt_each` makes a value of it.
+What cannot go on raises its Fault. Where others go on beside it, `attempt_each` and `attempt` make a value of it: it is
+among the `faults`, by the name of what was attempted, and never in the place of a result.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -12,6 +13,7 @@ from rig.errors import Fault
 Key = TypeVar("Key")
 Result = TypeVar("Result")
 Made = TypeVar("Made")
+MadeOfFault = TypeVar("MadeOfFault")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,10 +30,14 @@ class Attempts(Generic[Key, Result]):
         kept_faults = {key: fault for key, fault in self.faults.items() if key not in again}
         return Attempts({**kept, **later.results}, {**kept_faults, **later.faults})
 
-    def by_key(self, of_result: Callable[[Result], Made], of_fault: Callable[[Fault], Made]) -> dict[Key, Made]:
+    def by_key(
+        self, of_result: Callable[[Result], Made], of_fault: Callable[[Fault], MadeOfFault]
+    ) -> dict[Key, Made | MadeOfFault]:
         """Return what `of_result` makes of each result, then what `of_fault` makes of each Fault."""
-        made = {key: of_result(result) for key, result in self.results.items()}
-        return {**made, **{key: of_fault(fault) for key, fault in self.faults.items()}}
+        made: dict[Key, Made | MadeOfFault] = {key: of_result(result) for key, result in self.results.items()}
+        for key, fault in self.faults.items():
+            made[key] = of_fault(fault)
+        return made
 
 
 def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, Result]:
@@ -43,6 +49,15 @@ def attempt_each(attempts: Mapping[Key, Callable[[], Result]]) -> Attempts[Key, 
         except Fault as fault:
             faults[key] = fault
     return Attempts(results, faults)
+
+
+def attempt(faults: dict[str, Fault], name: str, solve: Callable[[], Result]) -> Result | None:
+    """Return what `solve` gives; None if it ends in a Fault, which `faults` then holds under that name."""
+    try:
+        return solve()
+    except Fault as fault:
+        faults[name] = fault
+        return None
 
 
 def all_failed(keys: Iterable[Key], fault: Fault) -> Attempts[Key, Result]:

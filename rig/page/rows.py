@@ -12,7 +12,6 @@ from rig.data.result_file import ResultDocument
 from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
-from rig.estimation.vector_model import VectorSolution
 from rig.observation.mean import QuantityInDwell, ReadAtRest
 from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
@@ -107,16 +106,16 @@ def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
 
 
 def _parameters_so_far(name: str, partial: Turned) -> Row:
-    solution = partial.solution
-    if isinstance(solution, VectorSolution):
+    if (solution := partial.solution) is not None:
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = Three(solution.bias_rad_s.tolist(), u[3:]), Three(solution.scale.tolist(), u[:3])
         return _row(Shown(name, RATE, name, RATE.bias, bias, combined=False, scale=scale))
+    missing = None if partial.missing is None else partial.missing.what
     if partial.bias_rad_s is None:
-        return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": solution.what}
+        return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": missing}
     mean, std = partial.bias_rad_s
     bias = Three(mean.tolist(), (COVERAGE_FACTOR * std).tolist())
-    return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": solution.what}
+    return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": missing}
 
 
 def _row(shown: Shown) -> Row:

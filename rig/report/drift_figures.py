@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.bias_drift import Anew, BiasDrift
+from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
@@ -47,7 +47,7 @@ def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     """Draw the bias by repeat: dots with scale and axes held, crosses all found anew, lines where it moved."""
     size = quantity.drift.size
     repeat = np.arange(1, len(drift.held.bias) + 1)
-    again = [(number, found) for number, found in zip(repeat, drift.anew, strict=True) if isinstance(found, Anew)]
+    again = [(index + 1, anew) for index, anew in drift.anew.results.items()]
     factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
     for i, axis in enumerate("xyz"):
         held, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size

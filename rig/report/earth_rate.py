@@ -6,18 +6,15 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_types import ErrorEntry
-from rig.errors import Fault
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import DEG_H, EarthRate
 from rig.report.entry import entry
 from rig.report.expanded import expanded, factor_words
 
 
-def earth_rate_entry(earth_rate: EarthRate | Fault) -> EarthRateEntry | ErrorEntry:
-    """The entry of the Earth's rate, or of why it was not found."""
-    if isinstance(earth_rate, Fault):
-        return ErrorEntry(error=str(earth_rate))
-    return entry(EarthRateEntry, earth_rate)
+def earth_rate_entry(earth_rate: EarthRate) -> EarthRateEntry:
+    """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
+    return entry(EarthRateEntry, earth_rate, freedom=earth_rate.freedom if np.isfinite(earth_rate.freedom) else None)
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.calibration import found_earth_rate
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
@@ -29,7 +28,7 @@ def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder:
     found = {
         name: (result.explained, earth)
         for name, result in outcome.results.items()
-        if result.explained is not None and (earth := found_earth_rate(result.earth)) is not None
+        if result.explained is not None and (earth := result.earth) is not None
     }
     return write_pictures(
         [

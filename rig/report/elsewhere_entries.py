@@ -22,6 +22,7 @@ from rig.estimation.known_increments import EarthSeen
 from rig.estimation.reference_model import REFERENCE, SECOND
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.entry import entry
+from rig.report.error_entry import error_entry
 from rig.report.triad_entry import OF_ACCELEROMETERS, OF_MAGNETOMETERS, attitudes_entry
 
 ORDER = (
@@ -68,7 +69,7 @@ def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
     """Why quantities that were recorded have no solution, by sensor; those without any left out."""
     told: dict[str, dict[str, ErrorEntry]] = {}
     faults = [(name, *each) for name, found in outcome.elsewhere.items() for each in found.unsolved.items()]
-    faults += [(each.name, each.quantity, each.found) for each in outcome.of_kinds if isinstance(each.found, Fault)]
+    faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.of_kinds if kind.fault is not None]
     for name, quantity, fault in faults:
         told.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
     return told
@@ -127,11 +128,10 @@ def _followed(increments: InIncrements) -> FollowedEntry:
 
 
 def _rates_beside(attitudes: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
-    entries: dict[str, BesideEntry | ErrorEntry] = {
-        method: entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
-        for method, other in attitudes.beside.results.items()
-    }
-    return entries | {method: ErrorEntry(error=str(fault)) for method, fault in attitudes.beside.faults.items()}
+    def solution_entry(other: TriaxialSolution) -> BesideEntry:
+        return entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
+
+    return {str(method): made for method, made in attitudes.beside.by_key(solution_entry, error_entry).items()}
 
 
 def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:

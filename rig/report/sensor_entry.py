@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.calibration import SensorResult
+from rig.analysis.calibration import ALGORITHM_1, EARTH_RATE, NEWTON, VECTOR, SensorResult
 from rig.analysis.freedom_beside import of_angles, of_sensitivity
 from rig.analysis.onboard_check import Agreement
 from rig.data.quantity import RATE
@@ -30,6 +30,7 @@ from rig.observation.average import Average
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import counted, entry
+from rig.report.error_entry import error_entry
 from rig.report.hand_entry import by_hand_entry
 
 
@@ -55,8 +56,8 @@ def sensor_entry(
         rests=[entry(AverageEntry, each, temperature_c=_warm(each)) for each in result.rests],
         time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
         vector_model=_vector_or_error(result),
-        six_observation=entry_or_error(result.six_observation),
-        algorithm_1=entry_or_error(result.algorithm_1),
+        six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
+        algorithm_1=_estimate_or_error(result.algorithm_1, result.faults.get(ALGORITHM_1)),
         by_hand=None if result.by_hand is None else by_hand_entry(result.by_hand),
         **({} if agreed is None else {"board": _board(agreed)}),
         **_uncertain(result),
@@ -83,6 +84,8 @@ def _uncertain(result: SensorResult) -> dict[str, Any]:
             found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:
         found["earth_rate"] = earth_rate_entry(result.earth)
+    elif EARTH_RATE in result.faults:
+        found["earth_rate"] = error_entry(result.faults[EARTH_RATE])
     return found
 
 
@@ -91,15 +94,15 @@ def estimate_entry(solution: Estimate) -> EstimateEntry:
     return entry(EstimateEntry, solution, observations_used=solution.observations)
 
 
-def entry_or_error(outcome: Estimate | Fault) -> EstimateEntry | ErrorEntry:
-    """A solution that stands beside another, or the error it ended in."""
-    return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else estimate_entry(outcome)
+def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
+    """Return the entry of a solution that stands beside another, or of the error it ended in."""
+    return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
 
 
 def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     outcome = result.vector_model
-    if isinstance(outcome, Fault):
-        return ErrorEntry(error=str(outcome))
+    if outcome is None:
+        return error_entry(result.faults[VECTOR])
     more: dict[str, Any] = {}
     if result.explained is not None:
         more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)

@@ -14,8 +14,7 @@ from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, M
 from rig.data.motion_file import Item
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.result_types import Entry, ErrorEntry
-from rig.errors import Fault
+from rig.data.result_types import Entry
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.residuals import attitude_residual_std
@@ -25,6 +24,7 @@ from rig.observation.acceleration import DwellReading
 from rig.observation.mean import Held
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import EntryT, entry
+from rig.report.error_entry import error_entry
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +82,6 @@ def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
         return {"attitude_error_rad": None, "attitude_error_std_rad": None}
     known = error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None
     return {"attitude_error_rad": error.std_rad, "attitude_error_std_rad": known}
-
-
-def error_entry(fault: Fault) -> Entry:
-    """Return the entry of what has no solution."""
-    return ErrorEntry(error=str(fault))
 
 
 def _beside_entry(models: Models[Any], other: TriaxialSolution) -> Entry:

@@ -21,7 +21,8 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.recorded_turner import RecordedTurner
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault, or_fault
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
 from rig.motion.steps import Sweep
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
@@ -64,12 +65,12 @@ class BoardCalibration:
         self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
-    def revolutions(self, sweep: Sweep) -> dict[str, Revolution | Fault]:
-        """When the revolution was for each sensor, just after it, or why none was found; that may take seconds."""
-        return {name: or_fault(partial(self._revolution, name, sweep)) for name in self.sensors}
+    def revolutions(self, sweep: Sweep) -> Attempts[str, Revolution]:
+        """Return when the revolution was for each sensor, just after it; that may take seconds."""
+        return attempt_each({name: partial(self._revolution, name, sweep) for name in self.sensors})
 
     @contextmanager
-    def looking(self, sweep: Sweep) -> Iterator["Future[dict[str, Revolution | Fault]]"]:
+    def looking(self, sweep: Sweep) -> Iterator["Future[Attempts[str, Revolution]]"]:
         """The revolutions, as they will be found meanwhile."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
@@ -77,9 +78,11 @@ class BoardCalibration:
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def observe(self, sweep: Sweep, revolutions: Mapping[str, Revolution | Fault]) -> None:
+    def observe(self, sweep: Sweep, revolutions: Attempts[str, Revolution]) -> None:
         """Make the board average the revolutions. One that is not fit for it is noted and left out."""
-        for name, revolution in revolutions.items():
+        for name, fault in revolutions.faults.items():
+            self.note(BoardNotObserved(name, sweep.index, str(fault)))
+        for name, revolution in revolutions.results.items():
             try:
                 found, speed_rad_s = self._observe(name, revolution)
             except (Fault, BoardError) as error:
@@ -96,10 +99,8 @@ class BoardCalibration:
             for method in METHODS:
                 self.note(BoardSolved(name, self.board.solve(index, method)))
 
-    def _observe(self, name: str, revolution: Revolution | Fault) -> tuple[BoardObservation, float]:
+    def _observe(self, name: str, revolution: Revolution) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
-        if isinstance(revolution, Fault):
-            raise revolution
         start_us, end_us, speed_rad_s = revolution
         index, _ = self.sensors[name]
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s

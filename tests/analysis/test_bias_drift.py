@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from rig.analysis.bias_drift import Anew, BiasDrift, Stand, acceleration_drift, rate_drift
+from rig.analysis.bias_drift import SLOPE, BiasDrift, Stand, acceleration_drift, rate_drift
 from rig.data.settings import Site
-from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.reference_model import BIAS, covariance_bound, whitening
 from rig.study import rate_table as rt
@@ -44,7 +43,7 @@ def bound(matrix: Array, reference: Array, variance: float) -> Array:
 def errors(drifts: list[BiasDrift], truth: Array) -> tuple[Array, Array]:
     """(S, R, 3) of the biases with F held, and found anew."""
     held = np.array([drift.held.bias for drift in drifts]) - truth
-    anew = np.array([[found.bias for found in drift.anew if isinstance(found, Anew)] for drift in drifts]) - truth
+    anew = np.array([[anew.bias for anew in drift.anew.results.values()] for drift in drifts]) - truth
     return held, anew
 
 
@@ -92,13 +91,14 @@ def test_a_gyroscope_s_bias_is_as_good_as_its_bound() -> None:
 def test_without_the_earth_s_rate_a_gyroscope_is_not_found_anew() -> None:
     repeats = stands(np.zeros((rt.ATTITUDES, 3)), np.full((3, 3), 0.01), 1e-12, 1)
     drift = rate_drift(repeats, Site((0.0, 0.0, 1.0), 9.8, None))
-    assert all(isinstance(found, Fault) and found.name == "earth_rate_unknown" for found in drift.anew)
+    assert not drift.anew.results
+    assert {fault.name for fault in drift.anew.faults.values()} == {"earth_rate_unknown"}
     assert np.abs(drift.held.bias - 0.01).max() < 2e-6
-    assert isinstance(drift.over_temperature, Fault)
+    assert drift.over_temperature is None
 
 
 @pytest.mark.parametrize("repeats", [2, 3])
 def test_few_repeats_tell_their_bias_and_nothing_of_temperature(repeats: int) -> None:
     drift = rate_drift(stands(np.zeros((10, 3)), np.zeros((repeats, 3)), 1e-12, 2), Site((0.0, 0.0, 1.0), 9.8, None))
     assert len(drift.held.bias) == repeats and not drift.held.moves
-    assert isinstance(drift.over_temperature, Fault) and drift.over_temperature.name == "too_few_observations"
+    assert drift.over_temperature is None and drift.faults[SLOPE].name == "too_few_observations"

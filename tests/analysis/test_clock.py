@@ -10,16 +10,14 @@ from rig.analysis.analyses import calibrated
 from rig.analysis.check import Check
 from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
-from rig.config.judged_by import OF_SENSORS, UncertaintySection
 from rig.data.run_file import RunData
-from rig.data.settings import Uncertainty
 from rig.observation.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = Uncertainty(**{**UncertaintySection().model_dump(), **{what: {} for what in OF_SENSORS}})
+KNOWN = synthetic_run(Setup()).settings.stated_uncertainty  # 50 ppm of the controller, 1 of the computer, 20 of a crystal
 
 
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"

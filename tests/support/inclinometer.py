@@ -107,7 +107,7 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     made = {}
     for each in outcome.of_kinds:
-        if each.quantity == INCLINATION and isinstance(each.found, OfKind) and isinstance(each.found.found, Solution):
+        if each.quantity == INCLINATION and each.found is not None and isinstance(each.found.found, Solution):
             found = {key: np.asarray(value).tolist() for key, value in vars(each.found.found).items()}
             of = each.sensor.part, each.sensor.serial_number
             found["covariance_combined"] = found["covariance"]

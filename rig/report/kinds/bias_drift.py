@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.bias_drift import Anew, BiasDrift
+from rig.analysis.bias_drift import SLOPE, Anew, BiasDrift
 from rig.analysis.outcome import Outcome
 from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
 from rig.data.installed_kinds import quantities
@@ -13,12 +13,12 @@ from rig.data.quantity import RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry, Vector3
-from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.report.budget_table import heading_of
 from rig.report.certificate import dcc_results
 from rig.report.entry import counted
+from rig.report.error_entry import error_entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
 from rig.report.kinds.finding import Finding
@@ -41,6 +41,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
 def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) -> DriftEntry:
     """The bias of that sensor by repeat, in SI units."""
     held, slope = drift.held, drift.over_temperature
+    anew = drift.anew.by_key(_anew, error_entry)
     return DriftEntry(
         unit=quantity.unit,
         repeats=tuple(
@@ -48,7 +49,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
                 time_s=float(drift.time_s[repeat]),
                 temperature_c=_known(float(drift.temperature_c[repeat])),
                 held=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
-                anew=_anew(drift.anew[repeat]),
+                anew=anew[repeat],
             )
             for repeat in range(len(held.bias))
         ),
@@ -60,8 +61,8 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         ),
         false_alarm=FALSE_ALARM,
         largest_change=_vector(held.largest_change),
-        over_temperature=ErrorEntry(error=str(slope))
-        if isinstance(slope, Fault)
+        over_temperature=error_entry(drift.faults[SLOPE])
+        if slope is None
         else SlopeEntry(
             slope=_vector(slope.slope),
             std=_vector(slope.std),
@@ -82,9 +83,7 @@ def _known(temperature_c: float) -> float | None:
     return None if np.isnan(temperature_c) else temperature_c
 
 
-def _anew(anew: Anew | Fault) -> BiasEntry | ErrorEntry:
-    if isinstance(anew, Fault):
-        return ErrorEntry(error=str(anew))
+def _anew(anew: Anew) -> BiasEntry:
     return BiasEntry(bias=_vector(anew.bias), std=_vector(anew.std))
 
 

@@ -18,6 +18,7 @@ from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
 from rig.report.elsewhere_entries import magnetometers_elsewhere
 from rig.report.entry import counted, entry
+from rig.report.error_entry import error_entry
 from rig.report.kinds.characteristics import MAGNETOMETERS
 from rig.report.kinds.finding import Finding
 from rig.report.kinds.kind import Standard
@@ -35,7 +36,7 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
     return {
         **magnetometers_elsewhere(outcome),
         **{name: _entry(outcome, name, result) for name, result in on_arm.results.items()},
-        **{name: ErrorEntry(error=str(fault)) for name, fault in on_arm.faults.items()},
+        **{name: error_entry(fault) for name, fault in on_arm.faults.items()},
     }
 
 
