@@ -79,6 +79,7 @@ class HandSession:
     _taken: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)  # the faces that lay up
     _refused: int = 0  # in a row
+    _bias_doubted: bool = False  # at the rest before, in which the item may have crept
     _reminded: bool = False
     _asked: HandAsked | None = None
     _progress: Progress | None = None
@@ -146,13 +147,13 @@ class HandSession:
         read = now.faces[-1] if now.faces else None
         if read is None:
             wrong = wrong or Fault("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go")
-        if wrong is not None:
-            self._wrong(wrong, move, rest)
+        counts = wrong is None or self._wrong(wrong, move, rest)
         face = None if read is None else self._face(read)
-        if face is None or (wrong is not None and wrong.name in NO_REST):
+        if face is None or not counts:
             last = Instruction("lay", FACES[0]) if self._asked is None else self._asked.instruction
             self._ask(last if face is None else Instruction("lay", face), wrong)
             return
+        self._bias_doubted = False
         self.note(HandRested(*self._board_us(rest), face))
         if move is not None and wrong is None:
             self._take(move, now, face)
@@ -197,8 +198,12 @@ class HandSession:
         self._taken.append(HandMove(kind, before, face, turns if kind == "turn" else 0))
         self.note(HandMoveTaken(*self._board_us(move), kind, before, face, self._taken[-1].turns))
 
-    def _wrong(self, wrong: Fault, move: Move | None, rest: Rest) -> None:
-        """Leave out what is wrong: a move, a rest, or all before. Raises the Fault that no hand can mend."""
+    def _wrong(self, wrong: Fault, move: Move | None, rest: Rest) -> bool:
+        """Leave out what is wrong, a move, a rest, or all before, and return whether the rest counts.
+
+        Another bias at one rest may be a creep, which costs this rest; at the next one too it is another bias.
+        Raises the Fault that no hand can mend.
+        """
         self._refused += 1
         if wrong.name not in MENDED_BY_HAND:
             raise wrong
@@ -206,16 +211,20 @@ class HandSession:
             what = f"{REFUSED_IN_A_ROW} moves in a row were refused; the last: {wrong.what}"
             raise Fault(wrong.name, what, wrong.remedy)
         events: list[OfTheHand] = []
-        if wrong.name in ANEW:
+        crept = wrong.name == "bias_jumped" and not self._bias_doubted
+        no_rest = crept or wrong.name in NO_REST
+        if no_rest:
+            self._bias_doubted |= crept
+            events.append(HandRestRefused(*self._board_us(rest), wrong.name))
+        elif wrong.name in ANEW:
             events.append(HandBegunAnew(self._board_us(rest)[0], wrong.name))
             self._taken, self._lay = [], []
-        elif wrong.name in NO_REST:
-            events.append(HandRestRefused(*self._board_us(rest), wrong.name))
         elif move is not None:
             events.append(HandMoveRefused(*self._board_us(move), wrong.name))
         for event in events:
             self._not_counted.take(event, self._shift_s or 0.0)
             self.note(event)
+        return not no_rest
 
     def _remind(self) -> None:
         """An item that is held in the hand is to be laid down."""

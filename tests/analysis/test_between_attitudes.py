@@ -18,7 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.observation.fixes import Turning
-from support.followed_body import EARTH_RAD_S, Followed, World, follow, write
+from support.followed_body import EARTH_RAD_S, Followed, World, follow, turning, write
 from support.real import recording
 
 BY_INTEGRAL, KNOWN_TO = np.array([1.0008, 1.0038, 1.0009]), np.array([0.0003, 0.0015, 0.0013])  # its README
@@ -35,12 +35,6 @@ WORLDS = {
     "noisy gyroscope, few looks": World(random_walk_rad_sqrt_s=3e-3, looks_hz=4),
     "wandering bias": World(bias_walk_rad_s_sqrt_s=1e-4),
 }
-
-
-def turning(followed: Followed) -> Turning:
-    half_s = np.median(np.diff(followed.looks_s)) / 2.1
-    rows_s = np.column_stack([followed.looks_s - half_s, followed.looks_s + half_s])
-    return Turning(followed.time_s, followed.readings, rows_s, followed.attitudes)
 
 
 def solved(followed: Followed, window_s: float | None = None) -> InIncrements:

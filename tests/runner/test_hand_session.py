@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.data.hand_events import HandBegunAnew
 from rig.errors import Fault
 from support.at_the_table import LIST, TRUE_SCALE, Table
 
@@ -85,6 +86,17 @@ def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
     with pytest.raises(Fault) as ended:
         Table(seed=8, mistakes={"too_fast": 1.0}).sit()
     assert ended.value.name == "clipping"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("creeps", [6, 11])
+def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: int) -> None:
+    table = Table(seed=3, settings=SHORT, creeps=creeps)
+    table.sit()
+    assert table.again == ["bias_jumped"]
+    assert not [event for event in table.events if isinstance(event, HandBegunAnew)]
+    assert [move.kind for move in table.taken].count("turn") == 2
+    held(table)
 
 
 ALL = ("short", "two_turns", "other_way", "wrong_face", "skipped", "crumb", "table_pushed", "held", "dropped", "left",

@@ -30,18 +30,20 @@ CHANNELS = (
 SENSOR = RecordedSensor("lsm9ds1", "LSM9DS1-HAND", RATE_HZ, CHANNELS)
 MATRIX = np.array([[0.85, 0.003, -0.002], [0.001, 0.865, 0.004], [0.002, -0.001, 0.874]])  # F of m = F ω + c
 OFFSET, NOISE = np.array([0.0077, -0.01, -0.005]), 1.0e-3
+CREEP_RAD_S = np.radians([0.2, -0.15, 0.1])
 TOLD = Told(50.0, "the board's crystal")
 LIST = ByHand(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)), closure_rad=float(np.radians(0.3)))
 
 
 @dataclass
 class Table:
-    """What happens at it: `events` of the session, in their order."""
+    """What happens at it: `events` of the session, in their order. At the rest number `creeps` it turns slowly."""
 
     seed: int
     mistakes: dict[str, float] = field(default_factory=dict)
     settings: ByHand = LIST
     hand: dict[str, Any] = field(default_factory=dict)
+    creeps: int | None = None
     events: list[OfTheHand] = field(default_factory=list)
     time_s: float = 0.0
 
@@ -51,7 +53,8 @@ class Table:
         self.operator = Operator(WorldSection.model_validate({"seed": self.seed, "sensors": sensors, "hand": hand}))
         self._random = np.random.default_rng([self.seed, 7])
         self.samples: list[np.ndarray] = []
-        self._count = 0
+        self._count = self._laid_down = 0
+        self._still, self._crept = False, 0
         self.acquisition = Acquisition()
         self.acquisition.expect("gyro", SENSOR)
         self.session = HandSession(
@@ -114,13 +117,27 @@ class Table:
         samples["sequence"] = self._count + np.arange(count)
         samples["board_time_us"] = np.round(1e6 * (times + 100.0) / (1 + NOMINAL_DRIFT))
         samples["host_time_s"] = times + 1.0
-        rates = np.array([each.rate_rad_s for each in felt]) @ MATRIX.T + OFFSET
+        true_rates = np.array([each.rate_rad_s for each in felt])
+        rates = (true_rates + self._creeping(true_rates)) @ MATRIX.T + OFFSET
         forces = np.array([each.force_m_s2 for each in felt])
         self._fill(samples, RATE, rates + self._random.normal(0, NOISE, rates.shape), PER_COUNT)
         self._fill(samples, ACCELERATION, forces + self._random.normal(0, 0.02, forces.shape), PER_COUNT_M_S2)
         self._count += count
         self.samples.append(samples)
         self.acquisition.on_samples("gyro", samples)
+
+    def _creeping(self, rates: Array) -> Array:
+        """(n, 3) what the item turns in the rest in which it creeps, and back as the hand takes it up."""
+        turning = np.zeros_like(rates)
+        for row, still in enumerate(~rates.any(axis=1)):
+            self._laid_down += bool(still and not self._still)
+            self._still = bool(still)
+            if still and self._laid_down == self.creeps:
+                turning[row] = CREEP_RAD_S
+                self._crept += 1
+            elif not still:
+                turning[row], self._crept = -self._crept * CREEP_RAD_S, 0
+        return turning
 
     @staticmethod
     def _fill(samples: np.ndarray, quantity: Any, values: Array, per_count: float) -> None:

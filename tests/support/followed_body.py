@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
+from rig.observation.fixes import Turning
 from support.csv_tables import write_table
 
+AT_REST = 0.02
 EARTH_RAD_S = 7.292e-5 * np.array([0.6, 0.0, 0.8])  # in room coordinates
 
 
@@ -21,7 +24,8 @@ class World:
     """A body that swings by `swing_rad` about all axes with periods of `fastest_s` and more, `duration_s` long.
 
     `random_walk_rad_sqrt_s` and `bias_walk_rad_s_sqrt_s` of the gyroscope; the reference errs by `attitude_rad` about
-    each axis at `looks_hz`, alike over `colour_s`; its look at t was at t + `late_s`.
+    each axis at `looks_hz`, alike over `colour_s`; its look at t was at t + `late_s`. From each of `stops_s` on it
+    stands still for `stop_lasts_s`, and the reference errs by `AT_REST` of that.
     """
 
     duration_s: float = 40.0
@@ -34,6 +38,8 @@ class World:
     looks_hz: float = 40.0
     colour_s: float = 0.0
     late_s: float = 0.0
+    stops_s: tuple[float, ...] = ()
+    stop_lasts_s: float = 0.8
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,13 @@ def follow(world: World, seed: int) -> Followed:
     looks_s = np.arange(0.1, world.duration_s - 0.1, 1 / world.looks_hz)
     matrix = np.eye(3) + 0.02 * rng.normal(size=(3, 3))
     bias = 0.01 * rng.normal(size=3)
-    attitudes, rates = swings.at(time_s)
+    attitudes, rates, _ = _stopping(swings, world, time_s)
     felt = (rates + EARTH_RAD_S @ attitudes) @ matrix.T + bias
     walk = np.cumsum(rng.normal(size=felt.shape), axis=0) * world.bias_walk_rad_s_sqrt_s / np.sqrt(world.rate_hz)
     noise = rng.normal(size=felt.shape) * world.random_walk_rad_sqrt_s * np.sqrt(world.rate_hz)
-    told, told_rates = swings.at(looks_s + world.late_s)
-    errors = Rotation.from_rotvec(_coloured(world, len(looks_s), rng)).as_matrix()
+    told, told_rates, moving = _stopping(swings, world, looks_s + world.late_s)
+    missed = _coloured(world, len(looks_s), rng) * np.where(moving, 1.0, AT_REST)[:, None]
+    errors = Rotation.from_rotvec(missed).as_matrix()
     return Followed(time_s, felt + walk - walk.mean(axis=0) + noise, looks_s, errors @ told, told_rates, matrix, bias)
 
 
@@ -90,6 +97,15 @@ class _Swings:
         return np.asarray(Rotation.from_euler("ZYX", angles).as_matrix()), np.column_stack(rates)
 
 
+def _stopping(swings: _Swings, world: World, time_s: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Attitudes (n, 3, 3) and rates (n, 3) as of `swings` with the stops, and whether it moves (n,)."""
+    since_s = time_s[:, None] - np.array(world.stops_s)
+    stood_s = np.clip(since_s, 0, world.stop_lasts_s)
+    moving = np.all((since_s <= 0) | (since_s >= world.stop_lasts_s), axis=1)
+    attitudes, rates = swings.at(time_s - stood_s.sum(axis=1))
+    return attitudes, rates * moving[:, None], moving
+
+
 def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
     """(count, 3) rad."""
     if world.colour_s == 0:
@@ -97,6 +113,13 @@ def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
     kept = np.exp(-1 / (world.looks_hz * world.colour_s))
     fresh = rng.normal(size=(count + 1000, 3)) * world.attitude_rad * np.sqrt(1 - kept**2)
     return np.asarray(lfilter([1.0], [1.0, -kept], fresh, axis=0)[1000:])
+
+
+def turning(followed: Followed) -> Turning:
+    """What the rig solves: rows as long as the looks are apart."""
+    half_s = np.median(np.diff(followed.looks_s)) / 2.1
+    rows_s = np.column_stack([followed.looks_s - half_s, followed.looks_s + half_s])
+    return Turning(followed.time_s, followed.readings, rows_s, followed.attitudes)
 
 
 def write(folder: Path, followed: Followed, rates_rad_s: Array | None = None) -> list[Path]:

@@ -16,7 +16,7 @@ from rig.estimation.by_hand.graph import ACCELERATION, CLOSURE, FLAT, MOVE, PRIO
 from rig.estimation.by_hand.moves import Moved, Taken, moved
 from rig.estimation.by_hand.session import LARGEST, STATED, Faced, Handled, Sizes, Told
 
-PASSES, SIZED = 10, 4  # of the fit; in each but the first, how often the sizes are found anew
+PASSES, SIZED = 30, 4  # of the fit, slow by few moves; in each but the first, how often the sizes are found anew
 SETTLED = 1e-2  # of the standard uncertainty
 SEEN = 5.0  # degrees of freedom that what is stated of hands counts
 LEAST = 0.4  # of what is stated: so good is no hand
