@@ -5,6 +5,10 @@ that drifts steadily, to within the noise, a bias that wanders, and what arm and
 check adds columns for one thing that might be wrong and asks how much they explain: without it, χ² with as many degrees
 of freedom as columns. The process of the bias comes from what is left within the sweeps and between the rests, so that
 a wrong sweep does not excuse itself.
+
+A ripple that is faster than readings and states come is in the ways' means, and in neither's rates. It looks like noise
+unless it stands still in the samples: so what scatters on them counts as much more as they contradict each other beside
+all that may have changed from quarter to quarter (Birge's ratio). Where nothing scatters, nothing is excused.
 """
 
 from collections.abc import Iterator
@@ -29,6 +33,7 @@ from rig.analysis.suspected import (
     changes,
     differences,
     each_axis,
+    in_quarters,
     in_time,
     jumps,
     of_one_axis,
@@ -48,6 +53,8 @@ CHECKS = (
     "scale_changed",
     "sweeps_against_rests",
 )
+
+MOST, TRIED = 16.0, 7  # times its variance by low frequencies is what stands still in the samples; sizes that are tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +91,7 @@ def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allow
     scatter = _allowed(segments, allowance.off_rad_s, allowance)
     bias = _wandering(segments, felt, _steady(segments), scatter)
     here = _Look(segments, felt, whiten_segments(segments, scatter, bias))
-    later = _on_ways(matrix, allowance, bias)
+    later = _on_ways(matrix, _contradicting(here, matrix, allowance, bias), bias)
     found = told_by(later.held, changes(later.segments, later.felt), rate)
     found |= told_by(here.held, differences(segments, felt, each_axis(here.means.sweeps)), rate)
     if told := later.held.most_by_one(of_one_axis(later.segments, later.felt), rate):
@@ -104,6 +111,28 @@ def would_tell(segments: Segments, matrix: Array, rate: float, allowance: Allowa
     scatter = _allowed(segments, allowance.off_rad_s, allowance)
     here = _Look(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
     return dict(_told_from(here, _on_ways(matrix, allowance, bias), rate))
+
+
+def _contradicting(here: _Look, matrix: Array, allowance: Allowance, bias: BiasProcess) -> Allowance:
+    """The allowance with what is unexplained of the ways as large as they contradict each other, up to `MOST` times.
+
+    χ² of all segments less that of those without the ways is theirs: it is to be as they are many.
+    """
+    ways, (own, freedom) = allowance.ways, _unexplained(here)
+    for ratio in np.geomspace(1.0, MOST, TRIED):
+        variances = ways.variances_rad2_s2 + (ratio - 1) * ways.unexplained_rad2_s2
+        allowance = replace(allowance, ways=replace(ways, variances_rad2_s2=variances))
+        whole, whole_freedom = _unexplained(_on_ways(matrix, allowance, bias))
+        if whole - own <= whole_freedom - freedom:
+            break
+    return allowance
+
+
+def _unexplained(look: _Look) -> tuple[float, int]:
+    """χ² of segments beside all that may have changed, and with how many degrees of freedom."""
+    changed = [*changes(look.segments, look.felt).values(), in_quarters(look.means)]
+    beside = [whiten(look.held.white, each) for each in changed if each is not None]
+    return explained(look.held.seen, np.concatenate([look.held.base, *beside], axis=1), None)
 
 
 def _on_ways(matrix: Array, allowance: Allowance, bias: BiasProcess) -> _Look:

@@ -80,7 +80,8 @@ def of_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
 ) -> ReadInReference:
     """What an accelerometer read in a run, in the order of its solution; `known` is of what no recording shows."""
-    dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording)]
+    matrix = result.solution.matrix
+    dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording, matrix)]
     pieces = pieces_of(name, recordings, result.dwells)
     solution, movement, theta = result.solution, result.movement, result.solution.theta
     sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)

@@ -27,6 +27,7 @@ class Segments:
     speed_std (N,): standard deviation of the mean speed, relative to it.
     times_s (N, 2): start and end on the clock of the first recording; `intervals` are on that of their own.
     roundings_rad_s (N, 3): standard uncertainty that rounding leaves in each mean.
+    unexplained_rad2_s2 (N, 3): part of the variances, of what neither arm nor noise explains.
     """
 
     sweep: NDArray[np.intp]
@@ -41,6 +42,7 @@ class Segments:
     intervals: tuple[MotionInterval, ...]
     readings: tuple[RawReadings, ...]
     roundings_rad_s: Array | float = 0.0
+    unexplained_rad2_s2: Array | float = 0.0
 
 
 def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
@@ -95,7 +97,8 @@ def with_transfers(
     own_times_s = np.array([[interval.start_s, interval.end_s] for interval in intervals])
     times_s = own_times_s + np.array([[transfer.clock_offset_s] for transfer in transfers])
     duration_s, count = np.diff(times_s), len(transfers)
-    noise = np.maximum(density / duration_s, [transfer.scatter_rad2_s2 for transfer in transfers])
+    noise = density / duration_s
+    unexplained = np.maximum([transfer.scatter_rad2_s2 for transfer in transfers] - noise, 0.0)
     roundings = np.array([transfer.rounding_rad2_s2 for transfer in transfers])
     vibration = _swings(windows, explained, times_s) / duration_s**2
     earth_rad_s = explained.seen.earth_rate_rad_s
@@ -105,7 +108,8 @@ def with_transfers(
         sweep=np.concatenate([segments.sweep, REST - 1 - np.arange(count)]),
         position=np.concatenate([segments.position, np.zeros(count)]),
         means_rad_s=np.concatenate([segments.means_rad_s, [transfer.mean_rad_s for transfer in transfers]]),
-        variances_rad2_s2=np.concatenate([segments.variances_rad2_s2, noise + vibration + roundings]),
+        variances_rad2_s2=np.concatenate([segments.variances_rad2_s2, noise + unexplained + vibration + roundings]),
+        unexplained_rad2_s2=np.concatenate([np.zeros(segments.means_rad_s.shape), unexplained]),
         roundings_rad_s=np.concatenate(
             [np.broadcast_to(segments.roundings_rad_s, segments.means_rad_s.shape), np.sqrt(roundings)]
         ),

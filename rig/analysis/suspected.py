@@ -105,6 +105,13 @@ def of_one_axis(ways: Segments, felt: Array) -> Array:
     return np.concatenate([per_axis(felt * since[:, None]) for since in later.T], axis=2)
 
 
+def in_quarters(means: Means) -> Array:
+    """(3, N, 9): another scale factor of each axis from each quarter of all the time on."""
+    middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
+    edges = np.linspace(begin, end, 5)[1:-1]
+    return np.concatenate([per_axis(means.felt_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)
+
+
 def of_sweep(segments: Segments, sweep: int) -> Array:
     """(3, N, 6): another reading in this sweep, and another in its second half than in its first."""
     inside = (segments.sweep == sweep).astype(np.float64)

@@ -1,7 +1,7 @@
 """What an accelerometer read in dwells: mean readings at rest, each with the attitude the arm stood in."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 from rig.data.quantity import ACCELERATION
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.settings import ObservationThresholds, Site
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
-from rig.observation.arm_rests import MAX_TRAVEL_AT_REST_RAD, MIN_SAMPLES_AT_REST
+from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream, between, steps_of
 from rig.observation.beside_lines import mean_of_standing
 from rig.observation.lost_samples import lost_samples
 from rig.observation.mean import Mean
+from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Dwelt, Window, dwelt
 
 LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
@@ -30,7 +31,8 @@ LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyr
 class DwellReading:
     """A dwell of the procedure, by its `index`: the mean reading in m/s².
 
-    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, `window` the controller's times.
+    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's by the weights of the readings'
+    mean, `window` the controller's times.
     """
 
     index: int
@@ -108,17 +110,28 @@ def _dwell_reading(
     _check_standing(motion, window, where)
     check_complete(stream.sensor, stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
-    readings = accelerations(stream, inside)
+    readings, time_s = accelerations(stream, inside), stream.time_s[inside]
     steps = steps_of(stream.raw, stream.sensor, ACCELERATION)
-    reading, _ = mean_of_standing(readings, stream.time_s[inside], window, steps)
+    attitudes = motion.attitudes(time_s)
+    swing = gravity_beside(attitudes, attitudes.mean(axis=0), stream.sensor, run.settings.site)  # no noise
+    reading, _ = mean_of_standing(readings - swing, time_s, window, steps)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
-        reading=reading,
-        attitude=motion.attitude(window.start_s, window.end_s),
+        reading=replace(reading, mean=reading.mean + reading.weights @ swing),
+        attitude=np.tensordot(reading.weights, attitudes, axes=1),
         window=window,
         temperature_c=stream.temperature_c(inside),
     )
+
+
+def gravity_beside(attitudes: Array, expected: Array, sensor: RecordedSensor, site: Site) -> Array:
+    """Return (n, 3) m/s² by which gravity differs from what is expected, to a sensor as it is nominally mounted.
+
+    attitudes (n, 3, 3) are those that the arm's encoders tell, expected those that the readings are held against.
+    """
+    found: Array = (attitudes - expected) @ -site.down_m_s2 @ np.array(sensor.mounting).T
+    return found
 
 
 def without_leaving(run: RunData, finished: Dwelt) -> Dwelt:

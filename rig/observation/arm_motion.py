@@ -25,12 +25,14 @@ from rig.motion.steps import Sweep
 from rig.observation.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
 from rig.observation.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
+from rig.observation.swing import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, without_swing
 from rig.observation.windows import Window
 
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
 KNOT_S = 0.004  # between the knots of the rate: a faster ripple than it can follow would look like a slower one
 SPARSE_S = 0.025  # samples that are farther apart meet a ripple of the servo anywhere
 PARTS = 5  # of a rest, whose means tell whether a joint moved where single readings scatter
+SWINGS = 8.0  # times what neighbouring readings of an angle differ by: ten thousand that are noise range by less
 ATTITUDES = 72  # of which a mean is made: over whole turns what is perpendicular to the axis averages out
 
 
@@ -91,8 +93,13 @@ class ArmMotion:
     def attitude(self, start_s: float, end_s: float) -> Array:
         """The mean rotation (3, 3) from the base frame into the flange's between two controller times."""
         times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
-        mean: Array = self.mount @ flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
+        mean: Array = self.attitudes(times_s).mean(axis=0)
         return mean
+
+    def attitudes(self, time_s: Array) -> Array:
+        """The rotations (n, 3, 3) from the base frame into the flange's at controller times (n,)."""
+        found: Array = self.mount @ flange_attitude(self.angles(time_s), self.kinematics)
+        return found
 
     def axes(self, q_rad: Array) -> Array:
         """(…, 3, 6) the joints' axes of growing angles at joint angles (…, 6)."""
@@ -114,11 +121,31 @@ class ArmMotion:
         return not self._scatters
 
     def moved_rad(self, window: Window) -> float | None:
-        """How far the joint that moved most was moved in a window; None where no two states tell."""
+        """How far the joint that moved most was moved in a window; None where no two states tell.
+
+        A standing arm that swings about where it stands is not moved: its angles tell the swing, and so do means.
+        """
         q_rad = self._q_rad(window)
         if self._scatters and len(q_rad) >= PARTS:
             q_rad = np.array([part.mean(axis=0) for part in np.array_split(q_rad, PARTS)])
-        return float(np.ptp(q_rad, axis=0).max()) if len(q_rad) > 1 else None
+        if len(q_rad) < 2:
+            return None
+        moved_rad = float(np.ptp(q_rad, axis=0).max())
+        if moved_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= FEWEST_OF_SWING:
+            moved_rad = float(np.ptp(without_swing(q_rad), axis=0).max())
+        return moved_rad
+
+    def swing_rates(self, time_s: Array) -> Array:
+        """(n, 3) rad/s as `sampled_rates`, at rising times (n,), of an arm that stands and swings; else zero.
+
+        An arm that stands as still as its encoders tell has no rate, and their noise makes none.
+        """
+        still = np.zeros((len(time_s), 3))
+        q_rad = self._q_rad(Window(float(time_s[0]), float(time_s[-1])))
+        if len(q_rad) < 2 or not self.tells_parts_of_turns:
+            return still
+        noise_rad = np.sqrt(np.mean(np.diff(q_rad, axis=0) ** 2, axis=0))
+        return self.sampled_rates(time_s) if (np.ptp(q_rad, axis=0) > SWINGS * noise_rad).any() else still
 
     def away_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
         """How far any joint ever was from the pose `q_rad` (k,) in a window; None where no state tells."""

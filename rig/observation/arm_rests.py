@@ -11,17 +11,23 @@ from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between
 from rig.observation.beside_lines import mean_of_standing
+from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Window, rested
 
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
-MAX_TRAVEL_AT_REST_RAD = 1e-3  # of any joint, while it stands
 MIN_SAMPLES_AT_REST = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
 
 
-def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
-    """Average the rests in which the arm stood still for long enough, but those beside a step in `superseded`."""
-    rests = (_rest(stream, motion, window) for window in rested(run, superseded))
+def rests_of(
+    run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
+) -> tuple[Average, ...]:
+    """Average the rests in which the arm stood still for long enough, but those beside a step in `superseded`.
+
+    An arm that swings where it stands does so in what its encoders tell and in what the sensor reads, by `response`
+    (3, 3) of that: the means are those of an arm that does not.
+    """
+    rests = (_rest(stream, motion, window, response) for window in rested(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
@@ -67,7 +73,7 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) -> Average | None:
     """Average a rest; None if the arm did not stand still or the rest is too short to say anything."""
     still = standing(motion, window)
     if still is None:
@@ -75,6 +81,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     inside = between(stream, still.start_s, still.end_s)
     if inside.stop - inside.start < MIN_SAMPLES_AT_REST:
         return None
-    readings = stream.readings_rad_s[inside]
-    found, lasting = mean_of_standing(readings, stream.time_s[inside], still, stream.steps)
+    time_s = stream.time_s[inside]
+    readings = stream.readings_rad_s[inside] - motion.swing_rates(time_s) @ response.T
+    found, lasting = mean_of_standing(readings, time_s, still, stream.steps)
     return place(averaged(stream, inside, lasting, found), motion)

@@ -22,7 +22,8 @@ class Mean:
 
     `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent. `cycles`
     (k,): how often lines come in the readings that were taken out of the mean. `rounding` (3,) is the part of the
-    variance that rounding to steps leaves.
+    variance that rounding to steps leaves. `weights` (n,) are those of the readings, which make the mean of whatever
+    else is averaged over the same samples; none where they are not kept.
     """
 
     mean: Array
@@ -32,6 +33,7 @@ class Mean:
     freedom: Array | float = np.inf
     cycles: Array = field(default_factory=partial(np.zeros, 0))
     rounding: Array | float = 0.0
+    weights: Array = field(default_factory=partial(np.zeros, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,7 @@ def _weighted_mean(
         samples=int(np.count_nonzero(own)),
         freedom=noise.freedom,
         rounding=rounding,
+        weights=weights,
     )
 
 

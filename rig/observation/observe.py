@@ -36,6 +36,7 @@ from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import Finished, Window, swept
 
+ABOUT_ALL_AXES = 0.05  # of the largest turns, the smallest about any axis that tell how a sensor follows it
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 FROZEN = 0.5  # of the rate of a sweep, by which an axis that repeats one reading must misread it
 MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
@@ -103,7 +104,7 @@ def observe_sensor(
     `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    rests, revolutions = rests_of(run, stream, motion, superseded), list[Observation]()
+    revolutions = list[Observation]()
     for finished in swept(run):
         if finished.sweep.index in superseded:
             continue
@@ -111,9 +112,10 @@ def observe_sensor(
             revolutions.append(_revolution(run, stream, motion, finished, settings))
         except Fault as fault:
             if fault.name in MISREAD:
-                check_feeling(run, rests, ())
+                check_feeling(run, rests_of(run, stream, motion, response_of(stream, revolutions), superseded), ())
                 check_other_way(finished.sweep, [each.joint_name for each in revolutions], fault)
             raise
+    rests = rests_of(run, stream, motion, response_of(stream, revolutions), superseded)
     felt = stream.sensor.measures(ACCELERATION)
     dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if felt else ()
     check_feeling(run, rests, dwells)
@@ -154,8 +156,18 @@ def _revolution(
     turn = motion.turn(finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
-        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
+        felt = swept_acceleration(stream, motion, finished.sweep, turn, run.settings.site)
+        return replace(seen, acceleration=felt)
     return seen
+
+
+def response_of(stream: Stream, turns: Sequence[Observation]) -> Array:
+    """Return (3, 3) how readings follow the flange's rates: by least squares, or nominal if turns do not tell all."""
+    design = np.array([(*(turn.speed_rad_s * turn.axis_flange), 1.0) for turn in turns]).reshape(-1, 4)
+    if np.linalg.matrix_rank(design, tol=ABOUT_ALL_AXES * np.linalg.norm(design)) < 4:
+        return np.array(stream.sensor.mounting)
+    found: Array = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)[0]
+    return found[:3].T
 
 
 def _drifting(average: Average, drift: Array) -> Average:

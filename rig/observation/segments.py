@@ -6,7 +6,7 @@ readings, its segments are several.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from rig.observation.average import Average, Stream, between
 from rig.observation.coloured_noise import widening
 from rig.observation.lines import LineSearch, find_lines, fitted, swings, waves
 from rig.observation.mean import Mean, Noise, weighted_means
-from rig.observation.observe import Observation
+from rig.observation.observe import Observation, response_of
 from rig.observation.observed_run import ObservedRun
 from rig.observation.raw_readings import REST, RawReadings, counts_of
 from rig.observation.tapered_weights import noise_at_zero
@@ -96,7 +96,12 @@ def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[Se
             _segment_revolution(stream, recording.motion, turn, of_turn, sweep)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
-        *(_segment_rest(stream, recording.motion, rest, of_rest) for recording, stream, rest in rests),
+        *(
+            _segment_rest(
+                stream, recording.motion, rest, of_rest, response_of(stream, recording.sensors[name].revolutions)
+            )
+            for recording, stream, rest in rests
+        ),
     )
 
 
@@ -180,11 +185,12 @@ def _segment_revolution(
     return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
 
 
-def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int) -> SegmentedAverage:
-    """Average a rest in segments beside what vibrates in it."""
+def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
+    """Average a rest in segments beside what vibrates in it, of an arm that does not swing: see `rests_of`."""
     inside = between(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
-    readings = division.readings_rad_s
+    readings = division.readings_rad_s - motion.swing_rates(division.time_s) @ response.T
+    division = replace(division, readings_rad_s=readings)
     share = (division.time_s - average.start_s) / average.duration_s
     cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share)
     lines = waves(cycles, share, AT_REST.beats)

@@ -42,7 +42,8 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
         dwells = read_each_dwell(run, stream, motion, settings)
-        check_feeling(run, rests_of(run, stream, motion), list(dwells.results.values()))
+        rests = rests_of(run, stream, motion, np.array(stream.sensor.mounting))
+        check_feeling(run, rests, list(dwells.results.values()))
     except Fault:
         return frozenset()
     sweeps = observe_each_sweep(run, stream, motion, settings)

@@ -1,11 +1,15 @@
 """What an accelerometer read in sweeps: the first harmonic of each revolution over the measured joint angle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rig.data.settings import Site
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.motion.steps import Sweep
-from rig.observation.acceleration import accelerations, check_acceleration
+from rig.observation.acceleration import accelerations, check_acceleration, gravity_beside
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.beside_lines import colour_left, swinging
@@ -30,9 +34,13 @@ class SweptAcceleration:
     station: tuple[float, ...]
 
 
-def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution) -> SweptAcceleration:
+def swept_acceleration(
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, site: Site
+) -> SweptAcceleration:
     """What one sweep's revolution tells, beside what swings in it.
 
+    The joints that stand may swing meanwhile, which is known: readings are held against one attitude, which the joint
+    alone turns, so that by which the arm's attitude differs from that is taken out of them.
     Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
     """
     inside = between(stream, turn.start_s, turn.end_s)
@@ -40,15 +48,26 @@ def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Re
     time_s = stream.time_s[inside]
     known = motion.covered(time_s)
     time_s = time_s[known]
+    angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
+    attitudes, rotations = motion.attitudes(time_s), _rotations(-sweep.growing * turn.axis_flange, angle_rad)
+    began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
     harmonic = first_harmonic(
         time_s,
-        accelerations(stream, inside)[known],
-        motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
+        accelerations(stream, inside)[known] - gravity_beside(attitudes, rotations @ began, stream.sensor, site),
+        angle_rad,
         motion.angle(sweep, time_s, 1),
         coloured=colour_left,
         swings=swinging,
     )
-    return of_turn(sweep, turn, harmonic)
+    return of_turn(sweep, replace(turn, attitude=began), harmonic)
+
+
+def _rotations(axis: Array, angle_rad: Array) -> Array:
+    """Return (n, 3, 3) rotations by angles (n,) about a unit vector (3,): Rodrigues' formula."""
+    across = np.cross(np.eye(3), axis)
+    sine, versine = np.sin(angle_rad)[:, None, None], (1 - np.cos(angle_rad))[:, None, None]
+    found: Array = np.eye(3) + sine * across + versine * (across @ across)
+    return found
 
 
 def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:

@@ -5,7 +5,8 @@ after. In the transfers the wrists turn by half a turn, from standing to standin
 sensor's mean reading is as well known by the arm as in a sweep, about axes that are not being swept.
 
 No lines are sought in a transfer: it is short, and the servo's own vibration grows faster and slower in it. Where that
-passes the data rate it stands still in the samples, and their mean is off by it.
+passes the data rate it stands still in the samples, and their mean is off by more than their scatter tells: see
+`rig.analysis.consistency`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +24,7 @@ from rig.motion.geometry import flange_attitude, flange_pose
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.known_motion import MIN_RATE_RAD_S
-from rig.observation.lines import fitted, unit_columns
+from rig.observation.lines import unit_columns
 from rig.observation.observed_run import ObservedRun
 from rig.observation.segments import MotionInterval
 from rig.observation.tapered_weights import noise_at_zero
@@ -38,6 +39,7 @@ CORNERS = (2 / 180) ** 0.5 / 2
 LOST = 0.01  # of the samples, at most, by a rate that a board keeps so well
 GAP = 1.5  # of the interval between samples: one is missing, and with it so much of the transfer
 STEPS = 48
+FILTERED = range(-2, 3)  # samples, from which to which a filter makes one reading of the arm's rates
 WRISTS = 3  # whose transfers count, the last joints
 STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 LOW = 0.0  # of the data rate: no more low frequencies than the fewest, for a servo's vibration is near
@@ -125,13 +127,15 @@ def sensed_gravity_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m:
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
     """Return (3,) the variance of the mean of readings (n, 3) by what neither the arm nor gravity explains.
 
-    A sensor that lags reads how the rate changes. A ripple that is faster than readings and states come looks like
-    noise, at low frequencies too.
+    A sensor's filter, whatever it is, makes of the arm's rates those of the samples around. A ripple that is faster
+    than readings and states come looks like noise, at low frequencies too.
     """
-    rates = motion.sampled_rates(time_s)
+    step_s = float(np.median(np.diff(time_s)))
+    rates = [motion.sampled_rates(time_s + late * step_s) for late in FILTERED]
     gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
-    columns = unit_columns(np.column_stack([np.ones(len(rates)), rates, np.gradient(rates, axis=0), gravity]))
-    variance: Array = noise_at_zero(readings - columns @ fitted(columns, readings), LOW) / len(readings)
+    columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))
+    left = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
+    variance: Array = noise_at_zero(left, LOW) / len(readings)
     return variance
 
 
