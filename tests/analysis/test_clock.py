@@ -17,7 +17,7 @@ from rig.observation.timebase import NOMINAL_DRIFT
 from support.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
-KNOWN = synthetic_run(Setup()).settings.stated_uncertainty  # 50 ppm of the controller, 1 of the computer, 20 of a crystal
+KNOWN = synthetic_run(Setup()).settings.stated_uncertainty  # 50, 1 and 20 ppm
 
 
 SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"
