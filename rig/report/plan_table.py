@@ -91,7 +91,7 @@ def plan_document(planned: Planned) -> dict[str, Any]:
         document["stages"] = [{**asdict(stage), "indices": sorted(stage.indices)} for stage in plan.stages]
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
-    for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
+    for key, by_sensor in (("detection_limits", told.rates), ("acceleration_detection_limits", told.accelerations)):
         if by_sensor:
             found = {name: told_from_entries(each) for name, each in by_sensor.items()}
             document[key] = {name: [each.model_dump() for each in entries] for name, entries in found.items()}
@@ -178,7 +178,7 @@ def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Tab
     for name in by_sensor:
         table.add_column(plain(name), justify="right")
     sizes = [
-        {each.what: size_words(each.size, each.unit) for each in told_from_entries(found)}
+        {each.fault: size_words(each.size, each.unit) for each in told_from_entries(found)}
         for found in by_sensor.values()
     ]
     for happens in dict.fromkeys(happens for found in sizes for happens in found):

@@ -170,7 +170,7 @@ def test_a_gap_in_the_samples_costs_its_windows_alone(tmp_path: Path, capsys: py
     spoilt = (followed.time_s > 10) & (followed.time_s < 10.5)
     files = write(tmp_path, replace(followed, time_s=followed.time_s[~spoilt], readings=followed.readings[~spoilt]))
     rate = document(capsys, files)
-    (left_out,) = rate["in_attitudes"]["followed"]["left_out"]
+    (left_out,) = rate["in_attitudes"]["by_increments"]["omitted"]
     assert left_out["error"] == "lost_samples" and left_out["count"] <= 3
     assert main(command(files, "--all")) == 0
     assert "increments, lost_samples, for up to 0.5" in " ".join(capsys.readouterr().out.split())
@@ -286,5 +286,5 @@ def command(files: list[Path], *options: str) -> list[str]:
 def document(capsys: pytest.CaptureFixture[str], files: list[Path], *options: str) -> dict[str, Any]:
     """What is said of the gyroscope for machines."""
     assert main([*command(files, *options), "--json"]) == 0
-    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     return rate

@@ -74,7 +74,7 @@ def result(folder: Path, **changes: Any) -> Path:
     }
     entries["gyro"] |= changes
     folder.mkdir(exist_ok=True)
-    document = json.loads(VERIFIED.text()) | {"sensors": entries}
+    document = json.loads(VERIFIED.text()) | {"gyroscopes": entries}
     (folder / "result.json").write_text(json.dumps(document))
     return folder
 
@@ -245,7 +245,7 @@ def test_a_missing_part_and_another_part_in_its_place_are_named(laboratory: Worl
 
 def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: WorldHandle, tmp_path: Path) -> None:
     section = SensorSection.model_validate(SENSORS["gyro"])
-    found = read_result(result(tmp_path)).sensors["gyro"]
+    found = read_result(result(tmp_path)).gyroscopes["gyro"]
     with Board(laboratory.board_port, 921600, lambda batch: None) as board:
         board.configure(0, section.rate_hz, section.range_deg_s)
         store(board, 0, calibration_of(found))

@@ -46,7 +46,7 @@ def in_file(folder: Path) -> dict[Path, bytes]:
 
 def shifted(document: ResultDocument) -> ResultDocument:
     """Half of U beside what the recording gives, in kx."""
-    gyro = document.sensors["gyro"]
+    gyro = document.gyroscopes["gyro"]
     (kx,) = (each for each in followed(document)[0].parameters if each.name == "kx")
     scale = (gyro.scale[0] + 0.5 * kx.expanded, *gyro.scale[1:])
     return document.model_copy(update={"sensors": {"gyro": gyro.model_copy(update={"scale": scale})}})

@@ -73,7 +73,7 @@ def solved(samples: Path, sweeps: Path) -> np.ndarray:
     """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
     item = Item("imu", "any", "1")
     found = calibrated([recorded_in_files(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
-    (entry,) = document_of(found).sensors.values()
+    (entry,) = document_of(found).gyroscopes.values()
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 
 

@@ -71,7 +71,7 @@ def test_nothing_that_reads_a_run_executes_its_script(
 def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path) -> None:
     done, before = rig_here("solve", foreign, "--json"), rig_here("solve", RECORDINGS / "six_observation", "--json")
     assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr and before.stderr == ""
-    numbers, expected = json.loads(done.stdout)["sensors"]["gyro"], json.loads(before.stdout)["sensors"]["gyro"]
+    numbers, expected = json.loads(done.stdout)["gyroscopes"]["gyro"], json.loads(before.stdout)["gyroscopes"]["gyro"]
     assert numbers["scale"] == expected["scale"]
 
 
@@ -161,7 +161,7 @@ def test_a_deeply_nested_script_identity_is_refused_by_name(foreign: Path, tmp_p
 @pytest.mark.parametrize("name", ["../../x", "a\nb", "a\x1b[2J", ".."])
 def test_a_name_that_is_no_sensors_names_no_file(foreign: Path, tmp_path: Path, name: str) -> None:
     document = json.loads((foreign / "result.json").read_text(encoding="utf-8"))
-    document["sensors"][name] = document["sensors"].pop("gyro")
+    document["gyroscopes"][name] = document["gyroscopes"].pop("gyro")
     (foreign / "result.json").write_text(json.dumps(document), encoding="utf-8")
     before = {*tmp_path.rglob("*")}
     refused = rig_here("export", foreign, "--format", "kalibr")

@@ -134,7 +134,7 @@ def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_inter
     if begun.returncode == 130:  # else it was home already
         assert rig("resume", run).returncode == 0
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
-    assert len(result["sensors"]["gyro"]["observations"]) == 6
+    assert len(result["gyroscopes"]["gyro"]["observations"]) == 6
     assert {"gyro.scale_u": True, "gyro.bias_u": True}.items() <= passed(result).items()
 
 
@@ -152,7 +152,7 @@ def test_a_run_that_does_not_come_to_what_is_wanted_fails_by_its_name(tmp_path: 
     assert "more than wanted: 1 more repeat at most" in done.stderr
     assert "FAILED gyro.scale_u" in done.stdout
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
-    assert len(result["sensors"]["gyro"]["observations"]) == 12
+    assert len(result["gyroscopes"]["gyro"]["observations"]) == 12
     assert [name for name, good in passed(result).items() if not good] == ["gyro.scale_u"]
 
 

@@ -208,7 +208,9 @@ def test_sweeps_record_a_magnetometer_and_say_that_they_do_not_calibrate_it(tmp_
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert result["magnetometers"]["compass"]["error"].startswith("no_attitudes: ")
-    assert set(result["sensors"]) == set(yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["sensors"])
+    assert set(result["gyroscopes"]) == set(
+        yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["sensors"]
+    )
     assert "compass, magnetometer, not calibrated: no_attitudes" in done.stdout.replace("\n", " ")
     assert len(recorded(out).samples["compass"]) > 100
 

@@ -145,4 +145,4 @@ def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path)
     assert resumed.returncode == 0, resumed.stderr + resumed.stdout
     assert resumed.stderr.count("done: sweep") == 2  # which of the two about one axis it was nobody can tell
     repeated = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    assert repeated["verdict"] == "pass" and len(repeated["sensors"]["gyro"]["observations"]) == 6
+    assert repeated["verdict"] == "pass" and len(repeated["gyroscopes"]["gyro"]["observations"]) == 6

@@ -342,7 +342,8 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     assert resumed.returncode == 0, resumed.stderr
     assert "resuming: 5 of 6 sweeps and dwells are recorded and sound" in resumed.stderr
     assert resumed.stderr.count("done: sweep") == 1
-    observations = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))["sensors"]["gyro"]["observations"]
+    result = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))
+    observations = result["gyroscopes"]["gyro"]["observations"]
     assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
 
 

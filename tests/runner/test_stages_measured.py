@@ -50,7 +50,7 @@ def ran(document: dict[str, Any], folder: Path) -> tuple[int, str]:
 
 def scale(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """(3,) scale factors of a run, and their U."""
-    (sensor,) = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["sensors"].values()
+    (sensor,) = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["gyroscopes"].values()
     return np.array(sensor["scale"]), np.array(sensor["budget"]["expanded"][:3])
 
 
