@@ -30,7 +30,7 @@ def run(options: Namespace) -> int:
 
     Returns 0, or 1 where no plan has that. Raises Refused as `planned` and `print_shortest_run`.
     """
-    if options.wanted or options.at_most is not None or options.write is not None:
+    if options.target_uncertainty or options.max_duration_s is not None or options.write is not None:
         return print_shortest_run(options)
     from rig.config.hand_sections import ByHandSection
     from rig.report.plan_profile import profile_csv

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import observe_recordings
 from rig.analysis.read_when import of_gyroscope
 from rig.data.channel import of_stated_temperature
@@ -58,7 +58,7 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_o
 
 @pytest.mark.slow
 def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
-    document = document_of(calibrated([warming(synthetic_run(Setup()))]))
+    document = document_of(calibrate([warming(synthetic_run(Setup()))]))
     sensor = document.gyroscopes["gyro"]
     assert sensor.scale_at is not None and sensor.bias_at is not None
     assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
@@ -84,7 +84,7 @@ def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
-    document = document_of(calibrated([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
+    document = document_of(calibrate([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
     sensor = document.gyroscopes["gyro"]
     assert sensor.bias_at is not None and sensor.bias_at.temperature_stated and sensor.temperature_c == 22.0
     assert when_words(sensor.bias_at).startswith("at 22.0 °C, as stated, mean over")
@@ -99,7 +99,7 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
 @pytest.mark.slow
 def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
     run = open_run(RECORDINGS / "imu").movement[0]
-    result = calibrated([warming(run)])
+    result = calibrate([warming(run)])
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
     assert entry.conditions is not None and entry.temperature_c is not None
     assert entry.temperature_c == pytest.approx(entry.conditions.temperature_c)
@@ -120,7 +120,7 @@ def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
 @pytest.mark.slow
 def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> None:
     lean = np.radians(12)
-    result = calibrated([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
+    result = calibrate([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
     explained = result.results["gyro"].explained
     assert explained is not None
     upright, *leaning = np.degrees(explained.loads_rad_s).tolist()
@@ -132,5 +132,5 @@ def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> N
 
 @pytest.mark.slow
 def test_upright_axes_are_loaded_with_the_speed_of_the_sweeps_and_nothing_is_said() -> None:
-    result = calibrated([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
+    result = calibrate([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
     assert load_words(document_of(result).gyroscopes["gyro"]) is None

@@ -228,7 +228,7 @@ def test_attitudes_over_thousands_of_years_are_put_on_no_grid(tmp_path: Path) ->
     text = (examples / "swinging_attitudes.csv").read_text(encoding="utf-8").rstrip()
     last = text.splitlines()[-1].split(",")
     attitudes.write_text("\n".join([text, ",".join(["99999999998", "1e11", *last[2:]])]), encoding="utf-8")
-    refused = rig_here("solve", examples / "swinging_samples.csv", "--attitudes", attitudes, "--find-clock")
+    refused = rig_here("solve", examples / "swinging_samples.csv", "--attitudes", attitudes, "--estimate-clock-offset")
     assert refused.returncode == 2 and "rig: impossible_times: the states or attitudes" in refused.stderr
 
 

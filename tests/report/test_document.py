@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome
 from rig.data.meaning import Meaning
@@ -24,7 +24,7 @@ from support.synthetic_run import Setup, synthetic_run
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
+    return calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
 
 @pytest.mark.slow
 def test_a_reference_has_no_solution_of_the_board() -> None:
-    found = calibrated([read_run(RECORDINGS / "verified" / "run.h5")])
+    found = calibrate([read_run(RECORDINGS / "verified" / "run.h5")])
     sensors = json.loads(document_of(found).text())["gyroscopes"]
     assert (sensors["gyro"]["role"], "board" in sensors["gyro"]) == ("calibrate", True)
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)
@@ -72,7 +72,7 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
 
 @pytest.mark.slow
 def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
-    document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
     assert document.provenance.arm_kinematics is not None
     assert document.provenance.arm_kinematics.alpha_rad == NOMINAL.alpha_rad
     sensor = json.loads(document.text())["gyroscopes"]["gyro"]

@@ -49,7 +49,7 @@ def drawn(seed: int) -> dict[str, Any]:
             "seed": seed,
             "time_scale": 15,  # faster, and a busy machine asks the board too late for what it keeps
             "arm": {
-                "residue": {
+                "unmodelled": {
                     "twist_rad": (ERROR_RAD * np.array([0, 0, 0, 1, 1, 0]) * rng.normal(size=6)).tolist(),
                     "zero_rad": (ERROR_RAD * WRISTS * rng.normal(size=6)).tolist(),
                     "encoder_once_rad": 0.7 * ERROR_RAD,  # as tests/support/arm_attitudes.py has them

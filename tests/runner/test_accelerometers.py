@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
@@ -211,7 +211,7 @@ def saturated(counts: np.ndarray) -> np.ndarray:
 def test_a_recording_that_is_wrong_is_refused_by_name(in_attitudes: Finished, damage: Damage, name: str) -> None:
     run = read_run(in_attitudes[0] / "run.h5")
     with pytest.raises(Fault) as refused:
-        calibrated([damage(run)])
+        calibrate([damage(run)])
     assert re.fullmatch(name, refused.value.name), refused.value
 
 

@@ -21,7 +21,7 @@ def test_half_turns_recover_the_simulated_truth(tmp_path: Path) -> None:
         "procedure": {"arc_deg": 180},
         "uncertainty": {"angle_std_deg": STD_DEG},
         "limits": {"bias_std_rad_s": 0.02},  # half the readings of whole turns
-        "world": {"arm": {"residue": {"encoder_once_rad": ONCE_RAD, "encoder_twice_rad": TWICE_RAD}}},
+        "world": {"arm": {"unmodelled": {"encoder_once_rad": ONCE_RAD, "encoder_twice_rad": TWICE_RAD}}},
     }
     done = rig("run", configuration(tmp_path, changes), "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr

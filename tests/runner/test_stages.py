@@ -30,7 +30,7 @@ def in_stages(truth: list[dict[str, Any]], stages: list[dict[str, Any]] = STAGES
 @pytest.mark.slow
 def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    config = configuration(tmp_path, in_stages([{}, {**QUARTER, "turned_deg": [0.4, -0.6, 0.5]}]))
+    config = configuration(tmp_path, in_stages([{}, {**QUARTER, "rotation_deg": [0.4, -0.6, 0.5]}]))
     done = rig("run", config, "--out", out, "--json")
     assert done.returncode == 0, done.stderr + done.stdout
     assert [read_run(out / name).settings.stage for name in ("run.h5", "run-2.h5")] == [0, 1]

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
@@ -61,7 +61,7 @@ LABORATORY = Stated(
 @functools.cache
 def result() -> ResultDocument:
     """Of a recording in which all that a budget needs is known. No board took part: the checks of one are left out."""
-    document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
 
