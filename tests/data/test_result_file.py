@@ -53,7 +53,7 @@ def test_what_is_missing_or_wrong_is_refused_by_its_place(tmp_path: Path) -> Non
     document = json.loads(VERIFIED.text())
     document["gyroscopes"]["gyro"]["observations"][2]["speed_rad_s"] = "fast"
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(Refused, match=r"not_a_result: .*sensors\.gyro\.observations\.2\.speed_rad_s"):
+    with pytest.raises(Refused, match=r"not_a_result: .*gyroscopes\.gyro\.observations\.2\.speed_rad_s"):
         read_result(tmp_path)
 
 
