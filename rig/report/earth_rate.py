@@ -17,7 +17,7 @@ def earth_rate_entry(earth_rate: EarthRate | Fault) -> EarthRateEntry | ErrorEnt
     """The entry of the Earth's rate, or of why it was not found."""
     if isinstance(earth_rate, Fault):
         return ErrorEntry(error=str(earth_rate))
-    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=earth_rate.freedom)
+    return entry(EarthRateEntry, earth_rate)
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:

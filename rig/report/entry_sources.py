@@ -223,6 +223,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
             "heading_std_rad up",
             vertical_fixed="vertical_held",
             birge_ratio="scatter",
+            degrees_of_freedom="freedom",
         ),
     ),
 }

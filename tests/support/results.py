@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from rig.data.result_file import ResultDocument, GyroscopeEntry, read_result
+from rig.data.result_file import GyroscopeEntry, ResultDocument, read_result
 from support.paths import RECORDINGS
 
 VERIFIED = read_result(RECORDINGS / "verified")

@@ -99,9 +99,8 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
         return
     if laid.placement_std is not None:
         told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
-        beside = (
-            f", {laid.rests_without_attitude} more rests have helped to find it" if laid.rests_without_attitude else ""
-        )
+        count = laid.rests_without_attitude
+        beside = f", {count} more rests have helped to find it" if count else ""
         yield f"a placement found to change each reading by {told} beside its attitude{beside}"
         if laid.placement_uncertainty > laid.placement_std / 2:
             yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
