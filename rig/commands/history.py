@@ -64,7 +64,7 @@ def add(history: argparse.ArgumentParser) -> None:
     add_json(compare)
     void = added("void", "say that a calibration does not count, and why; nothing is taken away")
     void.add_argument("number", type=int, metavar="NUMBER")
-    void.add_argument("--reason", required=True, metavar="TEXT")
+    void.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
 
 
 def _add_again(again: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 NO_CRYSTAL = (
-    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can mend them "
+    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can correct them "
     "(rig solve --attitudes FILE --estimate-clock-offset); rig solve --turns cannot use them"
 )
 

@@ -62,7 +62,7 @@ class ConfigurationRefused(Refused):
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
         what = "command line" if all(f"{SET} " in each or f"({SET})" in each for each in problems) else "file"
-        remedy = f"Mend the {what} and run again; nothing has moved"
+        remedy = f"Correct the {what} and run again; nothing has moved"
         super().__init__("configuration", f"{printable(source)} has {count}", remedy)
         self.problems = tuple(printable(problem) for problem in problems)
 

@@ -20,6 +20,7 @@ from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.hand_entries import ByHandEntry
 from rig.data.installed_kinds import quantities
+from rig.data.key_meanings import meaning_of
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
 from rig.data.result_types import (
@@ -474,6 +475,9 @@ class ResultDocument(Entry):
 def schema_text() -> str:
     """The JSON schema of `result.json`, as docs/result.schema.json has it."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ResultDocument.model_json_schema()}
+    for name, entry in {"ResultDocument": schema, **schema["$defs"]}.items():
+        for key, described in entry.get("properties", {}).items():
+            described["description"] = meaning_of(name.removesuffix("Entry"), key)
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 

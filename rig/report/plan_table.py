@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class DryRun:
     """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked.
 
     `model` is what the turner is called that it is for; None where its section does not say.
@@ -72,7 +72,7 @@ class Planned:
         return f"<plan: {_measured(self.plan)}{len(self.plan.motions)} motions, {self.duration_s:.1f} s>"
 
 
-def plan_document(planned: Planned) -> dict[str, Any]:
+def plan_document(planned: DryRun) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step."""
     from rig.report.attitude_account import account_document
     from rig.report.told_words import told_from_entries
@@ -98,7 +98,7 @@ def plan_document(planned: Planned) -> dict[str, Any]:
     return document
 
 
-def print_plan(planned: Planned, *, as_json: bool) -> None:
+def print_plan(planned: DryRun, *, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
         print(json.dumps(plan_document(planned), indent=2, allow_nan=False))
@@ -108,7 +108,7 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
     _print_told(planned, console)  # which takes longer to find than the steps
 
 
-def _print_steps(planned: Planned, console: Console) -> None:
+def _print_steps(planned: DryRun, console: Console) -> None:
     """Every step, how long it all takes, and what is doubtful about it."""
     plan = planned.plan
     table = Table(
@@ -147,7 +147,7 @@ def _print_steps(planned: Planned, console: Console) -> None:
         console.print(f"Note: {doubt}")
 
 
-def _print_told(planned: Planned, console: Console) -> None:
+def _print_told(planned: DryRun, console: Console) -> None:
     """What the attitudes tell of accelerometers, and the checks of damage."""
     from rig.report.attitude_account import print_account
 

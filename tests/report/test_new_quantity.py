@@ -133,7 +133,7 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
     assert first["bias"]["texts"][0] == "0.344" and first["bias"]["u"][0] == "0.028"
     result = Result(document)
     assert "gyro: density of noise x" in result._repr_html_()
-    found = result["gyro"].beside["density of noise"]
+    found = result["gyro"].characteristics["density of noise"]
     assert found.values.tolist() == list(VALUES) and found.unit == "rad/s/√Hz" and found.labels == ("x", "y", "z")
     assert found.expanded[:2].tolist() == pytest.approx([2 * STDS[0], 2 * STDS[1]]) and found.expanded[2] > 2 * STDS[2]
 

@@ -446,7 +446,7 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     for name in taken:
         handle.control({"do": "register_in_use", "name": name})
     missing = command("check", config)
-    assert missing.returncode == 2 and "not ready: 3 to mend" in missing.stdout
+    assert missing.returncode == 2 and "not ready: 3 to correct" in missing.stdout
     assert "missing: speed_slider: the speed slider is at 30 %" in missing.stderr
     assert "missing: registers_in_use: " in missing.stderr and "URCaps" in missing.stderr
     state = handle.state()
