@@ -49,14 +49,14 @@ print(between_s - began_s, time.perf_counter() - between_s)
 def runs(count: int) -> list[Finished]:
     """`count` runs of `count / OF_EACH` sensors, taken in turn."""
     first = finished_run(FIXTURE)
-    (sensor,) = first.document.sensors.values()
+    (sensor,) = first.document.gyroscopes.values()
     slim = sensor.model_copy(update={"observations": (), "rests": ()})
     found = []
     for i in range(count):
         started = (FIRST + timedelta(hours=i)).isoformat()
         each = slim.model_copy(update={"serial_number": f"S-{i % (count // OF_EACH)}"})
         provenance = first.document.provenance.model_copy(update={"started_utc": started})
-        document = first.document.model_copy(update={"provenance": provenance, "sensors": {"gyro": each}})
+        document = first.document.model_copy(update={"provenance": provenance, "gyroscopes": {"gyro": each}})
         found.append(replace(first, text=document.text(), document=document))
     return found
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from procedures.six_observation import PROCEDURE as SIX_OBSERVATION
-from rig.procedure import Outcome, RunData, calibrated, fitness, run_script
+from rig.procedure import Outcome, RunData, calibrate, fitness, run_script
 
 WARMING_MAX_K = 1.0
 
 
 def analyse(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """Return the usual outcome with a check of each gyroscope's temperature from its first sweep to its last."""
-    outcome, temperatures_c = calibrated(runs, estimator), dict[str, list[float]]()
+    outcome, temperatures_c = calibrate(runs, estimator), dict[str, list[float]]()
     for recording in outcome.recordings:
         for name, sensor in recording.sensors.items():
             temperatures_c.setdefault(name, []).extend(sweep.average.temperature_c for sweep in sensor.revolutions)

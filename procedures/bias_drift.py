@@ -18,7 +18,7 @@ from rig.procedure import (
     Procedure,
     RunData,
     Verbs,
-    drifted,
+    estimate_bias_drift,
     plan_static_attitudes,
     run_script,
 )
@@ -31,7 +31,7 @@ def bias_drift(rig: Verbs) -> None:
 
 def by_repeat(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """The calibration of the accelerometers, and every sensor's bias by repeat."""
-    return drifted(runs, estimator)
+    return estimate_bias_drift(runs, estimator)
 
 
 PROCEDURE = Procedure(

@@ -19,7 +19,7 @@ from rig.procedure import (
     Procedure,
     RunData,
     Verbs,
-    calibrated_by_hand,
+    calibrate_by_hand,
     plan_by_hand,
     run_script,
 )
@@ -34,7 +34,7 @@ def by_hand(rig: Verbs) -> None:
 
 def judged(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """Scale, bias and right angles of every gyroscope from its rests and moves."""
-    return calibrated_by_hand(runs)
+    return calibrate_by_hand(runs)
 
 
 PROCEDURE = Procedure(

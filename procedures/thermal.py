@@ -24,7 +24,7 @@ def thermal(rig: Verbs) -> None:
         match step:
             case Rest(for_temperature=True):
                 # At home: until the sensors are as warm as is wanted next.
-                if not rig.next_temperature(step):
+                if not rig.wait_for_next_temperature(step):
                     break
             case Transfer():
                 # To where the next sweep begins, or to the next attitude.
@@ -39,7 +39,7 @@ def thermal(rig: Verbs) -> None:
                 # Let the sensors settle, then stand still: the accelerometers' part.
                 rig.dwell(step)
     # The heater goes off; ends the run by name where a part of the range is missing.
-    rig.end_of_range()
+    rig.end_temperature_range()
     # The board's own arithmetic, over all temperatures alike, to be held against the computer's.
     rig.solve_on_board()
 

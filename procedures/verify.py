@@ -21,8 +21,8 @@ from rig.procedure import (
     VerifySection,
     plan_six_observation,
     run_script,
-    verified,
-    verified_alone,
+    verify_calibration,
+    verify_stored_calibrations,
 )
 
 
@@ -38,7 +38,7 @@ def verify(rig: Verbs) -> None:
 def comparison(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """The newest movement against the reference; with the calibration it followed, if there was one."""
     newest = runs[-1:]
-    return verified_alone(newest) if before is None else verified(before, newest)
+    return verify_stored_calibrations(newest) if before is None else verify_calibration(before, newest)
 
 
 PROCEDURE = Procedure(

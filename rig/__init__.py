@@ -31,15 +31,15 @@ if TYPE_CHECKING:
     from rig.notebook.readings import Readings, Signal
     from rig.notebook.results import Result, load_result, solve
     from rig.notebook.runs import Run, load
-    from rig.report.plan_table import Planned
+    from rig.report.plan_table import DryRun
 
 __version__ = VERSION
 __all__ = [
     "Calibration",
     "Calibrations",
     "Changes",
+    "DryRun",
     "Fault",
-    "Planned",
     "Readings",
     "Refused",
     "Result",
@@ -72,7 +72,7 @@ _PLACES = {
     **dict.fromkeys(("Readings", "Signal"), "rig.notebook.readings"),
     **dict.fromkeys(("Result", "load_result", "solve"), "rig.notebook.results"),
     **dict.fromkeys(("Run", "load"), "rig.notebook.runs"),
-    "Planned": "rig.report.plan_table",
+    "DryRun": "rig.report.plan_table",
 }
 
 

@@ -44,7 +44,7 @@ _COMMANDS = {
     "report": ("rig.commands.report", "the certificate of a finished run: HTML, PDF, digital certificate"),
     "verify": (
         "rig.commands.verify",
-        "who signed a certificate, when, whether it is whole, and whether a history knows it",
+        "who signed a certificate, when, whether it is unchanged, and whether a history knows it",
     ),
     "export": ("rig.commands.export", "what was calibrated and recorded, in the files of other programs"),
     "history": ("rig.commands.history", "what the laboratory remembers: calibrations, trends, check standards"),
@@ -133,7 +133,7 @@ def guarded(command: Callable[[], int]) -> int:
         ignore_endings()  # all is stopped: an impatient second one has nothing left to end
         return _ended(str(interrupt) or "interrupted", INTERRUPTED)
     except OSError as error:
-        return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
+        return _ended(str(Fault("system", f"the system refused ({error})", "Correct that, then try again")), FAULT)
     except SystemExit as ended:  # what a script's own code raised: its status would be taken for a verdict
         ended_by = f"a script ended the program (SystemExit: {ended})"
         return _ended(str(Fault("script_failed", ended_by, "Remove from the script what ends the program")), FAULT)

@@ -8,7 +8,13 @@ These names are the public ones; where they are made may change. docs/how-to/own
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
-from rig.analysis.analyses import calibrated, calibrated_by_hand, drifted, verified, verified_alone
+from rig.analysis.analyses import (
+    calibrate,
+    calibrate_by_hand,
+    estimate_bias_drift,
+    verify_calibration,
+    verify_stored_calibrations,
+)
 from rig.analysis.check import Check, fitness
 from rig.analysis.outcome import Outcome
 from rig.config.hand_sections import ByHandSection, HandSection
@@ -43,7 +49,7 @@ __all__ = [
     "ImuSection", "Joints", "Outcome", "Plan", "Procedure", "ProcedureSection", "Refused", "Rest", "RigConfig",
     "RunData", "ServoSection", "ServoSixObservationSection", "SixObservationSection", "SixSweepsSection",
     "StaticAttitudesSection", "Step", "Sweep", "ThermalSection", "Transfer", "TurnerSection", "Verbs",
-    "VerifySection", "calibrated", "calibrated_by_hand", "drifted", "fitness", "plan_by_hand", "plan_imu",
+    "VerifySection", "calibrate", "calibrate_by_hand", "estimate_bias_drift", "fitness", "plan_by_hand", "plan_imu",
     "plan_servo_six_observation", "plan_six_observation", "plan_static_attitudes", "plan_thermal", "run_script",
-    "trapezoid_duration", "travel", "verified", "verified_alone",
+    "trapezoid_duration", "travel", "verify_calibration", "verify_stored_calibrations",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 
 import rig.procedure
 from rig.data.run_file import read_run
-from rig.procedure import Outcome, calibrated, fitness
+from rig.procedure import Outcome, calibrate, fitness
 from support.paths import DOCS, RECORDINGS, ROOT
 
 STOCK = sorted(path for path in (ROOT / "procedures").glob("*.py") if path.name != "__init__.py")
@@ -58,7 +58,7 @@ def test_the_door_has_all_that_the_stock_scripts_need_and_says_so() -> None:
 
 def test_an_analysis_of_one_s_own_adds_a_check_to_the_verdict() -> None:
     def judged(limit: float) -> Outcome:
-        outcome = calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
+        outcome = calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
         turns = outcome.results["gyro"].observations
         shortest_s = min(turn.average.duration_s for turn in turns)
         return replace(

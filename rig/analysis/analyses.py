@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @solvable()
-def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
+def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
 
     Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
@@ -30,10 +30,10 @@ def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *,
 
 
 @solvable()
-def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
+def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+    """The outcome, as of `calibrate`, of attitudes gone through again and again: the bias by repeat too, and judged.
 
-    Raises Fault as `calibrated` and `bias_drifts` do.
+    Raises Fault as `calibrate` and `bias_drifts` do.
     """
     from rig.analysis import judging
 
@@ -41,7 +41,7 @@ def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Ou
 
 
 @solvable()
-def calibrated_by_hand(runs: "Sequence[RunData]") -> Outcome:
+def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
     """Solve and judge the recordings of a session by hand, at least one.
 
     Raises Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` where the board's clock has none.
@@ -52,7 +52,7 @@ def calibrated_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
 
 @solvable()
-def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
+def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
     """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
 
     Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
@@ -63,10 +63,10 @@ def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
 
 
 @solvable()
-def verified_alone(repeated: "Sequence[RunData]") -> Outcome:
+def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
     """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
 
-    Raises Fault as `verified` does.
+    Raises Fault as `verify_calibration` does.
     """
     from rig.analysis import judging
 

@@ -13,7 +13,7 @@ from rig.observation.hand_runs import session_of, told_of
 
 
 def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
-    """The outcome, as `rig.analysis.analyses.calibrated_by_hand` says."""
+    """The outcome, as `rig.analysis.analyses.calibrate_by_hand` says."""
     settings = runs[0].settings
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(

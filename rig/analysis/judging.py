@@ -53,7 +53,7 @@ ResultT = TypeVar("ResultT")
 
 
 def calibrated(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
-    """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrated` says."""
+    """Solve and judge the recordings of a calibration, as `rig.analysis.analyses.calibrate` says."""
     settings = runs[0].settings
     chosen = known_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs, settings)
@@ -166,7 +166,7 @@ def _over_temperature(
 
 
 def drifted(runs: Sequence[RunData], estimator: str) -> Outcome:
-    """Solve and judge attitudes gone through again and again, as `rig.analysis.analyses.drifted` says."""
+    """Solve and judge attitudes gone through again and again, as `rig.analysis.analyses.estimate_bias_drift` says."""
     outcome = calibrated(runs, estimator, drifting=True)
     settings = outcome.settings
     found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
@@ -186,7 +186,7 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """Verify a calibration by `repeated`, as `rig.analysis.analyses.verified` says."""
+    """Verify a calibration by `repeated`, as `rig.analysis.analyses.verify_calibration` says."""
     settings = outcome.settings
     known = settings.reference
     found: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
@@ -247,6 +247,6 @@ def _gravity_left(
 
 
 def verified_alone(repeated: Sequence[RunData]) -> Outcome:
-    """Verify the calibrations that the board had stored before, as `rig.analysis.analyses.verified_alone` says."""
+    """Verify what the board had stored before, as `rig.analysis.analyses.verify_stored_calibrations` says."""
     nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=origin_of(repeated[:1]))
     return verified(nothing_calibrated, repeated)

@@ -74,7 +74,7 @@ class Wanted:
 
 def wanted_by(section: SixObservationSection) -> Wanted | None:
     """The wish at which a run of several repeats ends; None where it makes all of them."""
-    scale, bias_rad_s = section.wanted_scale_u, section.wanted_bias_u_rad_s
+    scale, bias_rad_s = section.target_scale_u, section.target_bias_u_rad_s
     return None if scale is bias_rad_s is None else Wanted(scale or inf, bias_rad_s or inf)
 
 

@@ -155,12 +155,12 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
 
 def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration:
     """The run's calibration of a sensor. Raises Refused `not_in_result`, and as `refuse_other_sensor`."""
-    entry = result.sensors.get(place.name)
+    entry = result.gyroscopes.get(place.name)
     if entry is None or entry.role == "reference":
         raise Refused(
             "not_in_result",
             f"{path} has no calibration for sensors.{place.name}",
-            f"It has: {', '.join(result.sensors) or 'none'}; choose one with --sensor",
+            f"It has: {', '.join(result.gyroscopes) or 'none'}; choose one with --sensor",
         )
     if entry.range_rad_s is None:
         raise Refused(

@@ -47,7 +47,7 @@ def run(options: Namespace) -> int:
         return 2 if missing else 0
     for problem in missing:
         say(f"missing: {problem}", file=sys.stderr)
-    say(f"not ready: {len(missing)} to mend" if missing else "ready")
+    say(f"not ready: {len(missing)} to correct" if missing else "ready")
     return 2 if missing else 0
 
 

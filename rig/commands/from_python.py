@@ -14,12 +14,12 @@ from rig.notebook.runs import Run, load
 from rig.report.exports.formats import FORMATS
 
 if TYPE_CHECKING:
-    from rig.report.plan_table import Planned
+    from rig.report.plan_table import DryRun
 
 Changes = Mapping[str, object]
 
 
-def plan(config: str | Path, changes: Changes | None = None, *, script: str | Path | None = None) -> "Planned":
+def plan(config: str | Path, changes: Changes | None = None, *, script: str | Path | None = None) -> "DryRun":
     """Plan a calibration and print it, as `rig plan` does; connects to nothing.
 
     `changes` are values to use in place of the file's: `{"procedure.speed_deg_s": 90}`; `script` is a procedure of

@@ -10,7 +10,7 @@ from rig.commands.named_history import add_history
 from rig.commands.waiting import answer_of
 
 LIST = "list"
-AGAIN = "again"
+AGAIN = "recompute"
 _COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", AGAIN, "compare", "void")
 
 
@@ -64,7 +64,7 @@ def add(history: argparse.ArgumentParser) -> None:
     add_json(compare)
     void = added("void", "say that a calibration does not count, and why; nothing is taken away")
     void.add_argument("number", type=int, metavar="NUMBER")
-    void.add_argument("--reason", required=True, metavar="TEXT")
+    void.add_argument("--reason", required=True, metavar="TEXT", help="why, in a few words")
 
 
 def _add_again(again: argparse.ArgumentParser) -> None:
@@ -72,7 +72,7 @@ def _add_again(again: argparse.ArgumentParser) -> None:
     add_set(again, "judge by another threshold or limit than was recorded, as in `rig solve`", metavar="NAME=VALUE")
     again.add_argument("--estimator", metavar="NAME", help="another than each procedure's own, as in `rig solve`")
     again.add_argument(
-        "--of-u",
+        "--u-fraction",
         type=float,
         default=0.1,
         metavar="PART",
@@ -81,9 +81,9 @@ def _add_again(again: argparse.ArgumentParser) -> None:
     again.add_argument(
         "--out",
         type=Path,
-        default=Path("again"),
+        default=Path("recomputed"),
         metavar="DIR",
-        help="report and journal; the same command with the same folder goes on (default: again)",
+        help="report and journal; the same command with the same folder goes on (default: recomputed)",
     )
     spread = again.add_mutually_exclusive_group()
     spread.add_argument("--jobs", type=int, default=1, metavar="N", help="processes of this computer (default: 1)")

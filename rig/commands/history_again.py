@@ -1,4 +1,4 @@
-"""`rig history again`: every recording of the history by today's method, and what that changes. Overwrites nothing."""
+"""`rig history recompute`: all recordings of a history by today's method, and what that changes. Overwrites nothing."""
 
 import sys
 from argparse import Namespace
@@ -52,7 +52,7 @@ def again(options: Namespace, solve: Solve = solved_again) -> int:
             for each in left
         ]
         lost = _solve_all(tasks, options, solve, journal, answers)
-    outcome = compared(stated, answers, options.of_u)
+    outcome = compared(stated, answers, options.u_fraction)
     with _written(out):
         write_new(out / CSV, again_csv(outcome))
         write_new(out / PAGE, again_page(outcome, question, label))
@@ -67,8 +67,10 @@ def _question(options: Namespace) -> Question:
 
     if options.jobs < 1:
         raise Refused("bad_option", f"--jobs {options.jobs} is too small", "Give 1 or more")
-    if not options.of_u > 0:
-        raise Refused("bad_option", f"--of-u {options.of_u} is no part of U", "Give a number above 0, as 0.1")
+    if not options.u_fraction > 0:
+        raise Refused(
+            "bad_option", f"--u-fraction {options.u_fraction} is no part of U", "Give a number above 0, as 0.1"
+        )
     for item in options.overrides:
         known_setting(item)
     if options.estimator is not None:

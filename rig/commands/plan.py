@@ -10,7 +10,7 @@ from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.config.hand_sections import ByHandSection
-    from rig.report.plan_table import Planned
+    from rig.report.plan_table import DryRun
 
 
 def add(parser: ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def run(options: Namespace) -> int:
 
     Returns 0, or 1 where no plan has that. Raises Refused as `planned` and `print_shortest_run`.
     """
-    if options.wanted or options.at_most is not None or options.write is not None:
+    if options.target_uncertainty or options.max_duration_s is not None or options.write is not None:
         return print_shortest_run(options)
     from rig.config.hand_sections import ByHandSection
     from rig.report.plan_profile import profile_csv
@@ -62,14 +62,14 @@ def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
     say(f"{len(asked)} moves, {section.rest_s:g} s of rest between them; any order does")
 
 
-def planned(options: Namespace) -> "Planned":
+def planned(options: Namespace) -> "DryRun":
     """The plan from the home pose.
 
     Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
     """
     from rig.commands.configured import configured
     from rig.errors import refuse
-    from rig.report.plan_table import Planned
+    from rig.report.plan_table import DryRun
     from rig.turners.registry import kind_of
 
     found = configured(options.config, options.overrides, options.script)
@@ -78,4 +78,4 @@ def planned(options: Namespace) -> "Planned":
     kind = kind_of(config.turner)
     refuse(kind.problems([steps], config.turner, None))
     model = kind.meant(config.turner).model
-    return Planned(model, steps, config, repeated=found.phase.follows is not None)
+    return DryRun(model, steps, config, repeated=found.phase.follows is not None)

@@ -12,8 +12,8 @@ from rig.errors import Refused
 from rig.station.plain_text import say
 
 NO_CRYSTAL = (
-    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can mend them "
-    "(rig solve --attitudes FILE --find-clock); rig solve --turns cannot use them"
+    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can correct them "
+    "(rig solve --attitudes FILE --estimate-clock-offset); rig solve --turns cannot use them"
 )
 
 

@@ -27,7 +27,10 @@ def add(parser: ArgumentParser) -> None:
         help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
     )
     parser.add_argument(
-        "--reversal", type=Path, metavar="FILE", help="what `rig reversal … --out FILE` has found of its magnetometers"
+        "--reversal",
+        type=Path,
+        metavar="FILE",
+        help="the file that `rig reversal` wrote by --out, of its magnetometers",
     )
     parser.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")

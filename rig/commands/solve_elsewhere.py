@@ -66,7 +66,11 @@ def add(solve: ArgumentParser) -> None:
         help="how far the time stamps may be off (20 to 50 of a crystal); needed, for no reading shows it",
     )
     hand.add_argument(
-        "--box-deg", type=float, default=0.2, metavar="DEG", help="how far the faces are out of square (default: 0.2)"
+        "--squareness-deg",
+        type=float,
+        default=0.2,
+        metavar="DEG",
+        help="how far the faces are out of square (default: 0.2)",
     )
     hand.add_argument("--no-closure", action="store_true", help="turns on a face were not against a straight edge")
     hand.add_argument(
@@ -87,7 +91,7 @@ def add(solve: ArgumentParser) -> None:
     place.add_argument("--field-upwards", action="store_true", help="the magnetic field rises from the ground")
     place.add_argument("--any-mounting", action="store_true", help="the sensor's axes need not lie along the body's")
     place.add_argument(
-        "--find-clock",
+        "--estimate-clock-offset",
         action="store_true",
         help="the attitudes are on a clock of their own: find it by the turning that both files show",
     )
@@ -111,7 +115,7 @@ def run(options: Namespace) -> int:
     Returns 0, or 1 where a check of the solves failed. Raises Refused `bad_option`, `run_folder`, as
     `recorded_in_files`, and whatever the solve finds wrong.
     """
-    from rig.analysis.analyses import calibrated
+    from rig.analysis.analyses import calibrate
     from rig.commands.remember import since_lines
     from rig.commands.standard_streams import tell_where_the_result_is
     from rig.data.run_folder import RESULT
@@ -122,7 +126,7 @@ def run(options: Namespace) -> int:
         raise Refused("bad_option", "--history is for runs that are kept", "Give --out, which keeps the run")
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         recording = _recording(options)
-        outcome = calibrated([recording])
+        outcome = calibrate([recording])
     beside = () if options.out is None else _kept(options, recording, outcome)
     result = document_of(outcome)
     if options.out is None or options.all:
@@ -181,7 +185,7 @@ def _recording(options: Namespace) -> "RunData":
         ),
         Elsewhere(
             any_mounting=options.any_mounting,
-            find_clock=options.find_clock,
+            find_clock=options.estimate_clock_offset,
             exact_rates=options.exact_rates,
             window_s=options.window_s,
             estimator=options.estimator,
@@ -228,7 +232,7 @@ def _told_of_turns(options: Namespace) -> "Columns":
             "nothing in the readings shows how far their time stamps are off, and the scale factors are off by as much",
             "Say it: --clock-ppm 50 for a crystal; a part's own data rate is some per cent off, and is no clock",
         )
-    for name, largest in (("clock_ppm", 1e5), ("box_deg", 10.0)):
+    for name, largest in (("clock_ppm", 1e5), ("squareness_deg", 10.0)):
         if not 0 < getattr(options, name) <= largest:
             option = f"--{name.replace('_', '-')}"
             raise Refused(
@@ -236,7 +240,7 @@ def _told_of_turns(options: Namespace) -> "Columns":
             )
     told = {
         "clock_ppm": options.clock_ppm,
-        "box_rad": np.radians(options.box_deg),
+        "box_rad": np.radians(options.squareness_deg),
         "closure": 0.0 if options.no_closure else 1.0,
         "gravity_m_s2": options.gravity_m_s2,
     }

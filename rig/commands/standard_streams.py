@@ -60,7 +60,7 @@ def tell_where_the_result_is(result: Path) -> None:
 
     if (lost := output_lost()) is not None:
         why = f"stdout has not taken what was to be printed ({lost.strerror or lost})"
-        say(f"rig: output_lost: {why}. The result is whole: {result}", sys.stderr)
+        say(f"rig: output_lost: {why}. The result is complete: {result}", sys.stderr)
 
 
 def keep_streams_usable() -> None:

@@ -1,4 +1,4 @@
-"""`rig verify`: who signed a certificate, when, whether it is whole, and whether a history knows it."""
+"""`rig verify`: who signed a certificate, when, whether it is unchanged, and whether a history knows it."""
 
 import json
 from argparse import ArgumentParser, Namespace
@@ -20,7 +20,7 @@ SCHEMA = "rig.verification/1"
 WRONG, NOBODY_TRUSTED = 1, 4
 BY_NOBODY_TRUSTED = {"not_signed", "signer_unknown", "signer_not_trusted"}  # all is well but who answers for the file
 STATUSES = (
-    "exit status: 0 each file is whole, and signed by whom --trust and --signer name, or attached to one that is, or "
+    "exit status: 0 no file was changed, and signed by whom --trust and --signer say, or attached to one that is, or "
     f"known to the history that --history names; {WRONG} a file was altered, or the history contradicts it; "
     f"{NOBODY_TRUSTED} nobody who is trusted has signed a file: it is not signed, signed by another, or there is no "
     "--trust; 2 it could not be found out"

@@ -1,4 +1,4 @@
-"""`rig plan CONFIG --wanted …`: the shortest run for an uncertainty, and the configuration of it."""
+"""`rig plan CONFIG --target-uncertainty …`: the shortest run for an uncertainty, and the configuration of it."""
 
 import json
 import sys
@@ -21,20 +21,20 @@ NAMES = {
     "acceleration_scale": "acceleration_scale",
     "acceleration_bias": "acceleration_bias_m_s2",
 }
-EXAMPLE = "Give for example --wanted scale=5e-4 --wanted bias=1e-4"
+EXAMPLE = "Give for example --target-uncertainty scale=5e-4 --target-uncertainty bias=1e-4"
 
 
 def add_wanted(parser: ArgumentParser) -> None:
-    """`--wanted`, any number of times, with what belongs to it."""
+    """`--target-uncertainty`, any number of times, with what belongs to it."""
     parser.add_argument(
-        "--wanted",
+        "--target-uncertainty",
         action="append",
         default=[],
         metavar="scale=U",
         help="the shortest run that is predicted to reach this expanded uncertainty (k = 2): scale=U, bias=U in rad/s, "
         "acceleration_scale=U, acceleration_bias=U in m/s²",
     )
-    parser.add_argument("--at-most", type=float, metavar="S", help="… in so many seconds")
+    parser.add_argument("--max-duration-s", type=float, metavar="S", help="… in so many seconds")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the configuration of that run, a new file")
 
 
@@ -48,9 +48,11 @@ def print_shortest_run(options: Namespace) -> int:
     from rig.plans.shortest import shortest_run
     from rig.report.shortest_words import print_shortest
 
-    wanted = wanted_of(options.wanted, options.at_most)
+    wanted = wanted_of(options.target_uncertainty, options.max_duration_s)
     if options.table or options.script is not None:
-        raise Refused("bad_option", "--wanted goes with no --table and no --script", "Write the configuration first")
+        raise Refused(
+            "bad_option", "--target-uncertainty goes with no --table and no --script", "Write the configuration first"
+        )
     if options.write is not None and options.write.exists():
         raise _not_written(options.write, "it is there already")
     config = configured(options.config, options.overrides).loaded.config
@@ -73,13 +75,13 @@ def wanted_of(options: Sequence[str], at_most_s: float | None) -> "Wanted":
         try:
             sizes[name] = float(value)
         except ValueError:
-            raise Refused("bad_option", f"--wanted {each} is no size", EXAMPLE) from None
+            raise Refused("bad_option", f"--target-uncertainty {each} is no size", EXAMPLE) from None
         if name not in NAMES or not 0 < sizes[name] < inf:
-            raise Refused("bad_option", f"--wanted {each} is no uncertainty of {', '.join(NAMES)}", EXAMPLE)
+            raise Refused("bad_option", f"--target-uncertainty {each} is no uncertainty of {', '.join(NAMES)}", EXAMPLE)
     if not sizes:
-        raise Refused("bad_option", "--at-most and --write are for a run with --wanted", EXAMPLE)
+        raise Refused("bad_option", "--max-duration-s and --write are for a run with --target-uncertainty", EXAMPLE)
     if at_most_s is not None and not (isfinite(at_most_s) and at_most_s > 0):
-        raise Refused("bad_option", f"--at-most is {at_most_s:g}", "Give a time above 0, in seconds")
+        raise Refused("bad_option", f"--max-duration-s is {at_most_s:g}", "Give a time above 0, in seconds")
     wanted = {NAMES[name]: size for name, size in sizes.items()}
     return Wanted(**wanted, at_most_s=inf if at_most_s is None else at_most_s)
 
@@ -96,7 +98,8 @@ def _write(options: Namespace, best: "Planned") -> None:
     loaded = configured(options.config, [*options.overrides, *overrides]).loaded
     reached = best.reached
     predicted = ", ".join(f"{name} {size:.3g}" for name, each in NAMES.items() if (size := getattr(reached, each)) > 0)
-    said = f"# Made by rig plan --wanted. Predicted: {best.candidate.duration_s:.1f} s, U: {predicted} (SI units).\n"
+    predicted = f"{best.candidate.duration_s:.1f} s, U: {predicted} (SI units)"
+    said = f"# Made by rig plan --target-uncertainty. Predicted: {predicted}.\n"
     try:
         write_new(options.write, said + loaded.text)
     except OSError as error:

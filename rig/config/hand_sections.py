@@ -35,7 +35,7 @@ class ByHandSection(ProcedureSection):
     rest_s: float = Field(
         default=1.0, ge=1.0, le=60, description="how long the item has to lie at rest before the next move is asked for"
     )
-    box_deg: float = Field(
+    squareness_deg: float = Field(
         default=0.2,
         gt=0,
         le=1.7,
@@ -48,7 +48,7 @@ class ByHandSection(ProcedureSection):
         description="how well a whole turn ends where it began, a standard deviation; one that misses by more than "
         "three of these is asked for again",
     )
-    wanted_scale_u: float | None = Field(
+    target_scale_u: float | None = Field(
         default=None,
         gt=0,
         lt=0.1,

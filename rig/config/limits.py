@@ -54,13 +54,13 @@ class Limits(BaseModel):
     )
     scale_u: Annotated[Positive | None, Limit("rate", "scale_u", "1", "fitness", "scale")] = Field(
         default=None,
-        description="largest expanded uncertainty of a scale factor; if it is left out, `procedure.wanted_scale_u` of "
+        description="largest expanded uncertainty of a scale factor; if it is left out, `procedure.target_scale_u` of "
         "six_observation, where that is given",
         json_schema_extra=RATIO,
     )
     bias_u_rad_s: Annotated[Positive | None, Limit("rate", "bias_u", "rad/s", "fitness", "bias")] = Field(
         default=None,
-        description="largest expanded uncertainty of a bias; if it is left out, `procedure.wanted_bias_u_rad_s`, where "
+        description="largest expanded uncertainty of a bias; if it is left out, `procedure.target_bias_u_rad_s`, where "
         "that is given",
     )
     condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(

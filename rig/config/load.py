@@ -19,7 +19,7 @@ from rig.config.layers import BASE, SET, Layered, Places, put_together, read_lay
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.servo_section import ServoSection
-from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, WantedSection, turned_otherwise, written_out
+from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, TargetUncertaintySection, turned_otherwise, written_out
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
@@ -62,7 +62,7 @@ class ConfigurationRefused(Refused):
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
         what = "command line" if all(f"{SET} " in each or f"({SET})" in each for each in problems) else "file"
-        remedy = f"Mend the {what} and run again; nothing has moved"
+        remedy = f"Correct the {what} and run again; nothing has moved"
         super().__init__("configuration", f"{printable(source)} has {count}", remedy)
         self.problems = tuple(printable(problem) for problem in problems)
 
@@ -193,10 +193,14 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
         return ProcedureSection(name=str(name)), []
     place = ("procedure", "name")
     short = name == SHORTEST and SHORTEST not in sections
-    if isinstance(data, dict) and (short or (name == CARRIED_OUT and "wanted" in data)):  # a script's name stands there
+    if isinstance(data, dict) and (
+        short or (name == CARRIED_OUT and "target_uncertainty" in data)
+    ):  # a script's name stands there
         if (otherwise := turned_otherwise(layered.document)) is not None:
             return None, [f"{_where(place, layered.places)}: {otherwise}"]
-        wanted, problems = _validate(WantedSection, data.get("wanted", {}), ("procedure", "wanted"), layered)
+        wanted, problems = _validate(
+            TargetUncertaintySection, data.get("target_uncertainty", {}), ("procedure", "target_uncertainty"), layered
+        )
         if wanted is None:
             return None, problems
         data = written_out(data, wanted)

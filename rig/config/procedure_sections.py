@@ -176,16 +176,16 @@ class SixObservationSection(SixSweepsSection):
         max_length=12,
         description="mountings of the item, gone through one after the other",
     )
-    wanted_scale_u: float | None = Field(
+    target_scale_u: float | None = Field(
         default=None,
         gt=0,
         lt=0.1,
         description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
-        "home; without it and `wanted_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
+        "home; without it and `target_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
         "fails the check `scale_u`",
         json_schema_extra=RATIO,
     )
-    wanted_bias_u_rad_s: float | None = Field(
+    target_bias_u_rad_s: float | None = Field(
         default=None,
         gt=0,
         lt=1,
@@ -208,9 +208,9 @@ class SixObservationSection(SixSweepsSection):
         A magnetometer would be recorded, and only at the end of the run nobody could calibrate it.
         """
         yield from SixSweepsSection.problems(self, config)
-        if self.stages and (self.wanted_scale_u or self.wanted_bias_u_rad_s):
+        if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):
             yield (
-                "procedure.wanted_scale_u and wanted_bias_u_rad_s (or name: shortest) end a run after a repeat, and "
+                "procedure.target_scale_u and target_bias_u_rad_s (or name: shortest) end a run after a repeat, and "
                 "procedure.stages has its repeats in each mounting: leave out one or the other"
             )
         if self.stages and self.verify:
@@ -384,14 +384,14 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
     )
     to_c: float = Field(ge=-40, le=85, description="upper end of the range")
-    gap_k: float = Field(
+    max_step_k: float = Field(
         default=5.0,
         gt=0,
         le=50,
         description="how far neighbouring sets may be apart",
         json_schema_extra={"unit": "K"},
     )
-    most_rate_k_per_min: float = Field(
+    max_rate_k_per_min: float = Field(
         default=2.0,
         gt=0,
         le=100,
@@ -409,7 +409,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         "the board's own warm-up, changes the temperature",
         json_schema_extra=RATIO,
     )
-    both_ways: bool = Field(
+    both_directions: bool = Field(
         default=True,
         description="whether the range must be covered while the sensors warm and again while they cool, which shows "
         "their hysteresis",
@@ -417,14 +417,14 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     with_attitudes: bool = Field(
         default=False, description="whether each set has the attitudes too, which calibrate accelerometers"
     )
-    hottest_c: float = Field(
+    max_temperature_c: float = Field(
         default=70.0,
         ge=0,
         le=105,
         description="temperature above which the run ends (`overheated`); the board switches its heater off at 70 "
         "in any case",
     )
-    patience_min: float = Field(
+    timeout_min: float = Field(
         default=20.0,
         gt=0,
         le=1000,
@@ -443,18 +443,18 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
     @model_validator(mode="after")
     def a_range_with_several_temperatures(self) -> Self:
         """What makes sets enough for polynomials, which are found only after the run."""
-        gaps, ways = (2, "") if self.both_ways else (3, " with both_ways: false")
-        if self.to_c - self.from_c < gaps * self.gap_k:
+        gaps, ways = (2, "") if self.both_directions else (3, " with both_directions: false")
+        if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(
                 f"from_c and to_c must be {gaps} gaps apart at least{ways}: a line through two points shows nothing"
             )
-        least_k = MIN_RANGE_C + self.gap_k
+        least_k = MIN_RANGE_C + self.max_step_k
         if self.to_c - self.from_c < least_k:
             raise ValueError(f"from_c and to_c must be {MIN_RANGE_C:g} K and a gap apart at least: {least_k:g} K")
-        if not self.gap_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.gap_k / 2:
+        if not self.max_step_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.max_step_k / 2:
             raise ValueError("reference_c must lie between from_c and to_c, half a gap from each: sets end before them")
-        if self.hottest_c <= self.to_c:
-            raise ValueError("hottest_c must lie above to_c")
+        if self.max_temperature_c <= self.to_c:
+            raise ValueError("max_temperature_c must lie above to_c")
         return self
 
     @property

@@ -76,7 +76,7 @@ class ServoSixObservationSection(ProcedureSection):
     rest_s: float = Field(
         default=DEFAULT_REST_S, gt=0.5, le=3600, description="time of standing still before and after each turn"
     )
-    beyond_deg: float = Field(
+    overtravel_deg: float = Field(
         default=90.0,
         ge=30,
         le=360,

@@ -1,4 +1,4 @@
-"""`procedure: {name: shortest, wanted: …}`: six observations, repeated until the uncertainty is what is wanted."""
+"""`procedure: {name: shortest, target_uncertainty: …}`: six observations, repeated until it is reached."""
 
 from collections.abc import Mapping
 from typing import Any, Literal, Self
@@ -10,7 +10,7 @@ from rig.config.section import RATIO, Section
 SHORTEST = "shortest"
 CARRIED_OUT = "six_observation"
 REPEATS = 16  # at most, where the section says nothing
-IN_ADVANCE = "`rig plan CONFIG --wanted scale=U --write FILE` writes the shortest run for what is wanted"
+IN_ADVANCE = "`rig plan CONFIG --target-uncertainty scale=U --write FILE` writes the shortest run for what is wanted"
 # What does not end after a repeat, by the kind of turner, and the procedure to name in its place.
 OTHERS: Mapping[str, tuple[str, str]] = {
     "servo": ("with a servo the repeats are made in each mounting, so no run ends early", "servo_six_observation"),
@@ -18,21 +18,21 @@ OTHERS: Mapping[str, tuple[str, str]] = {
 }
 
 
-class WantedSection(Section):
+class TargetUncertaintySection(Section):
     """The expanded uncertainties at which the run ends; at least one of them."""
 
     scale: float | None = Field(
         default=None,
         gt=0,
         lt=0.1,
-        description="of the scale factors, as `wanted_scale_u` of six_observation",
+        description="of the scale factors, as `target_scale_u` of six_observation",
         json_schema_extra=RATIO,
     )
     bias: float | None = Field(
         default=None,
         gt=0,
         lt=1,
-        description="of the biases, as `wanted_bias_u_rad_s`",
+        description="of the biases, as `target_bias_u_rad_s`",
         json_schema_extra={"unit": "rad/s"},
     )
 
@@ -48,7 +48,7 @@ class ShortestSection(Section):
     """Repeats of six_observation, with all its keys, until U is as wanted; at most `repeats`, 16 if left out."""
 
     name: Literal["shortest"] = Field(description="this procedure")
-    wanted: WantedSection
+    target_uncertainty: TargetUncertaintySection
 
 
 def turned_otherwise(document: Mapping[str, Any]) -> str | None:
@@ -61,8 +61,8 @@ def turned_otherwise(document: Mapping[str, Any]) -> str | None:
     return f"{SHORTEST}: {why}; say name: {name}, and {IN_ADVANCE}"
 
 
-def written_out(section: Mapping[str, Any], wanted: WantedSection) -> dict[str, Any]:
+def written_out(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:
     """The section of the procedure that is carried out: the keys that stand beside the name and the wish stay."""
-    rest = {key: value for key, value in section.items() if key != "wanted"}
-    ends = {"wanted_scale_u": wanted.scale, "wanted_bias_u_rad_s": wanted.bias}
+    rest = {key: value for key, value in section.items() if key != "target_uncertainty"}
+    ends = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias}
     return {"repeats": REPEATS, **ends, **rest, "name": CARRIED_OUT}

@@ -15,7 +15,7 @@ Instruction = Annotated[str, Field(min_length=1, max_length=500)]
 class StageMountSection(MountingSection):
     """Which flange axis each axis of the item points along in this stage: a right-handed frame."""
 
-    turned_deg: Vector3 = Field(
+    rotation_deg: Vector3 = Field(
         default=(0.0, 0.0, 0.0),
         description="rotation vector, in the item's own axes, by which it is turned beyond that",
     )
@@ -48,7 +48,7 @@ def mount_matrix(mount: StageMountSection) -> np.ndarray:
 
     The item sits as its axes say and is turned by the rotation vector then: components change by the inverse of that.
     """
-    matrix: np.ndarray = rotation_by(np.radians(mount.turned_deg)).T @ mounting_matrix(mount)
+    matrix: np.ndarray = rotation_by(np.radians(mount.rotation_deg)).T @ mounting_matrix(mount)
     return matrix
 
 

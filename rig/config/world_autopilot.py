@@ -19,7 +19,7 @@ class SimulatedAutopilotSection(Section):
         json_schema_extra={"allowed": "8 to 24 hexadecimal digits, small letters, two for each byte"},
     )
     clock_ppm: float = Field(default=15.0, ge=-1000, le=1000, description="how much too fast its clock runs")
-    on_for_s: float = Field(
+    uptime_s: float = Field(
         default=30.0,
         ge=0,
         le=5e6,

@@ -44,7 +44,7 @@ class SimulatedHandSection(Section):
     table_mrad: float = Field(
         default=5.0, ge=0, le=50, description="by how much the table leans", json_schema_extra={"unit": "mrad"}
     )
-    thinks_s: tuple[Seconds, Seconds] = Field(
+    reaction_time_s: tuple[Seconds, Seconds] = Field(
         default=(0.5, 2.0), description="how long, at least and at most, from an instruction to the first touch"
     )
     mistakes: dict[Mistaken, Probability] = Field(

@@ -12,7 +12,7 @@ class SimulatedLinesSection(Section):
     """The simulated device that prints lines around its gyroscope. It prints as `sensors.<name>.lines` says."""
 
     oscillator_ppm: float = Field(default=40.0, ge=-20_000, le=20_000, description="how much too fast its clock runs")
-    on_for_s: float = Field(
+    uptime_s: float = Field(
         default=2.0, ge=0, le=1e6, description="how long it has been on; its time starts again at zero after its wrap"
     )
     boot_text: tuple[Annotated[str, Field(max_length=200)], ...] = Field(

@@ -16,7 +16,9 @@ class IronSection(Section):
         description="the link it is fixed to and moves with, by the joint that carries that; the housing of joint "
         "wrist 3 is carried by `wrist_2`, the flange by `wrist_3`"
     )
-    place_mm: Vector3 = Field(default=NOTHING, description="place in the frame of that link (Denavit and Hartenberg)")
+    position_mm: Vector3 = Field(
+        default=NOTHING, description="place in the frame of that link (Denavit and Hartenberg)"
+    )
     moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame", json_schema_extra={"unit": "A m²"})
 
 

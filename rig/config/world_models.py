@@ -189,16 +189,16 @@ class SimulatedArmSection(Section):
         description="RMS of a vibration of each wrist that is not locked to the turn and that no encoder sees",
     )
     vibration_hz: VibrationFrequency = Field(default=10.0, description="its frequency")
-    vibration_more_hz: tuple[VibrationFrequency, ...] = Field(
+    vibration_further_hz: tuple[VibrationFrequency, ...] = Field(
         default=(), max_length=20, description="further frequencies of it, each of which is as strong as the first"
     )
-    vibration_seen_rms_rad_s: float = Field(
+    vibration_measured_rms_rad_s: float = Field(
         default=0.0,
         ge=0,
         le=1,
         description="RMS of a vibration of each wrist that is not locked to the turn either, but that encoders see",
     )
-    vibration_seen_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
+    vibration_measured_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
     settling_rad: float = Field(
         default=0.0,
         ge=0,
@@ -218,7 +218,7 @@ class SimulatedArmSection(Section):
     )
     calibration: CalibrationSection = CalibrationSection()
     iron: dict[SensorName, IronSection] = Field(default={}, max_length=20)
-    residue: ResidueSection = ResidueSection()
+    unmodelled: ResidueSection = ResidueSection()
 
 
 class SimulatedBoardSection(Section):
@@ -326,7 +326,7 @@ class SimulatedKvhSection(Section):
         description="the serial number that it reports; if left out, the one that the configuration expects",
     )
     oscillator_ppm: float = Field(default=-8.0, ge=-1000, le=1000, description="how much too fast its clock runs")
-    on_for_s: float = Field(
+    uptime_s: float = Field(
         default=3.0,
         ge=0,
         le=1e6,

@@ -2,22 +2,22 @@
 
 from rig.data.budget_entries import BudgetEntry
 from rig.data.result_types import (
+    ConditionsEntry,
+    DetectionLimitEntry,
     Entry,
     ErrorEntry,
     Freedom3,
-    LaidDownEntry,
     Matrix3,
     Matrix6,
     Method,
+    PlacementEntry,
     PositiveVector3,
     Role,
-    ToldFromEntry,
     Vector3,
-    WhenEntry,
 )
 
 
-class InAttitudesEntry(Entry):
+class AccelerationSolutionEntry(Entry):
     """The solution of one method from the dwells alone."""
 
     method: str
@@ -48,7 +48,7 @@ class DwellEntry(Entry):
     residual_std_m_s2: Vector3 | None = None
 
 
-class HeldOutEntry(Entry):
+class ValidationEntry(Entry):
     """The last repeat of the attitudes, which the calibration does not know: size of acceleration less gravity."""
 
     dwells: int
@@ -74,11 +74,11 @@ class AccelerometerEntry(Entry):
       attitudes are off about each axis, by the readings' own account.
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
       the gyroscope, are there where sweeps were made.
-    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is that
+    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `conditions`: when scale and bias were read, and how warm it was then; `temperature_c` is that
       temperature, in results of before the mean over the dwells.
-    - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
-    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
+    - `…_degrees_of_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
+    - `placement`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
       matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
     """
@@ -114,13 +114,13 @@ class AccelerometerEntry(Entry):
     condition: float
     temperature_c: float | None
     correction_matrix: Matrix3
-    beside: dict[str, InAttitudesEntry | ErrorEntry]
-    held_out: HeldOutEntry | None
+    other_methods: dict[str, AccelerationSolutionEntry | ErrorEntry]
+    validation: ValidationEntry | None
     warnings: tuple[str, ...]
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
-    found_at: WhenEntry | None = None
-    non_orthogonality_freedom: Freedom3 | None = None
-    second_order_freedom: Freedom3 | None = None
-    told_from: tuple[ToldFromEntry, ...] = ()
-    laid_down: LaidDownEntry | None = None
+    conditions: ConditionsEntry | None = None
+    non_orthogonality_degrees_of_freedom: Freedom3 | None = None
+    second_order_degrees_of_freedom: Freedom3 | None = None
+    detection_limits: tuple[DetectionLimitEntry, ...] = ()
+    placement: PlacementEntry | None = None

@@ -18,7 +18,7 @@ class ContributorEntry(Entry):
     """One line of the budget; `half_width` in `unit` is null where it was measured.
 
     Of a normal distribution it is the expanded uncertainty (k = 2) that somebody stated.
-    `std` and `share` (of the variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
+    `std` and `variance_fraction` (of the variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
     """
 
     name: str
@@ -27,15 +27,15 @@ class ContributorEntry(Entry):
     half_width: float | None
     unit: str
     source: str
-    freedom: float | None
+    degrees_of_freedom: float | None
     std: Vector6
-    share: Vector6
+    variance_fraction: Vector6
 
 
 class BudgetEntry(Entry):
     """What makes up `covariance_combined`; `expanded` is `coverage_factors` × `std`.
 
-    These are Student's t of the effective degrees of `freedom`, so that each interval holds the true value with its
+    These are Student's t of the effective `degrees_of_freedom`, so that each interval holds the true value with its
     part of `coverage_probabilities`. `coverage_factor` is the largest of them: in results of before all are that one,
     and it alone stands there.
     """
@@ -44,7 +44,7 @@ class BudgetEntry(Entry):
     std: Vector6
     coverage_factor: float
     expanded: Vector6
-    freedom: Freedom6
+    degrees_of_freedom: Freedom6
     coverage_factors: Vector6 | None = None
     coverage_probabilities: Vector6 | None = None
 
@@ -56,7 +56,7 @@ class BudgetEntry(Entry):
     @property
     def known(self) -> tuple[float, ...]:
         """Effective degrees of freedom of each, infinite ones too."""
-        return tuple(math.inf if each is None else each for each in self.freedom)
+        return tuple(math.inf if each is None else each for each in self.degrees_of_freedom)
 
     @property
     def probabilities(self) -> tuple[float, ...]:
@@ -72,19 +72,19 @@ def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequ
 
 
 class BiasProcessEntry(Entry):
-    """How the bias wandered: it is the mean over `mean_over_s`, and an hour changes it by `hour_std_rad_s` (1σ)."""
+    """How the bias wandered: a mean over `averaging_time_s`; an hour changes it by `hour_std_rad_s` (1σ)."""
 
-    walk_rad_s_sqrt_s: float
+    random_walk_rad_s_sqrt_s: float
     scatter_rad_s: float
-    freedom: int
-    mean_over_s: float
+    degrees_of_freedom: int
+    averaging_time_s: float
     hour_std_rad_s: float
 
 
 class ClockComparisonEntry(Entry):
     """The controller's clock against another."""
 
-    by: str
+    clock: str
     error: float
     std: float
 

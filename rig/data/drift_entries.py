@@ -10,7 +10,7 @@ class BiasEntry(Entry):
     std: Vector3
 
 
-class MoveEntry(Entry):
+class BiasStepEntry(Entry):
     """A move of the bias before `repeat`, counted from 1, by `change`, known to `std`; most along `axis`."""
 
     repeat: int
@@ -20,15 +20,15 @@ class MoveEntry(Entry):
 
 
 class RepeatEntry(Entry):
-    """One repeat of all attitudes: its bias with scale, axes and reference `held`, and with everything found `anew`.
+    """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
 
     `time_s` is that of its middle since the first's.
     """
 
     time_s: float
     temperature_c: float | None
-    held: BiasEntry
-    anew: BiasEntry | ErrorEntry
+    scale_fixed: BiasEntry
+    scale_free: BiasEntry | ErrorEntry
 
 
 class SlopeEntry(Entry):
@@ -38,29 +38,32 @@ class SlopeEntry(Entry):
     std: Vector3
     range_c: tuple[float, float]
     correlation_with_time: float
-    freedom: Freedom3 | None = None
+    degrees_of_freedom: Freedom3 | None = None
 
 
 class DriftEntry(Entry):
     """One quantity's bias by repeat, in its `unit`.
 
-    `common_std` is what all biases share beside their own; `excess` how many times more the readings scatter from
-    repeat to repeat than they do within a dwell. `freedom` are the degrees of freedom of the `held` biases' standard
-    deviations, null where they have no end; results of before do not count them. A steady bias has `moves` in a share
-    of `false_alarm` of all runs. Results of before do not say whose bias it is: `part`, `serial_number`, `full_scale`
-    in the same unit. The repeats' temperatures are `temperature_stated` where the sensor has no thermometer.
+    - `common_std` is what all biases share beside their own; `scatter_ratio` how many times more the readings scatter
+      from repeat to repeat than they do within a dwell.
+    - `degrees_of_freedom` are those of the standard deviations of `scale_fixed`, null where they have no end; results
+      of before do not count them.
+    - A steady bias has `steps` with the probability `false_alarm_probability`.
+    - `temperature_slope` is the slope of the bias over temperature. Temperatures are `temperature_stated` where the
+      sensor has no thermometer.
+    - Results of before do not say whose bias it is: `part`, `serial_number`, `full_scale` in the same unit.
     """
 
     unit: str
     repeats: tuple[RepeatEntry, ...]
     common_std: Vector3
-    excess: Vector3
-    moves: tuple[MoveEntry, ...]
-    false_alarm: float
+    scatter_ratio: Vector3
+    steps: tuple[BiasStepEntry, ...]
+    false_alarm_probability: float
     largest_change: Vector3
-    over_temperature: SlopeEntry | ErrorEntry
+    temperature_slope: SlopeEntry | ErrorEntry
     earth_rate_known: bool
-    freedom: Freedom3 | None = None
+    degrees_of_freedom: Freedom3 | None = None
     part: str | None = None
     serial_number: str | None = None
     full_scale: float | None = None

@@ -9,18 +9,18 @@ from pydantic import Field
 from rig.data.budget_entries import BudgetEntry
 from rig.data.checked import read_document
 from rig.data.result_types import (
+    ConditionsEntry,
+    DetectionLimitEntry,
     Entry,
     ErrorEntry,
     Freedom3,
-    LaidDownEntry,
     Matrix3,
     Matrix6,
     Method,
+    PlacementEntry,
     PositiveVector3,
-    ToldFromEntry,
     Utc,
     Vector3,
-    WhenEntry,
 )
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
@@ -91,10 +91,10 @@ class MagnetometerEntry(Entry):
       says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
-    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `found_at`: when scale and bias were read; `non_orthogonality_freedom`: degrees of freedom of these standard
-      deviations, null where they have no end.
-    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told its range then.
+    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `conditions`: when scale and bias were read; `non_orthogonality_degrees_of_freedom` are null where they have no
+      end.
+    - `placement`: where a file told the attitudes, and no arm held them; nobody told its range then.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
@@ -124,14 +124,14 @@ class MagnetometerEntry(Entry):
     rank: int
     condition: float
     correction_matrix: Matrix3
-    beside: dict[str, FieldSolutionEntry | ErrorEntry]
+    other_methods: dict[str, FieldSolutionEntry | ErrorEntry]
     warnings: tuple[str, ...]
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
-    found_at: WhenEntry | None = None
-    non_orthogonality_freedom: Freedom3 | None = None
-    told_from: tuple[ToldFromEntry, ...] = ()
-    laid_down: LaidDownEntry | None = None
+    conditions: ConditionsEntry | None = None
+    non_orthogonality_degrees_of_freedom: Freedom3 | None = None
+    detection_limits: tuple[DetectionLimitEntry, ...] = ()
+    placement: PlacementEntry | None = None
 
 
 class AsMountedEntry(Entry):
@@ -152,7 +152,7 @@ class ReversalEntry(Entry):
       is the bias as mounted.
     - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
     - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
-    - `scale` and `correction_matrix` are the means of the runs'. `…_freedom`: degrees of freedom of the standard
+    - `scale` and `correction_matrix` are the means of the runs'. `…_degrees_of_freedom` are those of the standard
       deviations of that name, null where they have no end; files of before do not count them.
     """
 
@@ -171,9 +171,9 @@ class ReversalEntry(Entry):
     degrees_of_freedom: int
     limit: float
     runs: tuple[AsMountedEntry, ...]
-    scale_freedom: Freedom3 | None = None
-    bias_freedom: Freedom3 | None = None
-    arm_field_freedom: Freedom3 | None = None
+    scale_degrees_of_freedom: Freedom3 | None = None
+    bias_degrees_of_freedom: Freedom3 | None = None
+    arm_field_degrees_of_freedom: Freedom3 | None = None
 
 
 class ReversalDocument(Entry):

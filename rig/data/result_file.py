@@ -13,16 +13,19 @@ from rig.config.limits import Kind, Parameter
 from rig.config.section import SensorName
 from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.attitude_entries import InAttitudesRatesEntry, TurnedEntry
+from rig.data.attitude_entries import AnglesEntry, AttitudesEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import OfJoints, read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.hand_entries import ByHandEntry
 from rig.data.installed_kinds import quantities
+from rig.data.key_meanings import meaning_of
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
 from rig.data.result_types import (
+    ConditionsEntry,
+    DetectionLimitEntry,
     Entry,
     ErrorEntry,
     Freedom3,
@@ -32,12 +35,10 @@ from rig.data.result_types import (
     Positive,
     PositiveVector3,
     Role,
-    ToldFromEntry,
     Utc,
     Vector2,
     Vector3,
     Vector6,
-    WhenEntry,
     covariance,
 )
 from rig.data.run_folder import RESULT
@@ -61,12 +62,13 @@ class CheckEntry(Entry):
     """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set.
 
     Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor` (results of before do not say
-    it: 2), by how much the `decision_rule` has it stay below the limit (`guard`), and the probability that it is
+    it: 2), by how much the `decision_rule` has it stay below the limit (`guard_band`), and the probability that it is
     accepted although it is beyond the limit.
 
     `kind` says whether it holds a property of the item (conformity) or asks whether the measurement is fit for use;
-    `sensor`, `quantity` and `parameter` what of which sensor is held, where it is of a single one; `sweep` which sweep
-    contradicts the others, `what` is told of the quantity. Results of before say none of these, or all but `what`.
+    `sensor`, `quantity` and `parameter` what of which sensor is judged, where it is of a single one; `sweep` which
+    contradicts the others; `criterion` by what the quantity is judged. Results of before say none of these, or all but
+    `criterion`.
     """
 
     name: str
@@ -75,23 +77,23 @@ class CheckEntry(Entry):
     unit: str
     passed: bool
     uncertainty: float | None = None
-    guard: float = 0.0
-    false_acceptance: float | None = None
+    guard_band: float = 0.0
+    false_acceptance_probability: float | None = None
     coverage_factor: float | None = None
     kind: Kind | None = None
     sensor: str | None = None
     quantity: str | None = None
     parameter: Parameter | None = None
     sweep: int | None = None
-    what: str | None = None
+    criterion: str | None = None
 
     @property
     def means(self) -> Meaning:
         """What it says it is of; in results of before, what its name was taken to say."""
         if self.kind is None:
             return meaning_by_name(self.name)
-        said = Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.what)
-        return said if self.what is not None else completed_by_name(said, self.name)
+        said = Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.criterion)
+        return said if self.criterion is not None else completed_by_name(said, self.name)
 
 
 class StoredPolynomialsEntry(Entry):
@@ -188,8 +190,8 @@ class EstimateEntry(Entry):
 class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
 
-    `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_freedom` are the degrees of freedom
-    of the standard deviations of that name, null where they have no end. Results of before have neither.
+    `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_degrees_of_freedom` are those of
+    the standard deviations of that name, null where they have no end. Results of before have neither.
     """
 
     model: str
@@ -214,9 +216,9 @@ class VectorEntry(Entry):
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
     residuals_std_rad_s: tuple[Vector3, ...] | None = None
-    non_orthogonality_freedom: Freedom3 | None = None
-    mounting_freedom: Freedom3 | None = None
-    g_sensitivity_freedom: tuple[Freedom3, Freedom3, Freedom3] | None = None
+    non_orthogonality_degrees_of_freedom: Freedom3 | None = None
+    mounting_degrees_of_freedom: Freedom3 | None = None
+    g_sensitivity_degrees_of_freedom: tuple[Freedom3, Freedom3, Freedom3] | None = None
 
 
 class NonlinearityEntry(Entry):
@@ -255,7 +257,7 @@ class ObservationEntry(Entry):
     speed_rad_s: float
     angle_rad: float | None = None
     speed_std_rad_s: float
-    lost: int
+    lost_samples: int
     mean_rad_s: Vector3
     mean_std_rad_s: Vector3
     noise_rad_s: Vector3
@@ -297,7 +299,7 @@ class BoardEntry(Entry):
     bias_difference_rad_s: float | None
 
 
-class SensorEntry(Entry):
+class GyroscopeEntry(Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
     - `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both
@@ -305,15 +307,15 @@ class SensorEntry(Entry):
     - `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings; results of before
       have none, and it is K.
     - `speeds_rad_s` are those of the sweeps: found at one speed, either way, the calibration is valid at that speed,
-      and there is no `nonlinearity`. `loads_rad_s`: the smallest and the largest rate along each of the sensor's own
-      axes in the sweeps that tell its scale factor.
-    - `temperature_c` is the mean over the samples of all sweeps. `scale_at` and `bias_at` say when each was
-      read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
+      and there is no `nonlinearity`. `axis_rate_ranges_rad_s`: the smallest and the largest rate along each of the
+      sensor's own axes in the sweeps that determine its scale factor.
+    - `temperature_c` is the mean over the samples of all sweeps. `scale_conditions` and `bias_conditions`
+      say when each was read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
     - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     - `earth_rate` is there where it was to be found, or says why it was not.
-    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
     - `in_attitudes` is there where a file told the attitudes, and no arm turned it; what nobody told, as its range and
-      its temperature, is null then. `turned` is there where sweeps of a file were solved by how far the body turned,
+      its temperature, is null then. `by_angles` is there where sweeps of a file were solved by how far the body turned,
       `by_hand` where a hand turned it on a table.
     """
 
@@ -348,12 +350,12 @@ class SensorEntry(Entry):
     correction: Literal["matrix", "diagonal"] = "diagonal"
     correction_matrix: Matrix3 | None = None
     earth_rate: EarthRateEntry | ErrorEntry | None = None
-    scale_at: WhenEntry | None = None
-    bias_at: WhenEntry | None = None
-    loads_rad_s: tuple[Vector2, Vector2, Vector2] | None = None
-    told_from: tuple[ToldFromEntry, ...] = ()
-    in_attitudes: InAttitudesRatesEntry | None = None
-    turned: TurnedEntry | None = None
+    scale_conditions: ConditionsEntry | None = None
+    bias_conditions: ConditionsEntry | None = None
+    axis_rate_ranges_rad_s: tuple[Vector2, Vector2, Vector2] | None = None
+    detection_limits: tuple[DetectionLimitEntry, ...] = ()
+    in_attitudes: AttitudesEntry | None = None
+    by_angles: AnglesEntry | None = None
     by_hand: ByHandEntry | None = None
 
 
@@ -426,16 +428,16 @@ class VerificationEntry(Entry):
 class MountEntry(Entry):
     """How the item sat in a stage, counted from 1, beside how it was to be mounted, against the first stage.
 
-    `turn_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
+    `rotation_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
     """
 
     stage: int
-    turn_rad: Vector3
+    rotation_rad: Vector3
     std_rad: Vector3
 
 
 class ResultDocument(Entry):
-    """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified.
+    """The result of a run, of schema "rig.result/1"; `gyroscopes` is empty where stored calibrations were verified.
 
     It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
     were recorded; one that was recorded and not calibrated says why.
@@ -453,7 +455,7 @@ class ResultDocument(Entry):
     checks: tuple[CheckEntry, ...]
     provenance: ProvenanceEntry
     clock: ClockEntry | None = None
-    sensors: dict[SensorName, SensorEntry]
+    gyroscopes: dict[SensorName, GyroscopeEntry]
     verification: dict[SensorName, VerificationEntry]
     accelerometers: dict[SensorName, AccelerometerEntry] = Field(default_factory=dict)
     magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
@@ -473,6 +475,9 @@ class ResultDocument(Entry):
 def schema_text() -> str:
     """The JSON schema of `result.json`, as docs/result.schema.json has it."""
     schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ResultDocument.model_json_schema()}
+    for name, entry in {"ResultDocument": schema, **schema["$defs"]}.items():
+        for key, described in entry.get("properties", {}).items():
+            described["description"] = meaning_of(name.removesuffix("Entry"), key)
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 

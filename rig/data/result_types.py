@@ -44,7 +44,7 @@ class Entry(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
-class WhenEntry(Entry):
+class ConditionsEntry(Entry):
     """When readings were taken, from when to when (UTC, by the arm controller's clock since the recording's start).
 
     `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
@@ -63,34 +63,35 @@ class WhenEntry(Entry):
         return self.temperature_c is not None and self.temperature_range_c is None
 
 
-class LaidDownEntry(Entry):
+class PlacementEntry(Entry):
     """How a body was laid down in attitudes that a file tells, in the unit of the readings.
 
     `placement_std` is by how much a placement was found to change each reading beside its attitude, null where the
-    method does not ask; `rests_elsewhere` rests without an attitude have told of it too. `rows_left_out` of the
+    method does not ask; `rests_without_attitude` rests without an attitude have told of it too. `rows_omitted` of the
     file's rows were none, for the body moved in them. `covariance` is that of all that was found, in its order.
     """
 
     placement_std: float | None
     placement_uncertainty: float | None
-    rests_elsewhere: int
-    rows_left_out: int
+    rests_without_attitude: int
+    rows_omitted: int
     covariance: Covariance
     covariance_order: tuple[str, ...]
 
 
-class ToldFromEntry(Entry):
-    """The size from which on a `check` tells that `what` happened, in 95 of 100 recordings; null where none is told.
+class DetectionLimitEntry(Entry):
+    """The smallest `size` of a `fault` that the `check` detects in 95 of 100 recordings; null where it detects none.
 
-    Of what changes half-way it is the whole change. `off_by_expanded`: by how many times its U the scale factor or bias
-    farthest off is off just below that size; null where that was not reckoned.
+    This is the minimal detectable bias (Baarda 1968). For a change half-way it is the complete change.
+    `error_over_expanded` is the largest error of a scale factor or bias just below that size, in multiples of its
+    expanded uncertainty; null where it was not computed.
     """
 
-    what: str
+    fault: str
     check: str
     size: float | None
     unit: str
-    off_by_expanded: float | None
+    error_over_expanded: float | None
 
 
 class OmittedEntry(Entry):

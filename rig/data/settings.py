@@ -335,7 +335,7 @@ def _limits(config: "RigConfig") -> Limits:
 
     said, section = config.limits.model_dump(), config.procedure
     if isinstance(section, SixObservationSection):
-        wanted = {"scale_u": section.wanted_scale_u, "bias_u_rad_s": section.wanted_bias_u_rad_s}
+        wanted = {"scale_u": section.target_scale_u, "bias_u_rad_s": section.target_bias_u_rad_s}
         said |= {key: value for key, value in wanted.items() if said[key] is None}
     return Limits(**said)
 
@@ -346,9 +346,9 @@ def by_hand_of(section: "ByHandSection") -> ByHand:
         flips=section.flips,
         turns=section.turns,
         rest_s=section.rest_s,
-        box_rad=float(np.radians(section.box_deg)),
+        box_rad=float(np.radians(section.squareness_deg)),
         closure_rad=float(np.radians(section.closure_deg)),
-        wanted_scale_u=section.wanted_scale_u,
+        wanted_scale_u=section.target_scale_u,
     )
 
 

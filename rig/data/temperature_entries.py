@@ -9,14 +9,14 @@ from rig.data.result_types import Covariance, Entry, Freedom, Vector2, Vector3, 
 Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
 
 
-class TemperatureLineEntry(Entry):
+class TemperatureContributorEntry(Entry):
     """What makes up the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
 
     name: str
     kind: Literal["A", "B"]
     distribution: Literal["normal", "rectangular"]
     source: str
-    freedom: Freedom
+    degrees_of_freedom: Freedom
     std: Vector6
 
 
@@ -50,7 +50,7 @@ class OverTemperatureEntry(Entry):
     scale: Cubic
     bias: Cubic
     covariance: Covariance
-    contributors: tuple[TemperatureLineEntry, ...]
+    contributors: tuple[TemperatureContributorEntry, ...]
     table: tuple[AtTemperatureEntry, ...]
     lag_s: float
     lag_std_s: float

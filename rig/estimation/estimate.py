@@ -1,10 +1,11 @@
 """What every gyroscope estimator's result has in common."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from rig.estimation.arrays import Array
 
 
+@runtime_checkable
 class Estimate(Protocol):
     """Scale (3,), bias_rad_s (3,) and covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b)."""
 

@@ -17,8 +17,8 @@ from rig.data.checked import checked
 from rig.errors import Refused
 from rig.history.again import Answer, Given
 
-JOURNAL = "again.jsonl"
-SCHEMA: Final = "rig.again/1"
+JOURNAL = "recomputed.jsonl"
+SCHEMA: Final = "rig.recomputation/1"
 SIZE_MAX_BYTES = 1 << 32  # a recording has some thousand
 
 

@@ -15,7 +15,7 @@ from rig.history.store import Past
 from rig.history.tables import value_text
 from rig.report.rounding import figures
 
-CSV, PAGE = "again.csv", "again.html"
+CSV, PAGE = "recomputed.csv", "recomputed.html"
 COLUMNS = (
     "run",
     "calibration",
@@ -36,11 +36,11 @@ COLUMNS = (
     "before_expanded",
     "now",
     "now_expanded",
-    "shift_of_u",
-    "growth_of_u",
+    "shift_over_u",
+    "growth_over_u",
     "certificates_to_withdraw",
     "certificates_unconfirmed",
-    "left_out",
+    "omitted",
     "folder",
 )
 STATE_WORDS = {
@@ -179,7 +179,7 @@ def _rows(compared: Compared) -> Iterator[dict[str, Any]]:
             "state": "solved",
             "verdict_now": answer.verdict,
             "failed_now": ", ".join(answer.failed),
-            "left_out": answer.left_out,
+            "omitted": answer.left_out,
         }
     else:
         of_run |= {"state": "unreached"} if answer is None else {"state": answer.state, "why": answer.why}
@@ -206,6 +206,6 @@ def _of_move(move: Move) -> dict[str, Any]:
         "before": move.before.value,
         "before_expanded": move.before.expanded,
         **({} if now is None else {"now": now.value, "now_expanded": now.expanded}),
-        "shift_of_u": move.shift,
-        "growth_of_u": move.growth,
+        "shift_over_u": move.shift,
+        "growth_over_u": move.growth,
     }

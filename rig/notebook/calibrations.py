@@ -23,7 +23,7 @@ NOISE_TEXT = "± U: two standard deviations of noise; no more is known"
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class CharacteristicValue:
     """Numbers found beside scale factors and biases, by their `labels`: `values` and `expanded`, U, in an SI `unit`."""
 
     labels: tuple[str, ...]
@@ -34,7 +34,7 @@ class Beside:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Scale factors and biases of one sensor, with their uncertainties, and what was found `beside` them, by name.
+    """Scale factors and biases of one sensor, with their uncertainties, and their `characteristics`, by name.
 
     A gyroscope's reading m is corrected as g = K (m + b), an accelerometer's or a magnetometer's as M (m − b); `apply`
     does it. Arrays are in SI units: a bias in rad/s, m/s² or T. `entry` is all that `result.json` has of it.
@@ -43,7 +43,7 @@ class Calibration:
     name: str
     found: Finding[Any]
     shown: Shown
-    beside: Mapping[str, Beside] = field(default_factory=dict)
+    characteristics: Mapping[str, CharacteristicValue] = field(default_factory=dict)
 
     @property
     def entry(self) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
-from rig.notebook.calibrations import HEADINGS, U_TEXT, Beside, Calibration, rows
+from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, CharacteristicValue, rows
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
@@ -41,12 +41,12 @@ class Result(Mapping[str, Calibration]):
         )
         return {each.name: each for each in found}
 
-    def _beside(self, of: Finding[Any]) -> dict[str, Beside]:
+    def _beside(self, of: Finding[Any]) -> dict[str, CharacteristicValue]:
         """What was found of a sensor's quantity beside its scale and bias, by whatever kind of result."""
         of_it = of.sensor, of.quantity
         found = (each for each in terms_of(self.document) if (each.finding.sensor, each.finding.quantity) == of_it)
         return {
-            term.name: Beside(
+            term.name: CharacteristicValue(
                 tuple(term.characteristic.labels),
                 np.array(term.known.values),
                 np.array(term.expanded.widths),

@@ -112,5 +112,5 @@ def clocks_apart(time_s: Array, windows: Sequence[Window]) -> Fault:
         "clocks_apart",
         f"the rows reach from {start_s:.10g} to {end_s:.10g} s, the samples from {time_s[0]:.10g} to "
         f"{time_s[-1]:.10g} s: no row holds a sample",
-        "Write both files by one clock, in seconds; with --attitudes, --find-clock finds what is between two",
+        "Write both files by one clock, in seconds; with --attitudes, --estimate-clock-offset finds their offset",
     )

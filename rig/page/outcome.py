@@ -86,7 +86,7 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
 
 def after_fault(command: str, *, repeats: bool) -> Row:
     """What to do after a fault, in words and as a command."""
-    return _next("Repeat the refused sweeps" if repeats else "When it is mended, go on", command)
+    return _next("Repeat the refused sweeps" if repeats else "When it is corrected, go on", command)
 
 
 def _next(words: str, command: str) -> Row:

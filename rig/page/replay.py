@@ -87,7 +87,9 @@ def moments(run: RunData) -> Iterator[Moment]:
 def ended(result: ResultDocument) -> Iterator[RunEvent]:
     """What was told when the run had its result."""
     for each in result.checks:
-        yield Checked(Check(each.name, each.value, each.limit, each.unit, each.means, each.uncertainty, each.guard))
+        yield Checked(
+            Check(each.name, each.value, each.limit, each.unit, each.means, each.uncertainty, each.guard_band)
+        )
     yield VerdictReached(result.verdict == "pass")
 
 

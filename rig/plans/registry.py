@@ -11,7 +11,7 @@ from functools import cache
 from importlib.metadata import EntryPoint
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator
 from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
@@ -53,7 +53,7 @@ Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
 
 def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """The usual analysis: scale and bias of every sensor from averaged revolutions, held against the limits."""
-    return calibrated(runs, estimator)
+    return calibrate(runs, estimator)
 
 
 @dataclass(frozen=True, slots=True)

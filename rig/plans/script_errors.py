@@ -11,7 +11,7 @@ ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs bef
 
 
 @contextmanager
-def script_errors(what: str, remedy: str = "Mend the script") -> Iterator[None]:
+def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[None]:
     """Raises Refused `script_failed`, `what` with the reason and its place; errors that have a name stay as they are.
 
     A script that ends the program is refused as well: its exit status would be taken for a verdict.

@@ -23,14 +23,14 @@ def plan_servo_six_observation(
 ) -> Plan:
     """Three mountings or more, a small trial of each, then rest, turn, rest, turn back, rest.
 
-    Each turn is a revolution and `beyond_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
+    Each turn is a revolution and `overtravel_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
     winds by a turn's half and a little either way. `start_q_rad` is where the shaft stands (home when None); from
     there the plan goes home first, slowly, and each stage begins and ends at home. `done` holds the indices of turns
     to leave out; a stage of which nothing is left has no steps.
     """
     home = (math.radians(servo.home_deg),)
     shaft, pace = Station(0, "shaft", home), pace_of(servo.transfer_speed_deg_s, procedure.acceleration_deg_s2)
-    even_rad = TURN_RAD + math.radians(procedure.beyond_deg) + 2 * MARGIN_RAD
+    even_rad = TURN_RAD + math.radians(procedure.overtravel_deg) + 2 * MARGIN_RAD
     profile = Profile(TURN_RAD, even_rad, pace_of(procedure.speed_deg_s, procedure.acceleration_deg_s2))
     turns = [
         sweep_about(index, shaft, way, (0.0, 0.0, 1.0 if way == "ccw" else -1.0), profile)

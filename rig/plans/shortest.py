@@ -247,7 +247,7 @@ class _Swept:
         """The wish, after an earlier repeat."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
-        sizes = {"wanted_scale_u": wanted.scale, "wanted_bias_u_rad_s": wanted.bias_rad_s}
+        sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}
         return {key: size for key, size in sizes.items() if size < inf}
 
 
@@ -295,7 +295,7 @@ class _ByHand:
     def ending(self, procedure: ProcedureSection, wanted: Wanted) -> Mapping[str, float]:
         """The wish, before the list is done: beside what no session shows of hands."""
         own = wanted.scale**2 - (2 * REAL_HANDS) ** 2
-        return {"wanted_scale_u": round(own**0.5, 7)} if 0 < own < inf else {}
+        return {"target_scale_u": round(own**0.5, 7)} if 0 < own < inf else {}
 
     def _candidate(self, flips: int, turns: int, rest_s: float) -> Candidate:
         procedure = _changed(self.config.procedure, flips=flips, turns=turns, rest_s=rest_s)

@@ -54,8 +54,8 @@ def of_imu(config: RigConfig) -> Iterator[Motion]:
 
 def of_servo(config: RigConfig) -> Iterator[Motion]:
     """Turns of a servo at one speed, and how far beyond."""
-    for speed_deg_s, beyond_deg in product(_speeds_deg_s(config), BEYOND_DEG):
-        yield (speed_deg_s,), beyond_deg, {"speed_deg_s": speed_deg_s, "beyond_deg": beyond_deg}
+    for speed_deg_s, overtravel_deg in product(_speeds_deg_s(config), BEYOND_DEG):
+        yield (speed_deg_s,), overtravel_deg, {"speed_deg_s": speed_deg_s, "overtravel_deg": overtravel_deg}
 
 
 def _speeds_deg_s(config: RigConfig) -> list[float]:

@@ -19,15 +19,15 @@ REMEMBERS_S = 30.0  # after so long of what it is behind, the power for it has d
 
 @dataclass(slots=True)
 class Course:
-    """The way through the range from `from_c` to `to_c` with gaps of at most `gap_k`; `sets` are those measured.
+    """The way through the range from `from_c` to `to_c` with gaps of at most `max_step_k`; `sets` are those measured.
 
     `warming` says which way it goes now, None before anybody knows how warm the sensors are.
     """
 
     from_c: float
     to_c: float
-    gap_k: float
-    both_ways: bool
+    max_step_k: float
+    both_directions: bool
     sets: list[SetMeasured] = field(default_factory=list)
     warming: bool | None = None
 
@@ -44,9 +44,9 @@ class Course:
         self._turn_round(step)
 
     def _turn_round(self, step: SetMeasured) -> None:
-        if self.warming and min(step.temperatures_c.values()) >= self.to_c - AT_THE_END * self.gap_k:
+        if self.warming and min(step.temperatures_c.values()) >= self.to_c - AT_THE_END * self.max_step_k:
             self.warming = False
-        elif not self.warming and max(step.temperatures_c.values()) <= self.from_c + AT_THE_END * self.gap_k:
+        elif not self.warming and max(step.temperatures_c.values()) <= self.from_c + AT_THE_END * self.max_step_k:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
@@ -57,19 +57,19 @@ class Course:
             return True
         last = self.sets[-1].temperatures_c
         moved = (abs(now_c[name] - last[name]) for name in now_c)
-        return min(moved) >= NEXT_AFTER * self.gap_k
+        return min(moved) >= NEXT_AFTER * self.max_step_k
 
     def next_c(self, now_c: float) -> float:
         """Where the next set is due, for who is so warm now."""
         if not self.sets:
             return now_c
         last = self.sets[-1].temperatures_c.values()
-        step_k = NEXT_AFTER * self.gap_k
+        step_k = NEXT_AFTER * self.max_step_k
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
         """What of the range no set has covered yet, in words; None where all of it is covered."""
-        ways = ((True, "while warming"), (False, "while cooling")) if self.both_ways else ((None, ""),)
+        ways = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
         return next(self._missing(ways), None)
 
     def _missing(self, ways: Iterable[tuple[bool | None, str]]) -> Iterator[str]:
@@ -93,11 +93,11 @@ class Course:
 
     def _gap(self, temperatures_c: Sequence[float]) -> tuple[float, float] | None:
         """The first part of the range that has no set, from the cold end on."""
-        end_k = AT_THE_END * self.gap_k
+        end_k = AT_THE_END * self.max_step_k
         if temperatures_c[0] > self.from_c + end_k:
             return self.from_c, temperatures_c[0]
         for low, high in pairwise(temperatures_c):
-            if high - low > self.gap_k and high > self.from_c and low < self.to_c - end_k:
+            if high - low > self.max_step_k and high > self.from_c and low < self.to_c - end_k:
                 return low, high
         return None if temperatures_c[-1] >= self.to_c - end_k else (temperatures_c[-1], self.to_c)
 

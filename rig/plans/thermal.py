@@ -49,5 +49,5 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
     """How long the temperature takes to the next set at its fastest, without the set itself: a guess, for the plan."""
-    gap_s = 60 * procedure.gap_k / (procedure.most_rate_k_per_min * 2)
+    gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
     return max(LEAST_WAIT_S, gap_s - sum(step.duration_s for step in steps))

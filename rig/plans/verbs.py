@@ -38,14 +38,14 @@ class Verbs(Protocol):
         """Stand still in an attitude and measure there, once the sensors have settled."""
         ...
 
-    def next_temperature(self, rest: Rest) -> bool:
+    def wait_for_next_temperature(self, rest: Rest) -> bool:
         """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
 
         What comes after it, up to the next call, is one set.
         """
         ...
 
-    def end_of_range(self) -> None:
+    def end_temperature_range(self) -> None:
         """Switch the heater off. Whatever part of the range no set has covered ends the run."""
         ...
 

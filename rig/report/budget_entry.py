@@ -21,7 +21,7 @@ HOUR_S = 3600.0
 def budget_entry(budget: Budget) -> BudgetEntry:
     """The combined uncertainty and all it is made of."""
     lines = [
-        entry(ContributorEntry, each, share=share, freedom=_finite(each.freedom))
+        entry(ContributorEntry, each, variance_fraction=share, degrees_of_freedom=_finite(each.freedom))
         for each, share in zip(budget.contributors, budget.shares, strict=True)
     ]
     factors = budget.coverage_factors
@@ -30,7 +30,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
         budget,
         contributors=lines,
         coverage_factor=float(factors.max()),
-        freedom=[_finite(each) for each in budget.freedom.tolist()],
+        degrees_of_freedom=[_finite(each) for each in budget.freedom.tolist()],
         coverage_probabilities=covered(factors, budget.freedom),
     )
 
@@ -40,7 +40,7 @@ def bias_process_entry(explained: Explained) -> BiasProcessEntry:
     return entry(
         BiasProcessEntry,
         explained.bias,
-        mean_over_s=float(np.ptp(explained.seen.windows_s)),
+        averaging_time_s=float(np.ptp(explained.seen.windows_s)),
         hour_std_rad_s=explained.bias.wandered_rad_s(HOUR_S),
     )
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_file import SensorEntry
+from rig.data.result_file import GyroscopeEntry
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.kinds.finding import Finding
 
 
-def gyroscope_lines(finding: Finding[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
+def gyroscope_lines(finding: Finding[GyroscopeEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
     """C of a gyroscope that was calibrated; none of a reference."""
     if finding.entry.role != "calibrate":
         return
@@ -54,7 +54,7 @@ def prefix_of(name: str) -> str:
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
 
-def _correction(prefix: str, sensor: SensorEntry) -> Iterator[str]:
+def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
     about = f"{sensor.part}, serial number {sensor.serial_number}{_warm(sensor.temperature_c)}"
     whole = sensor.correction_matrix
     yield from (

@@ -1,11 +1,11 @@
 """The typed outcome of a run as the document of `result.json`."""
 
-from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
 from rig.analysis.mounts import FoundMount
 from rig.analysis.outcome import Origin, Outcome
+from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
 from rig.report.budget_entry import clock_entry
 from rig.report.elsewhere_entries import unsolved
@@ -14,7 +14,7 @@ from rig.report.kinds.kind import Without
 from rig.report.kinds.registry import kinds
 from rig.report.omitted import notes, omitted
 
-ALWAYS = ("sensors", "verification")  # there of every run, if only to say that there are none
+ALWAYS = ("gyroscopes", "verification")  # there of every run, if only to say that there are none
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
@@ -42,7 +42,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
 
 def _mount(mount: FoundMount) -> MountEntry:
     return MountEntry.model_validate(
-        {"stage": mount.stage + 1, "turn_rad": tuple(mount.turn_rad), "std_rad": tuple(mount.std_rad)}
+        {"stage": mount.stage + 1, "rotation_rad": tuple(mount.turn_rad), "std_rad": tuple(mount.std_rad)}
     )
 
 
@@ -52,12 +52,24 @@ def _plain(entries: Any) -> dict[str, Any]:
 
 
 def _check(check: Check) -> CheckEntry:
-    told = {name: each for name, each in asdict(check.means).items() if each is not None}
+    means = {name: value for name, value in _meaning(check.means).items() if value is not None}
     if check.uncertainty is not None:
-        return entry(CheckEntry, check, **told)
+        return entry(CheckEntry, check, **means)
     return CheckEntry(
-        name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed, **told
+        name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed, **means
     )
+
+
+def _meaning(means: Meaning) -> dict[str, Any]:
+    """Return what a check is of, by the fields of its entry."""
+    return {
+        "kind": means.kind,
+        "sensor": means.sensor,
+        "quantity": means.quantity,
+        "parameter": means.parameter,
+        "sweep": means.sweep,
+        "criterion": means.what,
+    }
 
 
 def _provenance(origin: Origin) -> ProvenanceEntry:

@@ -33,7 +33,7 @@ def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]
     )
     where = [
         f"latitude {np.degrees(earth.latitude_rad):.2f}° (± {k * np.degrees(earth.latitude_std_rad):.2f})"
-        + (", its vertical part as given" if earth.vertical_held else "")
+        + (", its vertical part as given" if earth.vertical_fixed else "")
     ]
     if earth.heading_rad is not None and earth.heading_std_rad is not None:
         heading, off = np.degrees(earth.heading_rad) % 360, k * np.degrees(earth.heading_std_rad)

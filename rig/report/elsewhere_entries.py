@@ -9,11 +9,17 @@ from rig.analysis.elsewhere import OfSensor
 from rig.analysis.increments import InIncrements
 from rig.analysis.outcome import Outcome
 from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.attitude_entries import BesideEntry, FollowedEntry, InAttitudesRatesEntry, LeftOutEntry, TurnedEntry
+from rig.data.attitude_entries import (
+    AnglesEntry,
+    AttitudesEntry,
+    IncrementsEntry,
+    OmittedIncrementsEntry,
+    RateSolutionEntry,
+)
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.motion_file import Item
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
-from rig.data.result_types import ErrorEntry, LaidDownEntry
+from rig.data.result_types import ErrorEntry, PlacementEntry
 from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
@@ -41,10 +47,10 @@ def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
             second_order_s2_m=result.solution.second_order,
             second_order_std_s2_m=_second_order_std(result.solution),
             reference_m_s2=result.solution.reference,
-            lever_arm_m=None, lever_arm_std_m=None, delay_s=None, delay_std_s=None, alignment=None, held_out=None,
+            lever_arm_m=None, lever_arm_std_m=None, delay_s=None, delay_std_s=None, alignment=None, validation=None,
             sweeps=0,
             temperature_c=None,
-            laid_down=_laid_down(result),
+            placement=_placement(result),
         )
         for name, item, site, result in _placed(outcome, ACCELERATION)
     }  # fmt: skip
@@ -59,7 +65,7 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
             field_t=site.magnetic_field_t,
             field_base_t=result.solution.reference,
             hard_iron_t=magnetometer.hard_iron(result.solution),
-            laid_down=_laid_down(result),
+            placement=_placement(result),
         )
         for name, item, site, result in _placed(outcome, FIELD)
     }  # fmt: skip
@@ -75,34 +81,34 @@ def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
     return told
 
 
-def rates_in_attitudes(sensor: OfSensor) -> InAttitudesRatesEntry | None:
+def rates_in_attitudes(sensor: OfSensor) -> AttitudesEntry | None:
     """What attitudes tell of a gyroscope beside scale and bias; None where it was swept."""
     if sensor.rates is None:
         return None
     earth = _earth_rate(sensor.rates)
-    return InAttitudesRatesEntry.model_validate(
+    return AttitudesEntry.model_validate(
         {
             "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.rate_rad_s.tolist(),
             "earth_rate_std_rad_s": None if isinstance(earth, Fault) else earth.std_rad_s.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
-            "followed": _followed(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
+            "by_increments": _followed(sensor.rates) if isinstance(sensor.rates, InIncrements) else None,
             "covariance": sensor.rates.solution.covariance.tolist(),
             "covariance_order": ORDER[:15],
-            "beside": {} if isinstance(sensor.rates, InIncrements) else _rates_beside(sensor.rates),
+            "other_methods": {} if isinstance(sensor.rates, InIncrements) else _rates_beside(sensor.rates),
         }
     )
 
 
-def turned(sensor: OfSensor) -> TurnedEntry | None:
+def turned(sensor: OfSensor) -> AnglesEntry | None:
     """What the turns were taken for that a gyroscope was solved by; None where means of sweeps or attitudes told it."""
     if sensor.turned is None or sensor.gyroscope is None:
         return None
     turns = sensor.turned.turns
-    return TurnedEntry(
+    return AnglesEntry(
         rows=sensor.turned.rows,
         angle_std_rad=max(turn.angle_std_rad for turn in turns),
         axis_std_rad=max(turn.axis_std_rad for turn in turns),
-        widened=getattr(sensor.gyroscope.solution, "widened", 1.0),
+        uncertainty_inflation=getattr(sensor.gyroscope.solution, "widened", 1.0),
     )
 
 
@@ -115,21 +121,22 @@ def _earth_rate(result: Result) -> EarthSeen | Fault:
     return EarthSeen(result.solution.reference, result.solution.covariance[REFERENCE, REFERENCE])
 
 
-def _followed(increments: InIncrements) -> FollowedEntry:
+def _followed(increments: InIncrements) -> IncrementsEntry:
     residuals = increments.solution.residuals_rad
     return entry(
-        FollowedEntry, increments.solution, increments,
+        IncrementsEntry, increments.solution, increments,
         increments=len(residuals),
         residual_rms_rad=float(np.sqrt(np.mean(residuals**2))),
-        left_out=[
-            LeftOutEntry(error=each.name, count=each.count, first_s=each.first_s) for each in increments.left_out
+        omitted=[
+            OmittedIncrementsEntry(error=cause.name, count=cause.count, first_s=cause.first_s)
+            for cause in increments.left_out
         ],
     )  # fmt: skip
 
 
-def _rates_beside(attitudes: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
-    def solution_entry(other: TriaxialSolution) -> BesideEntry:
-        return entry(BesideEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
+def _rates_beside(attitudes: InAttitudes) -> dict[str, RateSolutionEntry | ErrorEntry]:
+    def solution_entry(other: TriaxialSolution) -> RateSolutionEntry:
+        return entry(RateSolutionEntry, other, scale=scale_of(other.matrix), bias_rad_s=-other.bias)
 
     return {str(method): made for method, made in attitudes.beside.by_key(solution_entry, error_entry).items()}
 
@@ -143,13 +150,13 @@ def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site,
     ]
 
 
-def _laid_down(attitudes: InAttitudes) -> LaidDownEntry:
+def _placement(attitudes: InAttitudes) -> PlacementEntry:
     solution, laid = attitudes.solution, attitudes.laid
-    return LaidDownEntry(
+    return PlacementEntry(
         placement_std=None if laid is None else laid.placement_std,
         placement_uncertainty=None if laid is None else laid.placement_uncertainty,
-        rests_elsewhere=attitudes.elsewhere,
-        rows_left_out=attitudes.moving,
+        rests_without_attitude=attitudes.elsewhere,
+        rows_omitted=attitudes.moving,
         covariance=solution.covariance.tolist(),
         covariance_order=ORDER[: len(solution.covariance)],
     )

@@ -1,25 +1,30 @@
-"""From what the analysis found to the entries of `result.json`, field by field of the same name."""
+"""From what the analysis found to the entries of `result.json`, by the table of `rig/report/entry_sources.py`."""
 
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
 
 from rig.estimation.arrays import Array
+from rig.report.entry_sources import SOURCES
 
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
 def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
-    """An entry of that kind: each field is in `more`, or is the attribute of that name of the first source that has it.
+    """Return an entry of that kind: each field from `more`, or by the table from the first source that has it.
 
     Arrays become tuples. Raises ValueError for a field that nothing says or whose value does not fit, TypeError for one
-    of `more` that the entry does not have: reading ignores what it does not know, writing must not.
+    of `more` that the entry does not have and for a source that the table does not know: reading ignores what it does
+    not know, writing must not. Raises AttributeError where a source has lost what the table takes.
     """
     if unknown := more.keys() - kind.model_fields.keys():
         raise TypeError(f"{kind.__name__} has no {', '.join(sorted(unknown))}")
-    said = {name: getattr(source, name) for source in reversed(sources) for name in _shared(kind, source)}
-    return kind.model_validate({name: _plain(value) for name, value in {**said, **more}.items()})
+    fields: dict[str, Any] = {}
+    for source in reversed(sources):
+        fields |= {field: getattr(source, attribute) for field, attribute in _attributes(kind, source).items()}
+    return kind.model_validate({name: _plain(value) for name, value in {**fields, **more}.items()})
 
 
 def counted(freedom: Array | None) -> list[Any] | None:
@@ -31,8 +36,12 @@ def counted(freedom: Array | None) -> list[Any] | None:
     return list(found.tolist())
 
 
-def _shared(kind: type[BaseModel], source: object) -> list[str]:
-    return [name for name in kind.model_fields if hasattr(source, name)]
+def _attributes(kind: type[BaseModel], source: object) -> Mapping[str, str]:
+    """Return the attribute of a source that fills each field of such an entry."""
+    for row in SOURCES.get(kind, ()):
+        if isinstance(source, row.classes):
+            return row.attributes
+    raise TypeError(f"no row of entry_sources.py says what {kind.__name__} takes from {type(source).__name__}")
 
 
 def _plain(value: Any) -> Any:

@@ -24,18 +24,18 @@ def farthest_off(result: ResultDocument) -> Iterator[str]:
     if not found:
         return
     others = len(found) - 1
-    farthest = _line(max(found, key=lambda mount: hypot(*mount.turn_rad)))
+    farthest = _line(max(found, key=lambda mount: hypot(*mount.rotation_rad)))
     yield farthest if not others else f"{farthest}; less in {others} other stage{'s' if others > 1 else ''}"
 
 
 def _found(result: ResultDocument) -> list[MountEntry]:
-    return [mount for mount in result.mounts if hypot(*mount.turn_rad) > ROUNDING * hypot(*mount.std_rad)]
+    return [mount for mount in result.mounts if hypot(*mount.rotation_rad) > ROUNDING * hypot(*mount.std_rad)]
 
 
 def _line(mount: MountEntry) -> str:
     angles = (
         f"{plus_minus(degrees(angle), degrees(COVERAGE_FACTOR * std))}°"
-        for angle, std in zip(mount.turn_rad, mount.std_rad, strict=True)
+        for angle, std in zip(mount.rotation_rad, mount.std_rad, strict=True)
     )
     x, y, z = angles
     return f"mounted anew: in stage {mount.stage} the item sat off its mount by {x} about x, {y} about y, {z} about z"

@@ -8,7 +8,7 @@ from rig.data.result_types import OmittedEntry
 from rig.estimation.by_hand import HandSolution
 from rig.report.entry import entry
 
-LEFT_OUT = "left out"  # a move by hand that tells nothing
+LEFT_OUT = "omitted"  # a move by hand that tells nothing
 
 
 def omitted(outcome: Outcome) -> dict[str, tuple[OmittedEntry, ...]]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class DryRun:
     """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked.
 
     `model` is what the turner is called that it is for; None where its section does not say.
@@ -72,7 +72,7 @@ class Planned:
         return f"<plan: {_measured(self.plan)}{len(self.plan.motions)} motions, {self.duration_s:.1f} s>"
 
 
-def plan_document(planned: Planned) -> dict[str, Any]:
+def plan_document(planned: DryRun) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step."""
     from rig.report.attitude_account import account_document
     from rig.report.told_words import told_from_entries
@@ -91,14 +91,14 @@ def plan_document(planned: Planned) -> dict[str, Any]:
         document["stages"] = [{**asdict(stage), "indices": sorted(stage.indices)} for stage in plan.stages]
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
-    for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
+    for key, by_sensor in (("detection_limits", told.rates), ("acceleration_detection_limits", told.accelerations)):
         if by_sensor:
             found = {name: told_from_entries(each) for name, each in by_sensor.items()}
             document[key] = {name: [each.model_dump() for each in entries] for name, entries in found.items()}
     return document
 
 
-def print_plan(planned: Planned, *, as_json: bool) -> None:
+def print_plan(planned: DryRun, *, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
         print(json.dumps(plan_document(planned), indent=2, allow_nan=False))
@@ -108,7 +108,7 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
     _print_told(planned, console)  # which takes longer to find than the steps
 
 
-def _print_steps(planned: Planned, console: Console) -> None:
+def _print_steps(planned: DryRun, console: Console) -> None:
     """Every step, how long it all takes, and what is doubtful about it."""
     plan = planned.plan
     table = Table(
@@ -147,7 +147,7 @@ def _print_steps(planned: Planned, console: Console) -> None:
         console.print(f"Note: {doubt}")
 
 
-def _print_told(planned: Planned, console: Console) -> None:
+def _print_told(planned: DryRun, console: Console) -> None:
     """What the attitudes tell of accelerometers, and the checks of damage."""
     from rig.report.attitude_account import print_account
 
@@ -178,7 +178,7 @@ def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Tab
     for name in by_sensor:
         table.add_column(plain(name), justify="right")
     sizes = [
-        {each.what: size_words(each.size, each.unit) for each in told_from_entries(found)}
+        {each.fault: size_words(each.size, each.unit) for each in told_from_entries(found)}
         for found in by_sensor.values()
     ]
     for happens in dict.fromkeys(happens for found in sizes for happens in found):

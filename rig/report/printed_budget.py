@@ -59,8 +59,8 @@ def printed_budget(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> P
     """The budget with the largest shares first, all negligible lines in one, and what makes up a bias in that unit."""
     places = shown_places(budget, scale)
     sizes = [_Size.of(budget.std[places[0]], 1.0, ""), _Size.of(budget.std[places[1]], 1 / bias.size, bias.name)]
-    lines = sorted(budget.contributors, key=lambda line: -max(line.share[place] for place in places))
-    kept = [line for line in lines if max(line.share[place] for place in places) >= NEGLIGIBLE]
+    lines = sorted(budget.contributors, key=lambda line: -max(line.variance_fraction[place] for place in places))
+    kept = [line for line in lines if max(line.variance_fraction[place] for place in places) >= NEGLIGIBLE]
     printed = [_line(line, places, sizes) for line in kept]
     if len(kept) < len(lines):
         small_ones = [line for line in lines if line not in kept]
@@ -114,8 +114,15 @@ def _line(line: ContributorEntry, places: tuple[int, int], sizes: Sequence[_Size
     stated = " (k = 2)" if line.distribution == "normal" else ""
     found = "found" if line.kind == "A" else "–"
     assumed = found if line.half_width is None else f"±{figures(line.half_width)} {line.unit}{stated}"
-    freedom = _uncounted(line) if line.freedom is None else freedom_text(line.freedom)
-    return Line(line.name, line.kind, line.distribution, assumed, freedom, _parts(line.std, line.share, places, sizes))
+    freedom = _uncounted(line) if line.degrees_of_freedom is None else freedom_text(line.degrees_of_freedom)
+    return Line(
+        line.name,
+        line.kind,
+        line.distribution,
+        assumed,
+        freedom,
+        _parts(line.std, line.variance_fraction, places, sizes),
+    )
 
 
 def _uncounted(line: ContributorEntry) -> str:

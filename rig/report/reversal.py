@@ -30,8 +30,8 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
     console = Console(highlight=False)
     for name, found in document.magnetometers.items():
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
-        scale = expanded(found.scale_std, found.scale_freedom)
-        own = expanded(found.bias_std_t, found.bias_freedom)
+        scale = expanded(found.scale_std, found.scale_degrees_of_freedom)
+        own = expanded(found.bias_std_t, found.bias_degrees_of_freedom)
         heading, widths = heading_of([*scale.factors, *own.factors]), [*scale.widths, *own.widths]
         console.print(scale_and_bias_table(title, FIELD, found.scale, found.bias_t, widths, heading=heading))
         for line in _lines(found):
@@ -45,7 +45,7 @@ def _lines(reversal: ReversalEntry) -> Iterator[str]:
     else:
         yield "the sensor's own on all axes: it is separated from the arm's field"
     felt = triple(np.divide(reversal.arm_field_t, FIELD.bias.size), "+.3f")
-    field = max(expanded(reversal.arm_field_std_t, reversal.arm_field_freedom).widths) / FIELD.bias.size
+    field = max(expanded(reversal.arm_field_std_t, reversal.arm_field_degrees_of_freedom).widths) / FIELD.bias.size
     yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"
     yield f"the runs agree: χ² {reversal.chi_square:.1f}, at most {reversal.limit:.1f}"
     for run in reversal.runs:
@@ -59,9 +59,9 @@ def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
         ReversalEntry, reversal.found, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],
         arm_field_std_t=std[3:],
-        scale_freedom=counted(scale),
-        bias_freedom=None if both is None else counted(both[:3]),
-        arm_field_freedom=None if both is None else counted(both[3:]),
+        scale_degrees_of_freedom=counted(scale),
+        bias_degrees_of_freedom=None if both is None else counted(both[:3]),
+        arm_field_degrees_of_freedom=None if both is None else counted(both[3:]),
         runs=tuple(map(_as_mounted, reversal.runs)),
     )  # fmt: skip
 
@@ -69,7 +69,7 @@ def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
 def _as_mounted(run: AsMounted) -> AsMountedEntry:
     solution = run.result.solution
     return entry(
-        AsMountedEntry, run, run.result.sensor, solution,
+        AsMountedEntry, run, run.result.sensor,
         started_utc=run.outcome.provenance.recorded.started_utc,
         bias_std_t=np.sqrt(np.diag(solution.covariance))[12:],
         bias_t=solution.bias,

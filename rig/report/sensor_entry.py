@@ -13,9 +13,9 @@ from rig.data.result_file import (
     BoardEntry,
     BoardSolutionEntry,
     EstimateEntry,
+    GyroscopeEntry,
     NonlinearityEntry,
     ObservationEntry,
-    SensorEntry,
     TimeBaseEntry,
     VectorEntry,
 )
@@ -36,25 +36,25 @@ from rig.report.hand_entry import by_hand_entry
 
 def sensor_entry(
     result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None, **more: Any
-) -> SensorEntry:
+) -> GyroscopeEntry:
     """Scale, bias and covariance by the chosen estimator; beside them the others, or the error each ends in.
 
     And what `more` there is to say. What a result does not have is left out.
     """
     solution, turns = result.solution, result.observations
     return entry(
-        SensorEntry, result.sensor, solution, result,
+        GyroscopeEntry, result.sensor, solution, result,
         role=role,
         model=MODEL,
         observations_used=solution.observations,
         covariance_order=PARAMETERS,
         covariance_units=RATE.parameter_units,
         observations=[
-            entry(ObservationEntry, turn, turn.average, joint=turn.joint_name, temperature_c=_warm(turn.average))
+            entry(ObservationEntry, turn, turn.average, temperature_c=_warm(turn.average))
             for turn in turns
         ],
         rests=[entry(AverageEntry, each, temperature_c=_warm(each)) for each in result.rests],
-        time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
+        time_bases=[entry(TimeBaseEntry, each) for each in result.time_bases],
         vector_model=_vector_or_error(result),
         six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
         algorithm_1=_estimate_or_error(result.algorithm_1, result.faults.get(ALGORITHM_1)),
@@ -79,7 +79,7 @@ def _uncertain(result: SensorResult) -> dict[str, Any]:
     if (explained := result.explained) is not None:
         found["bias_process"] = bias_process_entry(explained)
         found["speeds_rad_s"] = explained.seen.speeds_rad_s
-        found["loads_rad_s"] = explained.loads_rad_s
+        found["axis_rate_ranges_rad_s"] = explained.loads_rad_s
         if explained.nonlinearity is not None:
             found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:
@@ -91,7 +91,7 @@ def _uncertain(result: SensorResult) -> dict[str, Any]:
 
 def estimate_entry(solution: Estimate) -> EstimateEntry:
     """What every estimator's solution has."""
-    return entry(EstimateEntry, solution, observations_used=solution.observations)
+    return entry(EstimateEntry, solution)
 
 
 def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
@@ -107,9 +107,9 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     if result.explained is not None:
         more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
         if (angles := counted(of_angles(result))) is not None:
-            more |= {"non_orthogonality_freedom": angles[:3], "mounting_freedom": angles[3:]}
+            more |= {"non_orthogonality_degrees_of_freedom": angles[:3], "mounting_degrees_of_freedom": angles[3:]}
         if (felt := counted(of_sensitivity(result))) is not None:
-            more["g_sensitivity_freedom"] = felt
+            more["g_sensitivity_degrees_of_freedom"] = felt
     return vector_entry(outcome, **more)
 
 
@@ -126,7 +126,6 @@ def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: 
     return entry(
         VectorEntry, outcome,
         model=vector_model.MODEL,
-        observations_used=outcome.observations,
         matrix_covariance_order=vector_model.MATRIX_PARAMETERS,
         non_orthogonality_std_rad=angles[:3],
         non_orthogonality_order=("yz", "zx", "xy"),

@@ -73,9 +73,9 @@ def shortest_document(shortest: Shortest, section: ProcedureSection) -> dict[str
     shown = shortest.best or shortest.nearest
     return {
         "schema": "rig.shortest/1",
-        "wanted": {
+        "target_uncertainty": {
             **{size: _finite(getattr(shortest.wanted, size)) for size in SIZES},
-            "at_most_s": _finite(shortest.wanted.at_most_s),
+            "max_duration_s": _finite(shortest.wanted.at_most_s),
         },
         "reached": shortest.best is not None,
         "cannot_be_had": shortest.cannot_be_had,

@@ -5,7 +5,7 @@ import numpy as np
 from rig.data.motion_file import Item
 from rig.data.quantity import Quantity
 from rig.data.recorded_sensor import RecordedSensor
-from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureLineEntry
+from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
 from rig.estimation.over_temperature import COEFFICIENTS, OverTemperature, powers_at
 from rig.report.entry import counted, entry
 
@@ -28,8 +28,8 @@ def temperature_entry(
         bias=quantity.offset * polynomials.bias,
         covariance=np.outer(of_each, of_each) * polynomials.covariance,
         contributors=[
-            entry(TemperatureLineEntry, line,
-                  freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
+            entry(TemperatureContributorEntry, line,
+                  degrees_of_freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
                   std=np.sqrt(np.diag(at @ line.covariance @ at.T).clip(min=0.0)))
             for line in polynomials.lines
         ],

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from rig.data.quantity import Quantity
-from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureLineEntry
+from rig.data.temperature_entries import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
 from rig.estimation.over_temperature import GRADIENT, HYSTERESIS, LAG, NOISE, ORDER
 from rig.report.rounding import plus_minus
 
@@ -15,7 +15,7 @@ def shown_rows(entry: OverTemperatureEntry) -> Sequence[AtTemperatureEntry]:
     return entry.table[::EACH]
 
 
-def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureLineEntry]:
+def own_contributors(entry: OverTemperatureEntry) -> Sequence[TemperatureContributorEntry]:
     """What is uncertain about the polynomials alone, not about the calibration at the reference."""
     return [line for line in entry.contributors if line.name in (NOISE, ORDER, LAG, HYSTERESIS, GRADIENT)]
 

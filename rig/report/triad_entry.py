@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.attitudes import InAttitudes
 from rig.analysis.magnetic_field import MagnetometerResult
-from rig.data.accelerometer_entries import AccelerometerEntry, DwellEntry, InAttitudesEntry
+from rig.data.accelerometer_entries import AccelerationSolutionEntry, AccelerometerEntry, DwellEntry
 from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
 from rig.data.motion_file import Item
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
@@ -37,7 +37,7 @@ class Models(Generic[EntryT]):
     beside: type[Entry]
 
 
-OF_ACCELEROMETERS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, InAttitudesEntry)
+OF_ACCELEROMETERS = Models(ACCELERATION, AccelerometerEntry, DwellEntry, AccelerationSolutionEntry)
 OF_MAGNETOMETERS = Models(FIELD, MagnetometerEntry, FieldDwellEntry, FieldSolutionEntry)
 
 
@@ -61,7 +61,7 @@ def triad_entry(
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),
         dwells=[_dwell_entry(models, *each) for each in zip(dwells, left[0], left[1], strict=True)],
-        beside=result.beside.by_key(partial(_beside_entry, models), error_entry),
+        other_methods=result.beside.by_key(partial(_beside_entry, models), error_entry),
         **more,
     )  # fmt: skip
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
-from rig.data.result_file import SensorEntry
-from rig.data.result_types import WhenEntry
+from rig.data.result_file import GyroscopeEntry
+from rig.data.result_types import ConditionsEntry
 
 DEG = math.degrees(1)
 AS_STATED = ", as stated"
@@ -13,7 +13,7 @@ UNKNOWN = "a temperature that is not known"
 ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
 
 
-def when_words(when: WhenEntry) -> str:
+def when_words(when: ConditionsEntry) -> str:
     """The temperature at which, and the time over which, a value is a mean, in words."""
     began, ended = (datetime.fromisoformat(each) for each in (when.from_utc, when.to_utc))
     day = f"{began:%Y-%m-%d} "
@@ -28,7 +28,7 @@ def when_words(when: WhenEntry) -> str:
     return f"at {when.temperature_c:.1f} °C, {over}, in which it {went}"
 
 
-def warmth_words(when: WhenEntry | None) -> str:
+def warmth_words(when: ConditionsEntry | None) -> str:
     """What tells a temperature, in words; results of before, which do not say when, read it."""
     if when is not None and when.temperature_c is None:
         return "of which the item provided no temperature, and nobody stated one"
@@ -37,7 +37,7 @@ def warmth_words(when: WhenEntry | None) -> str:
     return "by the item's own thermometer, which is not calibrated"
 
 
-def warmth(when: WhenEntry, of: str = "") -> dict[str, float | None]:
+def warmth(when: ConditionsEntry, of: str = "") -> dict[str, float | None]:
     """A temperature, by what was read `of` the sensor then."""
     return {f"{of}{AS_STATED}" if when.temperature_stated else of: when.temperature_c}
 
@@ -47,14 +47,14 @@ def told_by(of: str) -> str:
     return of if of.endswith(AS_STATED) else f"{of}, by its own thermometer"
 
 
-def speed_words(sensor: SensorEntry) -> str:
+def speed_words(sensor: GyroscopeEntry) -> str:
     """The speeds of the sweeps, °/s, either way."""
     return ", ".join(f"±{DEG * speed:.1f}" for speed in sensor.speeds_rad_s)
 
 
-def load_words(sensor: SensorEntry) -> str | None:
+def load_words(sensor: GyroscopeEntry) -> str | None:
     """The rates with which a gyroscope's own axes were loaded, °/s; None where these are the speeds of the sweeps."""
-    loads, speeds = sensor.loads_rad_s, sensor.speeds_rad_s
+    loads, speeds = sensor.axis_rate_ranges_rad_s, sensor.speeds_rad_s
     if loads is None or not speeds:
         return None
     if all(_alike(low, speeds[0]) and _alike(high, speeds[-1]) for low, high in loads):

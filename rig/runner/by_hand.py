@@ -191,7 +191,7 @@ class HandSession:
     def _take(self, move: Move, now: Progress, face: Face) -> None:
         """A move counts, unless too much time passed in it for it to tell anything."""
         self._refused = 0
-        if now.moves[-1].kind == "left out":
+        if now.moves[-1].kind == "omitted":
             return
         before, turns = self._lay[-1] if self._lay else face, now.moves[-1].turns
         kind: Literal["flip", "turn"] = "flip" if before != face else "turn"

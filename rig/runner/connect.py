@@ -251,8 +251,8 @@ class Connector:
             course=Course(
                 section.from_c,
                 section.to_c,
-                section.gap_k,
-                section.both_ways,
+                section.max_step_k,
+                section.both_directions,
                 sets=[each for each in measured if self.resumed.done.issuperset(range(each.first, each.end))],
             ),
         )

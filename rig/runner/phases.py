@@ -224,7 +224,7 @@ class Run:
             self._ended(Failed(fault), advice)
             raise fault from error
         except OSError as error:
-            remedy = f"Mend that, then go on with: {self._going_on}"
+            remedy = f"Correct that, then go on with: {self._going_on}"
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
             self._ended(Failed(fault))
             raise fault from error

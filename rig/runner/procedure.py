@@ -347,7 +347,7 @@ class Rig:
             turner.rest(SETTLING_LOOK_S, watch)
         return True
 
-    def next_temperature(self, rest: Rest) -> bool:
+    def wait_for_next_temperature(self, rest: Rest) -> bool:
         """Stand still until the sensors are as warm as the next set wants them; False where the range is covered.
 
         Raises Refused `other_turner` where the procedure has no temperatures, Fault `range_not_reached`.
@@ -359,17 +359,17 @@ class Rig:
             return False
         with self._step(rest):
             warming.begin_waiting()
-            at_most_s = 60 * warming.section.patience_min
+            at_most_s = 60 * warming.section.timeout_min
             with self.devices.acquisition.standing():
                 due = self._wait(lambda: warming.is_due, at_most_s, lambda: self._watch(rest))
             if not due:
                 raise range_not_reached(
-                    missing, f"in {warming.section.patience_min:g} minutes the sensors did not become as warm as wanted"
+                    missing, f"in {warming.section.timeout_min:g} minutes the sensors did not become as warm as wanted"
                 )
         warming.begin_set()
         return True
 
-    def end_of_range(self) -> None:
+    def end_temperature_range(self) -> None:
         """Switch the heater off. Raises Fault `range_not_reached` where no set has covered a part of the range."""
         warming = self._temperatures()
         self._end_set()

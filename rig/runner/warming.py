@@ -83,8 +83,8 @@ class Warming:
     @property
     def _rate_k_s(self) -> float:
         """How fast a ramp may be: within the limit, and so that a set is made within a part of a gap."""
-        allowed_k_s = RAMP_SHARE * self.section.most_rate_k_per_min / 60
-        return min(allowed_k_s, SET_SHARE * self.section.gap_k / max(self.set_s, 1.0))
+        allowed_k_s = RAMP_SHARE * self.section.max_rate_k_per_min / 60
+        return min(allowed_k_s, SET_SHARE * self.section.max_step_k / max(self.set_s, 1.0))
 
     def check(self, time_s: float) -> None:
         """Look at the thermometers at that time of the controller's, and speak to the heater.
@@ -160,8 +160,8 @@ class Warming:
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:
         hottest = max(now_c, key=lambda name: now_c[name])
         too_hot = self.heater is not None and self.heater.heating is not None and self.heater.heating.cause == "too_hot"
-        if now_c[hottest] > self.section.hottest_c or too_hot:
-            limit_c = HEATER_LIMIT_C if too_hot else self.section.hottest_c
+        if now_c[hottest] > self.section.max_temperature_c or too_hot:
+            limit_c = HEATER_LIMIT_C if too_hot else self.section.max_temperature_c
             raise Fault(
                 "overheated",
                 f"{hottest} is at {now_c[hottest]:.1f} °C, and the limit is {limit_c:g} °C",
@@ -180,13 +180,13 @@ class Warming:
             return
         times_s, temperatures_c = np.array(seen).T
         k_per_min = 60 * float(np.polynomial.polynomial.polyfit(times_s - times_s[0], temperatures_c, 1)[1])
-        if abs(k_per_min) > self.section.most_rate_k_per_min:
+        if abs(k_per_min) > self.section.max_rate_k_per_min:
             raise Fault(
                 "too_fast",
                 f"the temperature of {name} changes by {k_per_min:+.1f} K/min, and at most "
-                f"{self.section.most_rate_k_per_min:g} K/min are allowed: what its thermometer says is then another "
+                f"{self.section.max_rate_k_per_min:g} K/min are allowed: what its thermometer says is then another "
                 "temperature than that of what moves in it",
-                "Heat or cool more slowly, or allow more (procedure.most_rate_k_per_min), then resume",
+                "Heat or cool more slowly, or allow more (procedure.max_rate_k_per_min), then resume",
             )
 
     def _heat(self, time_s: float, now_c: Mapping[str, float]) -> None:

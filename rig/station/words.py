@@ -111,7 +111,7 @@ def _of_the_outcome(event: RunEvent) -> str | None:
         case RunFolderWritten(folder):
             text = f"written: {folder}"
         case Advice(folder, command, repeats):
-            to_do = "to repeat refused sweeps" if repeats else "when it is mended, go on with"
+            to_do = "to repeat refused sweeps" if repeats else "when it is corrected, go on with"
             text = f"the data are kept in {folder}; {to_do}: {command}"
         case ListenerDropped(listener, error):
             text = f"{listener} hears nothing more of this run: it failed ({error})"

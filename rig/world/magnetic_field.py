@@ -94,5 +94,5 @@ def magnetic_field_of(section: SiteSection, iron: Sequence[IronSection] = ()) ->
 
 
 def _dipole(section: IronSection) -> Dipole:
-    x, y, z = (1e-3 * each for each in section.place_mm)
+    x, y, z = (1e-3 * each for each in section.position_mm)
     return Dipole(LINKS.index(section.carried_by), (x, y, z), section.moment_a_m2)

@@ -74,7 +74,7 @@ class Operator:
         if say == "lay" and face == self._hand.face and not again:
             self._told = None
             return
-        thought_s = float(self._mind.uniform(*self._section.thinks_s))
+        thought_s = float(self._mind.uniform(*self._section.reaction_time_s))
         mistake = self._mistake(say)
         action: Action = Flip(face, mistake) if say == "lay" else Turn(int(turns), mistake)
         self._told = action, max(self.time_s, self._hand.lies_from_s) + thought_s

@@ -47,15 +47,15 @@ def solved(capsys: pytest.CaptureFixture[str], files: Sequence[Path], *options: 
     document = json.loads(capsys.readouterr().out)
     assert document["schema"] == "rig.result/1"
     parts = {}
-    for rate in document["sensors"].values():
+    for rate in document["gyroscopes"].values():
         earth = rate["in_attitudes"]["earth_rate_rad_s"]
         told = [rate["vector_model"]["matrix"], earth, np.negative(rate["bias_rad_s"]), []]
         parts["rate"] = told, rate["in_attitudes"]
     for at_rest in document.get("accelerometers", {}).values():
         told = [at_rest["matrix"], at_rest["reference_m_s2"], at_rest["bias_m_s2"], at_rest["second_order_s2_m"] or []]
-        parts["acceleration"] = told, at_rest["laid_down"]
+        parts["acceleration"] = told, at_rest["placement"]
     for at_rest in document.get("magnetometers", {}).values():
-        parts["field"] = [at_rest["matrix"], at_rest["field_base_t"], at_rest["bias_t"], []], at_rest["laid_down"]
+        parts["field"] = [at_rest["matrix"], at_rest["field_base_t"], at_rest["bias_t"], []], at_rest["placement"]
     found = {}
     for quantity, (told, known) in parts.items():
         theta = np.concatenate([np.ravel(each) for each in told])
@@ -112,16 +112,16 @@ def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = on_another_clock(tmp_path, late_s=-731.25, fast=4e-4)
-    assert main([*solve(files, "--find-clock"), "--json"]) == 0
+    assert main([*solve(files, "--estimate-clock-offset"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    rate = found["sensors"]["imu"]
+    rate = found["gyroscopes"]["imu"]
     (clock,) = rate["time_bases"]
     read_s = clock["reference_board_s"]
     off_s = read_s + clock["offset_s"] - (read_s + 731.25) / (1 + 4e-4)
     assert abs(off_s) < 4 * clock["offset_std_s"] < 1e-3
     assert abs(clock["drift"] + 4e-4) < 4 * clock["drift_std"] + 4e-7
     assert np.allclose(rate["vector_model"]["matrix"], GYRO_MATRIX, atol=1e-4)
-    assert main(solve(files, "--find-clock", "--all")) == 0
+    assert main(solve(files, "--estimate-clock-offset", "--all")) == 0
     assert "the samples' clock on the table's: +731." in capsys.readouterr().out
 
 
@@ -134,16 +134,16 @@ def test_the_papers_gyroscope_is_found_without_its_rates(capsys: pytest.CaptureF
 @pytest.mark.slow
 def test_quaternions_alone_tell_the_clock_and_the_sensor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = on_another_clock(tmp_path, late_s=12.5, fast=0.0, rates=False)
-    assert main([*solve(files, "--find-clock"), "--json"]) == 0
-    rate = json.loads(capsys.readouterr().out)["sensors"]["imu"]["vector_model"]
+    assert main([*solve(files, "--estimate-clock-offset"), "--json"]) == 0
+    rate = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]["vector_model"]
     std = np.sqrt(np.diag(rate["matrix_covariance"]))
     assert (np.abs(np.ravel(rate["matrix"]) - np.ravel(GYRO_MATRIX)) < 4 * std[:9]).all()
 
 
 def test_a_file_of_stops_alone_tells_no_clock(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(solve([EXAMPLES / SWINGING[0], EXAMPLES / STILL[1]], "--find-clock")) == 2
+    assert main(solve([EXAMPLES / SWINGING[0], EXAMPLES / STILL[1]], "--estimate-clock-offset")) == 2
     assert "time_base_not_found: of 16 rows 0 follow another" in capsys.readouterr().err
-    assert main(solve(example(STILL), "--find-clock")) == 2
+    assert main(solve(example(STILL), "--estimate-clock-offset")) == 2
     assert "wrong_columns: the samples contain no turn rate" in capsys.readouterr().err
 
 

@@ -73,7 +73,7 @@ def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | 
     scale, std = in_unit(found.solution)
     assert (np.abs(scale - BY_INTEGRAL) < 2 * 2 * std[:3]).all(), (scale, 2 * std)
     assert (2 * std[:3] < 2e-3).all(), "and it says something"
-    assert found.solution.clock_s == pytest.approx(4.1e-3, abs=3e-4)  # as --find-clock finds it
+    assert found.solution.clock_s == pytest.approx(4.1e-3, abs=3e-4)  # as --estimate-clock-offset finds it
     assert isinstance(found.solution.earth, Fault), "nobody sees the Earth's rate by a hand-held phone's gyroscope"
 
 
@@ -164,7 +164,7 @@ def test_a_gap_in_the_samples_costs_its_windows_alone(tmp_path: Path, capsys: py
     spoilt = (followed.time_s > 10) & (followed.time_s < 10.5)
     files = write(tmp_path, replace(followed, time_s=followed.time_s[~spoilt], readings=followed.readings[~spoilt]))
     rate = document(capsys, files)
-    (left_out,) = rate["in_attitudes"]["followed"]["left_out"]
+    (left_out,) = rate["in_attitudes"]["by_increments"]["omitted"]
     assert left_out["error"] == "lost_samples" and left_out["count"] <= 3
     assert main(command(files, "--all")) == 0
     assert "increments, lost_samples, for up to 0.5" in " ".join(capsys.readouterr().out.split())
@@ -280,5 +280,5 @@ def command(files: list[Path], *options: str) -> list[str]:
 def document(capsys: pytest.CaptureFixture[str], files: list[Path], *options: str) -> dict[str, Any]:
     """What is said of the gyroscope for machines."""
     assert main([*command(files, *options), "--json"]) == 0
-    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     return rate

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
@@ -151,8 +151,8 @@ def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it
 @pytest.mark.slow
 def test_every_recording_of_a_run_is_held_against_its_computer_and_the_worst_is_told() -> None:
     whole = recorded(FAST, 1.0, REAL)
-    assert named(calibrated([whole]).checks)["controller_and_computer"].passed
-    both = calibrated(in_two(whole))
+    assert named(calibrate([whole]).checks)["controller_and_computer"].passed
+    both = calibrate(in_two(whole))
     check = named(both.checks)["controller_and_computer"]
     assert not check.passed and check.value == pytest.approx(200, abs=5)
     assert both.clock is not None and abs(both.clock.error) < 5 * PPM  # speeds go by the longest
@@ -166,7 +166,7 @@ def test_a_board_that_says_it_follows_no_crystal_is_compared_with_nothing_howeve
 
 @pytest.mark.slow
 def test_clocks_are_in_the_verdict() -> None:
-    found = calibrated([recorded(with_crystal(500), 0.2)])
+    found = calibrate([recorded(with_crystal(500), 0.2)])
     checks = named(found.checks)
     assert {name for name, check in checks.items() if not check.passed} == {"controller_and_crystal"}
     assert found.clock is not None and len(found.clock.comparisons) == 1

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.check import Check
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
@@ -201,7 +201,7 @@ def test_an_undamaged_run_raises_no_alarm(thorough: bool) -> None:
 def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     """Which of the two about one axis it was cannot be told where there are only two."""
     run = offset(0.02, sweep_2)(readings_of(Setup(noise_rad_s=0.005))).recording()
-    outcome = calibrated([run])
+    outcome = calibrate([run])
     assert not outcome.passed
     named = [check.name for check in outcome.checks if check.means.sweep is not None]
     assert named == ["gyro.disturbed_sweep.2", "gyro.disturbed_sweep.3"]

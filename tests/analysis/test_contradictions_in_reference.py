@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from rig.analysis.acceleration import calibrate_accelerometers
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import observe_recordings
 from rig.analysis.contradictions import disturbed_sweeps
 from rig.errors import Fault
@@ -150,14 +150,14 @@ def test_a_sensor_that_is_no_more_bent_than_its_data_sheet_says_is_within_its_un
 
 
 def test_the_disturbed_dwell_is_named_and_fails_the_verdict() -> None:
-    outcome = calibrated([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()])
+    outcome = calibrate([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()])
     assert not outcome.passed
     assert [check.name for check in outcome.checks if not check.passed] == ["gyro.acceleration_disturbed_dwell.15"]
 
 
 def test_a_sweep_that_only_the_accelerometer_feels_to_be_disturbed_is_repeated_as_one_of_a_gyroscope_is() -> None:
     run = offset(0.02, sweep_4)(readings_of(IMU, "gyro")).recording()
-    failed = {check.name: check.means.sweep for check in calibrated([run]).checks if not check.passed}
+    failed = {check.name: check.means.sweep for check in calibrate([run]).checks if not check.passed}
     assert failed == {"gyro.acceleration_disturbed_sweep.4": 4, "gyro.acceleration_residuals": None}
     assert disturbed_sweeps([run]) == {4}
     assert disturbed_sweeps([offset(0.02, dwell_3)(readings_of(IMU, "gyro")).recording()]) == frozenset()
@@ -166,7 +166,7 @@ def test_a_sweep_that_only_the_accelerometer_feels_to_be_disturbed_is_repeated_a
 def test_a_bias_that_drifts_contradicts_nothing_where_it_is_watched() -> None:
     drifting = told_of(recorded("bias_drift"))
     assert "gyro.acceleration_bias_changed" in {check.name for check in drifting.checks}
-    outcome = calibrated([recorded("bias_drift")], drifting=True)
+    outcome = calibrate([recorded("bias_drift")], drifting=True)
     names = {check.name for check in outcome.checks}
     assert "gyro.acceleration_bias_changed" not in names and "gyro.acceleration_scale_changed" in names
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import EARTH_RATE, SensorResult
 from rig.config.load import ConfigurationRefused, load
 from rig.data.settings import settings_from_json
@@ -21,7 +21,7 @@ FIND = replace(SETUP, procedure=(("earth_rate", "find"),))
 
 
 def solved(setup: Setup) -> SensorResult:
-    return calibrated([synthetic_run(setup)]).results["gyro"]
+    return calibrate([synthetic_run(setup)]).results["gyro"]
 
 
 @pytest.mark.slow

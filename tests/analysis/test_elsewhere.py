@@ -118,7 +118,7 @@ def test_the_notebook_and_rig_solve_find_the_same_numbers(
     example, folder = kept
     document = read_result(folder / "run")
     result = rig.solve(rig.load(folder / "run"))
-    entries = [*document.sensors.values(), *document.accelerometers.values(), *document.magnetometers.values()]
+    entries = [*document.gyroscopes.values(), *document.accelerometers.values(), *document.magnetometers.values()]
     assert len(result) == len(entries) == len(example.kinds)
     for found, stated in zip(result.values(), entries, strict=True):
         np.testing.assert_allclose(found.scale, stated.scale, rtol=1e-12)  # type: ignore[union-attr]

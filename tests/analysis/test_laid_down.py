@@ -90,7 +90,7 @@ def test_rows_in_which_the_body_moves_are_left_out(tmp_path: Path, capsys: pytes
     rows = np.column_stack([starts_s, starts_s + 0.05, laid.rows[row, 2:]])
     dense = Laid(laid.time_s, laid.readings, rows, laid.matrix, laid.bias)
     found = solved(capsys, *write(tmp_path, dense))
-    assert len(found["dwells"]) == 18 and found["laid_down"]["rows_left_out"] > 100
+    assert len(found["dwells"]) == 18 and found["placement"]["rows_omitted"] > 100
     assert (np.abs(off(found, laid)) < 3.5).all()
     files = tmp_path / "samples.csv", tmp_path / "attitudes.csv"
     assert main(["solve", str(files[0]), "--attitudes", str(files[1]), "--all"]) == 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.analyses import calibrated, verified, verified_alone
+from rig.analysis.analyses import calibrate, verify_calibration, verify_stored_calibrations
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault, Refused
 from rig.estimation.vector_fit import explain
@@ -46,8 +46,8 @@ def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
 def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
     with calls(ArmMotion.__init__, estimate_time_base, observe_sensor, explain) as counted:
-        calibration = calibrated(runs)
-        outcome = verified(calibration, repeated)
+        calibration = calibrate(runs)
+        outcome = verify_calibration(calibration, repeated)
     assert calibration.passed and outcome.passed
     assert counted == {
         "ArmMotion.__init__": 2,  # one for each recording
@@ -60,7 +60,7 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
 
 @pytest.mark.slow
 def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> None:
-    (recording,) = calibrated([recorded("run.h5")]).recordings
+    (recording,) = calibrate([recorded("run.h5")]).recordings
     late, none = recording.delay("gyro", behind="reference"), recording.delay("gyro", behind="gyro")
     assert late is not None and none is not None
     assert 5 * late.std_s < 1e-4 and 1e-3 < late.delay_s < 3e-3  # of the filters of the two parts
@@ -70,20 +70,20 @@ def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> Non
 @pytest.mark.slow
 def test_a_recording_without_sweeps_is_refused_by_name() -> None:
     with pytest.raises(Fault, match="too_few_observations: no finished sweep"):
-        calibrated([replace(recorded("run.h5"), events=())])
+        calibrate([replace(recorded("run.h5"), events=())])
 
 
 @pytest.mark.slow
 def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:
     with calls(observe_sensor) as counted, pytest.raises(Refused, match="unknown_estimator"):
-        calibrated([recorded("run.h5")], estimator="newtun")
+        calibrate([recorded("run.h5")], estimator="newtun")
     assert not counted
 
 
 @pytest.mark.slow
 def test_stored_calibrations_are_verified_alone() -> None:
     repeated = [recorded("verify.h5")]
-    outcome = verified_alone(repeated)
+    outcome = verify_stored_calibrations(repeated)
     assert outcome.passed and list(outcome.verifications) == ["gyro"]
     assert not outcome.results and not outcome.recordings
     assert outcome.provenance.verified_utc == (repeated[0].provenance.started_utc,)
@@ -91,5 +91,5 @@ def test_stored_calibrations_are_verified_alone() -> None:
 
 @pytest.mark.slow
 def test_a_verification_that_was_not_recorded_has_not_passed() -> None:
-    outcome = verified(calibrated([recorded("run.h5")]), [])
+    outcome = verify_calibration(calibrate([recorded("run.h5")]), [])
     assert not outcome.passed and not outcome.verifications

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import SensorResult
 from rig.config.sensor_catalogue import PARTS
 from rig.data.quantity import RATE, TEMPERATURE
@@ -28,7 +28,7 @@ SPEED_RAD_S = np.pi / 3
 
 @cache
 def solved(setup: Setup) -> SensorResult:
-    return calibrated([synthetic_run(setup)]).results["gyro"]
+    return calibrate([synthetic_run(setup)]).results["gyro"]
 
 
 def stated(result: SensorResult) -> Budget:
@@ -78,8 +78,8 @@ def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one() 
     """So far from a ramp in time that a walk of the bias would not make much of it."""
     setup = Setup(noise_rad_s=3e-4)
     warmed = _warmed(synthetic_run(setup), 40, bias_rad_s_per_k=2e-3)
-    found = stated(calibrated([warmed]).results["gyro"])
-    unseen = stated(calibrated([_thermometer_broken(warmed)]).results["gyro"])
+    found = stated(calibrate([warmed]).results["gyro"])
+    unseen = stated(calibrate([_thermometer_broken(warmed)]).results["gyro"])
     assert found.of("bias instability")[3:].max() < 0.3 * unseen.of("bias instability")[3:].max()
 
 
@@ -106,7 +106,7 @@ def test_a_ramp_that_a_step_of_the_thermometer_hides_is_no_walk_of_the_bias() ->
     assert known is not None
     said_of = (known.model_copy(update={"bias_deg_s_k": {"gyro": said}}) for said in (PARTS[part].bias_deg_s_k, 0.0))
     found, without = (
-        calibrated([replace(ramp, settings=replace(ramp.settings, uncertainty=each))]).results["gyro"]
+        calibrate([replace(ramp, settings=replace(ramp.settings, uncertainty=each))]).results["gyro"]
         for each in said_of
     )
     assert (np.abs(found.bias_rad_s - setup.bias_rad_s) < stated(found).expanded[3:]).all()

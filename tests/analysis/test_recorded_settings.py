@@ -5,7 +5,7 @@ from pathlib import Path
 
 import h5py
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.run_file import RunData, read_run
 from support.paths import RECORDINGS
 
@@ -16,10 +16,10 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
     changed = Path(shutil.copy(RECORDING, tmp_path))
     with h5py.File(changed, "r+") as file:
         file.attrs["config"] = file.attrs["config"].replace("rest_s:", "pause_s:") + "\nlighting: {colour: red}\n"
-    assert calibrated([read_run(changed)]).checks == calibrated([read_run(RECORDING)]).checks
+    assert calibrate([read_run(changed)]).checks == calibrate([read_run(RECORDING)]).checks
 
 
 def test_another_limit_gives_another_verdict() -> None:
     run: RunData = read_run(RECORDING)
-    assert calibrated([run]).passed
-    assert not calibrated([run.judged_by(["limits.scale_std=1e-6"])]).passed
+    assert calibrate([run]).passed
+    assert not calibrate([run.judged_by(["limits.scale_std=1e-6"])]).passed

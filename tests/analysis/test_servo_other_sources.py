@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.estimation.arrays import Array
 from support.drawn_servo import Source, drawn_servo
 from support.servo_other_sources import by_autopilot, by_lines
@@ -16,7 +16,7 @@ QUICK = ("turner.state_rate_hz=100", "procedure.speed_deg_s=150", "procedure.res
 def off(source: Source, seed: int) -> Array:
     """(6,) errors of scale and bias by their combined u, of a run whose checks are passed."""
     drawn = drawn_servo(seed, QUICK, noise_rad_s=NOISE_RAD_S, source=source)
-    outcome = calibrated(drawn.runs, "newton")
+    outcome = calibrate(drawn.runs, "newton")
     assert not [check.name for check in outcome.checks if not check.passed]
     result = outcome.results["gyro"]
     assert result.uncertainty is not None

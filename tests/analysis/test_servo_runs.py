@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
 from rig.estimation.arrays import Array
 from rig.estimation.budget import AXES, MOUNTS
@@ -29,7 +29,7 @@ class Ran:
 
 def ran(seed: int, *overrides: str, noise_rad_s: float = 0.035) -> Ran:
     drawn = drawn_servo(seed, overrides, noise_rad_s=noise_rad_s)
-    outcome = calibrated(drawn.runs, "newton")
+    outcome = calibrate(drawn.runs, "newton")
     result = outcome.results["gyro"]
     assert result.uncertainty is not None
     error = np.array([*(result.scale - drawn.scale), *(result.bias_rad_s - drawn.bias_rad_s)])

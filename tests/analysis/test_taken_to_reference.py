@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
 from rig.analysis.over_temperature import taken_to_reference
 from rig.data.quantity import ACCELERATION, RATE
@@ -40,7 +40,7 @@ def warmed() -> RunData:
 
 @pytest.fixture(scope="module")
 def outcome(warmed: RunData) -> Outcome:
-    return calibrated([warmed])
+    return calibrate([warmed])
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ def off(found: Estimate, session: Session) -> Array:
 
 def document(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     assert main(["solve", *map(str, arguments), "--json"]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     return found
 
 
@@ -78,8 +78,10 @@ def test_real_turns_by_hand_tell_as_much_as_they_can(
     expanded = 2 * np.sqrt(np.diag(found["covariance"]))[:3]
     assert (np.abs(np.array(found["scale"]) - [0.9728, 1.0179, 1.0017]) < 0.5 * expanded).all()
     assert (expanded > 1e-3).all() and (expanded < 5e-3).all()
-    assert (found["estimator"], found["turned"]["rows"]) == ("increments", [7, 8, 9])
-    freedom = {line["name"]: line["freedom"] for line in found["budget"]["contributors"] if line["kind"] == "A"}
+    assert (found["estimator"], found["by_angles"]["rows"]) == ("increments", [7, 8, 9])
+    freedom = {
+        line["name"]: line["degrees_of_freedom"] for line in found["budget"]["contributors"] if line["kind"] == "A"
+    }
     assert freedom["bias from rest to rest"] >= 3 and freedom["noise"] > 1000
     by_means = document(capsys, *files, "--estimator", "vector")
     assert (2 * np.sqrt(np.diag(by_means["covariance"]))[:3] > 0.1).all(), "how it was before"
@@ -127,7 +129,7 @@ def test_a_sweep_at_constant_speed_stays_a_mean(tmp_path: Path, capsys: pytest.C
             row[5] = np.linalg.norm(rates[inside].mean(axis=0)) * np.ptp(row[:2])
     samples, sweeps = write(tmp_path, replace(session, rows=rows))
     found = document(capsys, samples, "--sweeps", sweeps)
-    assert (found["estimator"], found["turned"], len(found["observations"])) == ("vector", None, 6)
+    assert (found["estimator"], found["by_angles"], len(found["observations"])) == ("vector", None, 6)
     assert main(["solve", str(samples), "--sweeps", str(sweeps), "--estimator", "increments"]) == 2
     assert "no_turns" in capsys.readouterr().err
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.run_file import read_run
 from support.paths import RECORDINGS
 
@@ -20,7 +20,7 @@ def failed(stamp_std_s: float | None) -> set[str]:
     samples["board_time_us"] = np.rint(time_us + 1e6 * WANDERS_S * np.sin(2e-6 * np.pi * time_us / IN_S))
     late = replace(run, samples=run.samples | {"imu": samples})
     late = replace(late, sensors=run.sensors | {"imu": replace(sensor, stamp_std_s=stamp_std_s)})
-    outcome = calibrated([late], "newton")
+    outcome = calibrate([late], "newton")
     np.testing.assert_allclose(outcome.results["imu"].scale, [1.011, 0.993, 1.006], atol=1e-4)
     return {check.name for check in outcome.checks if not check.passed}
 

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import SensorResult
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
@@ -35,7 +35,7 @@ CURVED = Setup(
 
 @cache
 def solved(setup: Setup) -> SensorResult:
-    return calibrated([synthetic_run(setup)]).results["gyro"]
+    return calibrate([synthetic_run(setup)]).results["gyro"]
 
 
 def skew_deg(result: SensorResult) -> tuple[float, float]:

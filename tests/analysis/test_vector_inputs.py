@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from support.synthetic_run import Setup, synthetic_run, truth
 
 SETUP = Setup(noise_rad_s=0.005)
@@ -19,7 +19,7 @@ def test_a_resumed_recording_begins_after_the_last_one_ended_whatever_the_comput
     first, again = synthetic_run(SETUP), synthetic_run(replace(SETUP, seed=2))
     started = datetime.fromisoformat(first.provenance.started_utc) + timedelta(seconds=later_s)
     again = replace(again, provenance=replace(again.provenance, started_utc=started.isoformat()))
-    result = calibrated([first, again]).results["gyro"]
+    result = calibrate([first, again]).results["gyro"]
     assert result.explained is not None and result.uncertainty is not None
     windows = result.explained.seen.windows_s
     windows = windows[np.argsort(windows[:, 0])]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import observe_recordings
 from rig.analysis.read_when import of_gyroscope
 from rig.data.channel import of_stated_temperature
@@ -58,8 +58,8 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_o
 
 @pytest.mark.slow
 def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
-    document = document_of(calibrated([warming(synthetic_run(Setup()))]))
-    sensor = document.sensors["gyro"]
+    document = document_of(calibrate([warming(synthetic_run(Setup()))]))
+    sensor = document.gyroscopes["gyro"]
     assert sensor.scale_at is not None and sensor.bias_at is not None
     assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
     low, high = sensor.bias_at.temperature_range_c or (0.0, 0.0)
@@ -84,8 +84,8 @@ def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
-    document = document_of(calibrated([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
-    sensor = document.sensors["gyro"]
+    document = document_of(calibrate([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
+    sensor = document.gyroscopes["gyro"]
     assert sensor.bias_at is not None and sensor.bias_at.temperature_stated and sensor.temperature_c == 22.0
     assert when_words(sensor.bias_at).startswith("at 22.0 °C, as stated, mean over")
     certificate = certificate_of(document, Stated())
@@ -99,10 +99,10 @@ def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_s
 @pytest.mark.slow
 def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
     run = open_run(RECORDINGS / "imu").movement[0]
-    result = calibrated([warming(run)])
+    result = calibrate([warming(run)])
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
-    assert entry.found_at is not None and entry.temperature_c is not None
-    assert entry.temperature_c == pytest.approx(entry.found_at.temperature_c)
+    assert entry.conditions is not None and entry.temperature_c is not None
+    assert entry.temperature_c == pytest.approx(entry.conditions.temperature_c)
     dwells_c, own = [dwell.temperature_c for dwell in found.dwells], found.movement.own
     assert own is not None and abs(entry.temperature_c - float(np.mean(dwells_c))) > 0.1
     np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))
@@ -120,17 +120,17 @@ def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
 @pytest.mark.slow
 def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> None:
     lean = np.radians(12)
-    result = calibrated([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
+    result = calibrate([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
     explained = result.results["gyro"].explained
     assert explained is not None
     upright, *leaning = np.degrees(explained.loads_rad_s).tolist()
     assert upright == pytest.approx([60, 60], rel=1e-3)  # what turns it across that axis tells nothing of it
     for each in leaning:
         assert each == pytest.approx([60 * float(np.cos(lean))] * 2, rel=2e-3)
-    assert load_words(document_of(result).sensors["gyro"]) == "x 60.0, y 58.7, z 58.7"
+    assert load_words(document_of(result).gyroscopes["gyro"]) == "x 60.0, y 58.7, z 58.7"
 
 
 @pytest.mark.slow
 def test_upright_axes_are_loaded_with_the_speed_of_the_sweeps_and_nothing_is_said() -> None:
-    result = calibrated([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
-    assert load_words(document_of(result).sensors["gyro"]) is None
+    result = calibrate([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
+    assert load_words(document_of(result).gyroscopes["gyro"]) is None

@@ -37,7 +37,7 @@ def test_a_series_goes_through_its_list_without_questions(tmp_path: Path) -> Non
     whys = [each["why"].split(":")[0] for each in found]
     assert whys == ["", "G-001 is done", "no_port", "", "same_chip"]
     result = json.loads((out / found[0]["folder"] / "result.json").read_text(encoding="utf-8"))
-    assert result["sensors"]["gyro"]["serial_number"] == "G-001"
+    assert result["gyroscopes"]["gyro"]["serial_number"] == "G-001"
     assert found[0]["certificate"] in (out / found[0]["folder"] / "certificate.html").read_text(encoding="utf-8")
     assert found[0]["certificate"] in (out / "labels" / "01-G-001.txt").read_text(encoding="utf-8")
     assert {each.name for each in out.glob("0*")} == {"01-G-001", "04-G-004"}  # nothing was measured of the others

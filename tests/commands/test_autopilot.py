@@ -38,12 +38,12 @@ def result(folder: Path) -> Path:
     """A result that passed, as of the autopilot's IMU."""
     frozen = ROOT / "tests" / "fixtures" / "recordings" / "imu" / "result.json"
     document = json.loads(frozen.read_text(encoding="utf-8"))
-    for kind in ("sensors", "accelerometers"):
+    for kind in ("gyroscopes", "accelerometers"):
         (entry, *_) = document[kind].values()
-        entry |= {"part": "mavlink", "serial_number": "FC-1", "role": "calibrate"} if kind == "sensors" else {
+        entry |= {"part": "mavlink", "serial_number": "FC-1", "role": "calibrate"} if kind == "gyroscopes" else {
             "part": "mavlink", "serial_number": "FC-1"}  # fmt: skip
         document[kind] = {"imu": entry}
-    document["sensors"]["imu"]["range_rad_s"] = radians(2000)
+    document["gyroscopes"]["imu"]["range_rad_s"] = radians(2000)
     document["verdict"] = "pass"
     path = folder / "result.json"
     path.write_text(json.dumps(document), encoding="utf-8")
@@ -77,7 +77,7 @@ def test_a_calibration_is_stored_and_the_old_one_comes_back_bit_by_bit(tmp_path:
         done = rig_here("autopilot", "store", config, found, "--old", kept, "--yes")
         assert done.returncode == 0, done.stderr
         assert f"{STORED} parameters, the new ones" in done.stdout and "scale factors and axes" in done.stdout
-        bias = json.loads(found.read_text(encoding="utf-8"))["sensors"]["imu"]["bias_rad_s"]
+        bias = json.loads(found.read_text(encoding="utf-8"))["gyroscopes"]["imu"]["bias_rad_s"]
         offsets = [wire.parameters[f"INS_GYROFFS_{axis}"] for axis in "XYZ"]
         assert offsets == np.negative(bias).astype(np.float32).tolist() and wire.parameters["INS_GYR_CAL"] == 0
         assert rig_here("autopilot", "restore", config, kept, "--yes").returncode == 0

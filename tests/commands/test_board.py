@@ -74,7 +74,7 @@ def result(folder: Path, **changes: Any) -> Path:
     }
     entries["gyro"] |= changes
     folder.mkdir(exist_ok=True)
-    document = json.loads(VERIFIED.text()) | {"sensors": entries}
+    document = json.loads(VERIFIED.text()) | {"gyroscopes": entries}
     (folder / "result.json").write_text(json.dumps(document))
     return folder
 
@@ -245,7 +245,7 @@ def test_a_missing_part_and_another_part_in_its_place_are_named(laboratory: Worl
 
 def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: WorldHandle, tmp_path: Path) -> None:
     section = SensorSection.model_validate(SENSORS["gyro"])
-    found = read_result(result(tmp_path)).sensors["gyro"]
+    found = read_result(result(tmp_path)).gyroscopes["gyro"]
     with Board(laboratory.board_port, 921600, lambda batch: None) as board:
         board.configure(0, section.rate_hz, section.range_deg_s)
         store(board, 0, calibration_of(found))
@@ -263,7 +263,7 @@ def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: W
 def test_check_names_what_a_verification_lacks(config: Path) -> None:
     limits = ("limits.verification_rms_rad_s=1", "limits.verification_mean_rad_s=1", "procedure.name=verify")
     done = commands.rig("check", config, *(word for each in limits for word in ("--set", each)))
-    assert done.returncode == 2 and done.stdout.endswith("not ready: 2 to mend\n"), done
+    assert done.returncode == 2 and done.stdout.endswith("not ready: 2 to correct\n"), done
     assert [line.split(": ")[1:3] for line in done.stderr.splitlines()] == [
         ["no_calibration", "sensors.gyro"],
         ["no_calibration", "sensors.other"],

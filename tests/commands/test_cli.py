@@ -124,7 +124,7 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
     assert set(found) == {"lsm9ds1", "mpu9250", "adis16465"}
     assert found["mpu9250"]["scale_std"] == pytest.approx(94e-6, rel=0.02)
     assert found["adis16465"]["second_order_std_s2_m"] < found["mpu9250"]["second_order_std_s2_m"]
-    told = {each["what"]: each for each in document["acceleration_told_from"]["adis16465"]}
+    told = {each["fault"]: each for each in document["acceleration_detection_limits"]["adis16465"]}
     assert "an even part, of v²/g" not in told, "it is found"
     assert told["another reading in one dwell"]["size"] < 0.004
 
@@ -197,12 +197,12 @@ def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tm
 @pytest.mark.slow
 def test_a_plan_says_what_its_checks_will_tell() -> None:
     document = json.loads(shell(f"{PLAN} --json").stdout)
-    told = {each["what"]: each for each in document["told_from"]["gyro"]}
+    told = {each["fault"]: each for each in document["detection_limits"]["gyro"]}
     assert told["all scale factors change half-way"]["check"] == "scale_changed"
     said = " ".join(shell(PLAN).stdout.split())
     assert "notice in 95 of 100 runs" in said and "another reading in one sweep" in said
-    twice = json.loads(shell(f"{PLAN} --json --set procedure.repeats=2").stdout)["told_from"]["gyro"]
-    assert all(each["size"] < told[each["what"]]["size"] for each in twice if "half-way" in each["what"])
+    twice = json.loads(shell(f"{PLAN} --json --set procedure.repeats=2").stdout)["detection_limits"]["gyro"]
+    assert all(each["size"] < told[each["fault"]]["size"] for each in twice if "half-way" in each["fault"])
 
 
 @pytest.mark.thorough

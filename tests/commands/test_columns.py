@@ -69,7 +69,7 @@ def log_of_a_table(folder: Path) -> Path:
 def solved(*arguments: str | Path) -> dict[str, list[float]]:
     done = rig_here("solve", *arguments, "--json")
     assert done.returncode == 0, done.stderr
-    (sensor,) = json.loads(done.stdout)["sensors"].values()
+    (sensor,) = json.loads(done.stdout)["gyroscopes"].values()
     return {name: sensor[name] for name in ("scale", "bias_rad_s")}
 
 

@@ -44,7 +44,7 @@ def runs(folder: Path) -> int:
 
 
 def scale(result: Document) -> None:
-    gyro = result["sensors"]["gyro"]
+    gyro = result["gyroscopes"]["gyro"]
     gyro["scale"][0] += 1e-3 * gyro["covariance"][0][0] ** 0.5  # a thousandth of what is stated of it
 
 
@@ -61,11 +61,11 @@ def kind(result: Document) -> None:
 
 
 def serial_number(result: Document) -> None:
-    result["sensors"]["gyro"]["serial_number"] = "G-9"
+    result["gyroscopes"]["gyro"]["serial_number"] = "G-9"
 
 
 def mean(result: Document) -> None:
-    result["sensors"]["gyro"]["observations"][2]["mean_rad_s"][1] += 1e-4
+    result["gyroscopes"]["gyro"]["observations"][2]["mean_rad_s"][1] += 1e-4
 
 
 def board(result: Document) -> None:
@@ -94,7 +94,7 @@ def test_a_result_that_its_recording_does_not_give_is_known_by_what_differs(
 
 @pytest.mark.slow
 def test_what_the_recording_gives_is_entered_and_a_claim_is_refused(folder: Path) -> None:
-    stated = read_result(folder).sensors["gyro"]
+    stated = read_result(folder).gyroscopes["gyro"]
     claims(folder, scale)
     imported = rig_here("history", "import", folder)
     assert imported.returncode == 1 and "result_not_of_recording" in imported.stderr and runs(folder) == 0

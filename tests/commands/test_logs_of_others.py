@@ -40,7 +40,7 @@ def in_brief(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     return " ".join(capsys.readouterr().out.split())
 
 
-def off_and_u(found: dict[str, Any], kind: str = "sensors") -> tuple[Array, Array]:
+def off_and_u(found: dict[str, Any], kind: str = "gyroscopes") -> tuple[Array, Array]:
     """How many U each scale factor is off (3,), and these."""
     entry = found[kind]["imu"]
     covariance = np.array(entry.get("covariance_combined") or entry["covariance"])
@@ -99,7 +99,7 @@ def test_clocks_that_count_from_1970_lose_no_digit(
     mapped = ("--columns", tmp_path / "columns.yaml")
     found = solved(capsys, tmp_path / "mine.csv", "--sweeps", tmp_path / "sweeps.csv", *mapped)
     plain = solved(capsys, *_interleave(write_rates(tmp_path, log)))
-    assert found["sensors"]["imu"]["scale"] == pytest.approx(plain["sensors"]["imu"]["scale"], abs=1e-9)
+    assert found["gyroscopes"]["imu"]["scale"] == pytest.approx(plain["gyroscopes"]["imu"]["scale"], abs=1e-9)
     assert f"times count from {epoch_s} s" in str(found["notes"])
 
 
@@ -196,7 +196,10 @@ def test_a_gentle_turn_that_cancels_the_bias_is_no_rest(
     files = write_rates(tmp_path, turned_slowly(mean_rad_s, np.array([bias_rad_s, 0.01, -0.005])), None, "angle_rad")
     found = solved(capsys, *_interleave(files))
     off, expanded = off_and_u(found)
-    assert found["sensors"]["imu"]["estimator"] == "increments" and len(found["sensors"]["imu"]["turned"]["rows"]) == 6
+    assert (
+        found["gyroscopes"]["imu"]["estimator"] == "increments"
+        and len(found["gyroscopes"]["imu"]["by_angles"]["rows"]) == 6
+    )
     assert (off < 1.6).all() and (expanded < 2e-3).all()
 
 
@@ -327,7 +330,7 @@ def test_poses_ahead_of_the_readings_end_by_name(
         assert "clocks_apart: the attitudes' clock comes out +300" in said and "acceleration: " in said
     else:
         found = solved(capsys, samples, "--attitudes", attitudes, status=1)
-        assert found["sensors"]["imu"]["scale"] == pytest.approx([1, 1, 1], abs=1e-3)
+        assert found["gyroscopes"]["imu"]["scale"] == pytest.approx([1, 1, 1], abs=1e-3)
         assert found["unsolved"]["imu"]["acceleration"]["error"].startswith(("rank_deficient", "too_few"))
 
 

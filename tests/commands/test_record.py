@@ -70,8 +70,10 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     assert recording.returncode == 0 and ", 0 lost" in said
     table_file = tmp_path / "table.csv"
     table_file.write_text(attitudes(states), encoding="utf-8")
-    assert main(["solve", str(out / "kvh.csv"), "--attitudes", str(table_file), "--find-clock", "--json"]) == 0
-    rate = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    assert (
+        main(["solve", str(out / "kvh.csv"), "--attitudes", str(table_file), "--estimate-clock-offset", "--json"]) == 0
+    )
+    rate = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     assert rate["time_bases"][0]["offset_std_s"] < 1e-3
     truth = document["world"]["sensors"]["kvh"]
     # Seconds of turning, with rates told every 8 ms while they change: a table's own dwells know them far better, and

@@ -116,7 +116,7 @@ def test_the_pdf_holds_every_value_and_its_data(run: Path, tmp_path: Path) -> No
     assert done.returncode == 0 and done.stderr == "", done
     made = out / "certificate.pdf"
     text = told("pdftotext", "-layout", made, "-")
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     for value, expanded in zip([*sensor.scale, *sensor.bias_rad_s], sensor.budget.expanded, strict=True):
         found = rounded(value, expanded)

@@ -18,7 +18,7 @@ CLOCK = ("--turns", "--clock-ppm", "50")
 
 def solved(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
     assert main(["solve", *map(str, arguments), "--json"]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     return found
 
 
@@ -43,7 +43,7 @@ def test_a_recording_by_hand_reaches_every_outlet(tmp_path: Path, capsys: pytest
     kept = ("--out", folder, "--serial-number", "H1", "--history", tmp_path / "history.db")
     assert main(["solve", *map(str, (samples, *CLOCK, *kept))]) == 0
     assert "± U, about 95 %" in capsys.readouterr().out
-    again = json.loads((folder / "result.json").read_text(encoding="utf-8"))["sensors"]["imu"]
+    again = json.loads((folder / "result.json").read_text(encoding="utf-8"))["gyroscopes"]["imu"]
     assert again["scale"] == found["scale"]
     words = " ".join(re.sub("<[^>]*>", " ", (folder / "certificate.html").read_text(encoding="utf-8")).split())
     assert "By hand: the item was turned on a flat table" in words and "recordings of real hands" in words
@@ -72,7 +72,7 @@ def test_what_nothing_shows_must_be_told(tmp_path: Path, capsys: pytest.CaptureF
     assert "bad_option" in refused(capsys, samples, "--turns", "--clock-ppm", "-1")
     assert "wrong_face" in refused(capsys, samples, *CLOCK, "--first-face=-y")
     found = solved(capsys, samples, *CLOCK, "--first-face", "+z")
-    assert "acceleration_m_s2" not in {size["name"] for size in found["by_hand"]["sizes"]}
+    assert "level_m_s2" not in {size["name"] for size in found["by_hand"]["errors"]}
 
 
 @pytest.mark.slow

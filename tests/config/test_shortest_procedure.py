@@ -20,27 +20,29 @@ def section(*overrides: str) -> ProcedureSection:
 
 
 def test_it_is_carried_out_as_six_observations_that_end_early() -> None:
-    found = section("procedure.wanted={scale: 5e-4, bias: 1e-4}")
+    found = section("procedure.target_uncertainty={scale: 5e-4, bias: 1e-4}")
     assert isinstance(found, SixObservationSection)
     assert (found.name, found.repeats, found.speed_deg_s) == ("six_observation", 8, 60.0)
-    assert (found.wanted_scale_u, found.wanted_bias_u_rad_s) == (5e-4, 1e-4)
+    assert (found.target_scale_u, found.target_bias_u_rad_s) == (5e-4, 1e-4)
 
 
 def test_without_a_number_of_repeats_there_are_enough() -> None:
     text = TEXT.replace("repeats: 8", "margin_deg: 2")
-    found = parse(text, overrides=["procedure.name=shortest", "procedure.wanted={bias: 1e-4}"]).config.procedure
+    found = parse(
+        text, overrides=["procedure.name=shortest", "procedure.target_uncertainty={bias: 1e-4}"]
+    ).config.procedure
     assert isinstance(found, SixObservationSection)
-    assert (found.repeats, found.wanted_scale_u, found.wanted_bias_u_rad_s) == (16, None, 1e-4)
+    assert (found.repeats, found.target_scale_u, found.target_bias_u_rad_s) == (16, None, 1e-4)
 
 
 @pytest.mark.parametrize(
     ("wish", "where"),
     [
-        ((), "procedure.wanted: say the expanded uncertainty"),
-        (("procedure.wanted=5e-4",), "procedure.wanted (--set): "),
-        (("procedure.wanted={field: 1}",), "procedure.wanted.field"),
-        (("procedure.wanted={scale: often}",), "procedure.wanted.scale"),
-        (("procedure.wanted={bias: 0}",), "procedure.wanted.bias"),
+        ((), "procedure.target_uncertainty: say the expanded uncertainty"),
+        (("procedure.target_uncertainty=5e-4",), "procedure.target_uncertainty (--set): "),
+        (("procedure.target_uncertainty={field: 1}",), "procedure.target_uncertainty.field"),
+        (("procedure.target_uncertainty={scale: often}",), "procedure.target_uncertainty.scale"),
+        (("procedure.target_uncertainty={bias: 0}",), "procedure.target_uncertainty.bias"),
     ],
 )
 def test_a_wish_that_is_none_is_refused_by_its_place(wish: tuple[str, ...], where: str) -> None:
@@ -53,20 +55,24 @@ def test_a_wish_that_is_none_is_refused_by_its_place(wish: tuple[str, ...], wher
     ("file", "instead"), [("servo.yaml", "servo_six_observation"), ("by_hand.yaml", "name: by_hand")]
 )
 def test_where_no_arm_turns_it_is_refused_with_what_to_do_instead(file: str, instead: str) -> None:
-    changes = ["procedure={name: shortest, wanted: {scale: 1e-3}}"]
+    changes = ["procedure={name: shortest, target_uncertainty: {scale: 1e-3}}"]
     with pytest.raises(ConfigurationRefused) as refused:
         load(CONFIGS / file, changes, sections(installed()), turners.sections())
     (problem,) = refused.value.problems
-    assert problem.startswith("procedure.name") and instead in problem and "rig plan CONFIG --wanted" in problem
+    assert (
+        problem.startswith("procedure.name")
+        and instead in problem
+        and "rig plan CONFIG --target-uncertainty" in problem
+    )
 
 
 def test_a_misspelt_name_is_told_of_it() -> None:
     with pytest.raises(ConfigurationRefused, match="did you mean shortest"):
-        section("procedure.name=shortes", "procedure.wanted={bias: 1e-4}")
+        section("procedure.name=shortes", "procedure.target_uncertainty={bias: 1e-4}")
 
 
 def test_what_is_wanted_is_a_limit_of_the_verdict_unless_the_file_has_its_own() -> None:
-    wish = "procedure.wanted={scale: 5e-4, bias: 1e-4}"
+    wish = "procedure.target_uncertainty={scale: 5e-4, bias: 1e-4}"
     for said, limit in (((), 5e-4), (("limits.scale_u=2e-3",), 2e-3)):
         config = parse(TEXT, overrides=["procedure.name=shortest", wish, *said]).config
         plan = plan_six_observation(config.arm, config.procedure)  # type: ignore[arg-type]

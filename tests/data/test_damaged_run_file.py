@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.layout import Contents, lay_out
 from rig.data.run_file import read_run
 from rig.data.silence import crowding
@@ -80,7 +80,7 @@ def test_a_damaged_recording_is_refused_by_name_or_solved(
     path = tmp_path / "run.h5"
     path.write_bytes(damage(bytearray(RECORDING.read_bytes()), np.random.default_rng(seed)))
     try:
-        calibrated([read_run(path, TIMEOUT_S)])
+        calibrate([read_run(path, TIMEOUT_S)])
     except (Refused, Fault) as error:
         assert error.name
 

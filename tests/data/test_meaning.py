@@ -46,7 +46,7 @@ def test_a_check_that_says_nothing_means_what_its_name_did(name: str, means: Mea
 def test_what_a_check_says_counts_and_not_what_it_is_called() -> None:
     check = CheckEntry(name="gyro.bias", value=1.0, limit=2.0, unit="1", passed=True, kind="fitness", sensor="gyro")
     assert check.means == Meaning("fitness", "gyro", what="bias")
-    said = check.model_copy(update={"what": "residuals", "quantity": "inclination"})
+    said = check.model_copy(update={"criterion": "residuals", "quantity": "inclination"})
     assert said.means == Meaning("fitness", "gyro", "inclination", what="residuals")
 
 

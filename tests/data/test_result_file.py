@@ -42,7 +42,7 @@ def test_results_satisfy_the_committed_schema(name: str) -> None:
 @pytest.mark.slow
 def test_what_a_later_version_has_added_is_no_hindrance(tmp_path: Path) -> None:
     document = json.loads(VERIFIED.text())
-    for place in (document, document["checks"][0], document["sensors"]["gyro"], document["verification"]["gyro"]):
+    for place in (document, document["checks"][0], document["gyroscopes"]["gyro"], document["verification"]["gyro"]):
         place["humidity"] = 0.4
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     jsonschema.validate(document, json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8")))
@@ -51,9 +51,9 @@ def test_what_a_later_version_has_added_is_no_hindrance(tmp_path: Path) -> None:
 
 def test_what_is_missing_or_wrong_is_refused_by_its_place(tmp_path: Path) -> None:
     document = json.loads(VERIFIED.text())
-    document["sensors"]["gyro"]["observations"][2]["speed_rad_s"] = "fast"
+    document["gyroscopes"]["gyro"]["observations"][2]["speed_rad_s"] = "fast"
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(Refused, match=r"not_a_result: .*sensors\.gyro\.observations\.2\.speed_rad_s"):
+    with pytest.raises(Refused, match=r"not_a_result: .*gyroscopes\.gyro\.observations\.2\.speed_rad_s"):
         read_result(tmp_path)
 
 

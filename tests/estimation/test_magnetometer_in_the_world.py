@@ -29,7 +29,7 @@ def gradient(seed: int, size: float) -> list[float]:
 def housings(seed: int, moment_a_m2: float) -> list[dict[str, object]]:
     """Those of joints wrist 3 and wrist 2, magnetised any way."""
     rng = np.random.default_rng(seed)
-    other = {"carried_by": "wrist_1", "place_mm": [0, 0, 60]}
+    other = {"carried_by": "wrist_1", "position_mm": [0, 0, 60]}
     return [{**each, "moment_a_m2": (moment_a_m2 * direction(rng)).tolist()} for each in (HOUSING, other)]
 
 

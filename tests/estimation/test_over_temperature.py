@@ -142,7 +142,7 @@ def test_a_hysteresis_is_found_and_covered() -> None:
 def test_a_sensor_that_only_warmed_says_nothing_of_hysteresis() -> None:
     sensor, rng = upright(3)
 
-    assert calibrated(sensor, session(both_ways=False), rng).hysteresis is None
+    assert calibrated(sensor, session(both_directions=False), rng).hysteresis is None
 
 
 @pytest.mark.slow

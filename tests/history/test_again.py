@@ -174,7 +174,7 @@ def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(hist
         ("1", "solved", "pass", "pass", "False"),
         ("2", "solved", "pass", "fail", "True"),
     ]
-    assert float(rows[1]["shift_of_u"]) == pytest.approx(1.0) and rows[1]["parameter"] == "kx"
+    assert float(rows[1]["shift_over_u"]) == pytest.approx(1.0) and rows[1]["parameter"] == "kx"
     assert rows[1]["serial_number"] == "'=<b>G-2</b>" and rows[1]["certificates_to_withdraw"] == "RIG-1"
     page = again_page(outcome, QUESTION, "history.sqlite")
     assert "pass, now fail (gyro.scale_std)" in page and "&lt;b&gt;G-2" in page and "<b>" not in page

@@ -88,7 +88,7 @@ def append(name: str) -> Callable[[Path], None]:
 
 def another_value(folder: Path) -> None:
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    result["sensors"]["gyro"]["scale"][0] *= 1.001
+    result["gyroscopes"]["gyro"]["scale"][0] *= 1.001
     (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
 
 

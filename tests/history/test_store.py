@@ -57,7 +57,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
 
 
 def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
-    sensor = read_result(RECORDINGS / "verified").sensors["gyro"]
+    sensor = read_result(RECORDINGS / "verified").gyroscopes["gyro"]
     mean = {each.name: each for each in followed(read_result(RECORDINGS / "verified"))[0].parameters}["k"]
     assert mean.value == pytest.approx(sum(sensor.scale) / 3)
     variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
@@ -86,10 +86,10 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
 def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
     def scarce(day: float, bias_rad_s: float, freedom: float) -> Finished:
         run = finished(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
-        sensor = run.document.sensors["gyro"]
+        sensor = run.document.gyroscopes["gyro"]
         line = Contributor("noise", "A", "normal", None, "", "", freedom, np.array(sensor.covariance))
         found = {"budget": budget_entry(Budget((line,))), "covariance_combined": sensor.covariance}
-        document = run.document.model_copy(update={"sensors": {"gyro": sensor.model_copy(update=found)}})
+        document = run.document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update=found)}})
         return replace(run, document=document, text=compact(json.loads(document.text())))
 
     u = 2e-5

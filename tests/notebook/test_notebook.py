@@ -57,7 +57,7 @@ def test_the_result_is_that_of_the_run(result: rig.Result) -> None:
     then, document = read_result(RECORDINGS / "verified"), result.to_dict()
     now = ResultDocument.model_validate(document)
     assert differences(then, now) == []
-    gyro = now.sensors["gyro"]
+    gyro = now.gyroscopes["gyro"]
     assert (*result["gyro"].scale, *result["gyro"].bias_rad_s) == (*gyro.scale, *gyro.bias_rad_s)
     np.testing.assert_allclose(result["gyro"].std ** 2, np.diag(gyro.covariance))
     assert result.verdict == then.verdict == "pass"

@@ -51,7 +51,7 @@ def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
 def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv"), "--json"]
     assert main(arguments) == 0
-    result = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    result = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     assert result["model"] == "g = K (m + b)"
     assert (result["estimator"], result["six_observation"]["estimator"]) == ("vector", "newton")
     for estimate in (result, result["six_observation"]):
@@ -161,7 +161,9 @@ def test_a_missing_direction_leaves_the_vector_model_alone(tmp_path: Path, capsy
     sweeps = edited(tmp_path, "sweeps.csv", lambda lines: [line for line in lines if ",0,-1,0," not in line])
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]
     assert main([*arguments, "--json"]) == 0
-    assert "too_few_observations" in json.loads(capsys.readouterr().out)["sensors"]["imu"]["six_observation"]["error"]
+    assert (
+        "too_few_observations" in json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]["six_observation"]["error"]
+    )
     assert main([*arguments, "--estimator", "newton"]) == 2
     assert "too_few_observations" in capsys.readouterr().err
 
@@ -200,7 +202,7 @@ def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_betwee
 ) -> None:
     files = [str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv")]
     assert main(["solve", *files, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["sensors"]["imu"]
+    found = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
     assert main(["solve", *files, "--all"]) == 0
     printed = capsys.readouterr().out
     scale_x = next(line for line in printed.splitlines() if "scale" not in line and " x " in line)

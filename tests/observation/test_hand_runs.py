@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated_by_hand
+from rig.analysis.analyses import calibrate_by_hand
 from rig.data.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
 from rig.data.run_file import read_run
 from rig.errors import Fault
@@ -87,7 +87,7 @@ def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
         samples = run.samples["gyro"].astype(sensor.sample_dtype)
         samples["acceleration_counts"][len(samples) // 2 :] = reading
         with pytest.raises(Fault, match=f"{name}: "):
-            calibrated_by_hand([replace(run, samples={"gyro": samples}, sensors={"gyro": sensor})])
+            calibrate_by_hand([replace(run, samples={"gyro": samples}, sensors={"gyro": sensor})])
 
 
 def test_more_rests_than_memory_has_room_for_are_refused() -> None:
@@ -103,4 +103,4 @@ def test_stamps_that_no_clock_gives_are_refused(step: int, name: str) -> None:
     samples = run.samples["gyro"].copy()
     samples["board_time_us"] = 2_000_000_000 + step * np.arange(len(samples))
     with pytest.raises(Fault, match=f"{name}: "):
-        calibrated_by_hand([replace(run, samples={"gyro": samples})])
+        calibrate_by_hand([replace(run, samples={"gyro": samples})])

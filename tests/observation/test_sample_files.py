@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.motion_file import TIME, Item, samples_header
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.settings import Elsewhere, Site
@@ -72,8 +72,8 @@ def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = 
 def solved(samples: Path, sweeps: Path) -> np.ndarray:
     """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
     item = Item("imu", "any", "1")
-    found = calibrated([recorded_in_files(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
-    (entry,) = document_of(found).sensors.values()
+    found = calibrate([recorded_in_files(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
+    (entry,) = document_of(found).gyroscopes.values()
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.partial_results import so_far
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.quantity import ACCELERATION
@@ -57,7 +57,7 @@ def test_what_was_so_far_is_what_the_result_rests_on(run: RunData) -> None:
     shown = Shown(About("", ""))
     shown.look(look_of(so_far([run])))
     as_they_came = shown.sections["observations"]
-    for event in observations_of(calibrated([run])):
+    for event in observations_of(calibrate([run])):
         shown.take(event)
     assert shown.sections["observations"] == as_they_came and any(row["unit"] == "µT" for row in as_they_came)
 

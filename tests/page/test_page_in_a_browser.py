@@ -101,13 +101,13 @@ def test_a_run_goes_on_to_its_verdict_while_browsers_stall_and_is_replayed(
     sequence = run.samples["gyro"]["sequence"]
     assert (sequence == range(len(sequence))).all(), "samples are lost"
     shown = text(driver, "parameters")
-    assert f"{result['sensors']['gyro']['scale'][0]:.5f}" in shown and "combined" in shown
+    assert f"{result['gyroscopes']['gyro']['scale'][0]:.5f}" in shown and "combined" in shown
     assert f"{len(result['checks'])} of {len(result['checks'])} checks passed" == text(driver, "state-text")
 
     watching, url = page("watch", out, "--speed", "40")
     driver.get(url)
     wait_for(lambda: kind(driver) == "passed", "the verdict again")
-    assert f"{result['sensors']['gyro']['scale'][0]:.5f}" in text(driver, "parameters")
+    assert f"{result['gyroscopes']['gyro']['scale'][0]:.5f}" in text(driver, "parameters")
     assert len(driver.find_elements(By.CSS_SELECTOR, "#observations tbody tr")) == 6
     assert not driver.find_element(By.ID, "halt").is_displayed()
     watching.send_signal(signal.SIGINT)

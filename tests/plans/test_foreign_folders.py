@@ -71,7 +71,7 @@ def test_nothing_that_reads_a_run_executes_its_script(
 def test_a_run_by_anothers_script_is_solved_without_it_and_says_so(foreign: Path) -> None:
     done, before = rig_here("solve", foreign, "--json"), rig_here("solve", RECORDINGS / "six_observation", "--json")
     assert done.returncode == 0 and "recorded by the script theirs.py" in done.stderr and before.stderr == ""
-    numbers, expected = json.loads(done.stdout)["sensors"]["gyro"], json.loads(before.stdout)["sensors"]["gyro"]
+    numbers, expected = json.loads(done.stdout)["gyroscopes"]["gyro"], json.loads(before.stdout)["gyroscopes"]["gyro"]
     assert numbers["scale"] == expected["scale"]
 
 
@@ -161,7 +161,7 @@ def test_a_deeply_nested_script_identity_is_refused_by_name(foreign: Path, tmp_p
 @pytest.mark.parametrize("name", ["../../x", "a\nb", "a\x1b[2J", ".."])
 def test_a_name_that_is_no_sensors_names_no_file(foreign: Path, tmp_path: Path, name: str) -> None:
     document = json.loads((foreign / "result.json").read_text(encoding="utf-8"))
-    document["sensors"][name] = document["sensors"].pop("gyro")
+    document["gyroscopes"][name] = document["gyroscopes"].pop("gyro")
     (foreign / "result.json").write_text(json.dumps(document), encoding="utf-8")
     before = {*tmp_path.rglob("*")}
     refused = rig_here("export", foreign, "--format", "kalibr")
@@ -228,7 +228,7 @@ def test_attitudes_over_thousands_of_years_are_put_on_no_grid(tmp_path: Path) ->
     text = (examples / "swinging_attitudes.csv").read_text(encoding="utf-8").rstrip()
     last = text.splitlines()[-1].split(",")
     attitudes.write_text("\n".join([text, ",".join(["99999999998", "1e11", *last[2:]])]), encoding="utf-8")
-    refused = rig_here("solve", examples / "swinging_samples.csv", "--attitudes", attitudes, "--find-clock")
+    refused = rig_here("solve", examples / "swinging_samples.csv", "--attitudes", attitudes, "--estimate-clock-offset")
     assert refused.returncode == 2 and "rig: impossible_times: the states or attitudes" in refused.stderr
 
 

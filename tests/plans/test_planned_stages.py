@@ -77,7 +77,7 @@ def test_without_stages_nothing_is_tried() -> None:
 
 def test_a_mount_is_turned_in_the_item_s_own_axes() -> None:
     """A quarter about z: the item's x axis points where the flange's y axis does, as +y says."""
-    turned = mount_matrix(StageMountSection(turned_deg=(0.0, 0.0, 90.0)))
+    turned = mount_matrix(StageMountSection(rotation_deg=(0.0, 0.0, 90.0)))
     assert turned == pytest.approx(mount_matrix(StageMountSection(x="+y", y="-x", z="+z")), abs=1e-12)
 
 

@@ -70,13 +70,13 @@ def test_every_procedure_has_a_frozen_recording() -> None:
 
 def otherwise(result: ResultDocument) -> Iterator[ResultDocument]:
     """With a number moved by ten times what is allowed, a wider uncertainty, a check less, another verdict."""
-    gyro = result.sensors["gyro"]
+    gyro = result.gyroscopes["gyro"]
     std = gyro.covariance[3][3] ** 0.5
     x, y, z = gyro.bias_rad_s
     first = gyro.covariance[0]
     wider = ((first[0] * (1 + 20 * SHARE), *first[1:]), *gyro.covariance[1:])
     for update in ({"bias_rad_s": (x + 10 * SHARE * std, y, z)}, {"covariance": wider}):
-        yield result.model_copy(update={"sensors": {"gyro": gyro.model_copy(update=update)}})
+        yield result.model_copy(update={"gyroscopes": {"gyro": gyro.model_copy(update=update)}})
     yield result.model_copy(update={"checks": result.checks[1:]})
     yield result.model_copy(update={"verdict": "fail"})
 

@@ -84,7 +84,7 @@ def test_what_cannot_be_is_refused_before_anything_is_connected(override: str, w
 
 
 def test_a_plan_that_no_such_servo_can_drive_is_refused_by_name() -> None:
-    plan = planned("procedure.speed_deg_s=10", "procedure.beyond_deg=360")
+    plan = planned("procedure.speed_deg_s=10", "procedure.overtravel_deg=360")
     servo = loaded().config.turner
     assert isinstance(servo, ServoSection)
     assert {problem.name for problem in SERVO.problems([plan], servo, None)} == {"servo_move_too_long"}

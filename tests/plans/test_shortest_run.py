@@ -63,7 +63,7 @@ def run(part: str, turner: str, **keys: float) -> Run:
 
 Keys = tuple[dict[str, float], ...]
 ARM: Keys = ({}, {"speed_deg_s": 80, "rest_s": 6}, {"repeats": 3, "rest_s": 1}, {"axes": 6, "rest_s": 2})
-SERVO: Keys = ({"rest_s": 2}, {"repeats": 3, "speed_deg_s": 75}, {"beyond_deg": 180, "speed_deg_s": 45})
+SERVO: Keys = ({"rest_s": 2}, {"repeats": 3, "speed_deg_s": 75}, {"overtravel_deg": 180, "speed_deg_s": 45})
 HAND: Keys = ({"flips": 12, "turns": 0}, {"flips": 12, "turns": 3}, {"flips": 24, "turns": 0})
 RUNS = [
     run(part, turner, **keys)
@@ -346,7 +346,7 @@ def test_a_procedure_that_is_not_predicted_is_refused() -> None:
 @pytest.mark.slow
 def test_the_command_writes_a_configuration_that_plans_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "short.yaml"
-    words = ["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=1.3e-4", "--at-most", "90"]
+    words = ["plan", str(CONFIGS / "demo.yaml"), "--target-uncertainty", "scale=1.3e-4", "--max-duration-s", "90"]
     assert main([*words, "--write", str(written), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["reached"] and said["plan"]["scale"] <= 1.3e-4 and said["plan"]["duration_s"] <= 90
@@ -359,13 +359,15 @@ def test_the_command_writes_a_configuration_that_plans_so(tmp_path: Path, capsys
 @pytest.mark.thorough
 def test_by_hand_the_session_also_ends_when_u_is_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "hand.yaml"
-    words = ["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=1.2e-3", "--write", str(written)]
+    words = ["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=1.2e-3", "--write", str(written)]
     assert main(words) == 0
     section = load(written, (), sections(installed()), turners.sections()).config.procedure
-    assert section.wanted_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # type: ignore[attr-defined]
-    assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=9e-4"]) == 1
+    assert section.target_scale_u == pytest.approx((1.2e-3**2 - 1e-3**2) ** 0.5, rel=1e-3)  # type: ignore[attr-defined]
+    assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=9e-4"]) == 1
     assert "recordings of real hands" in " ".join(capsys.readouterr().out.split())
-    assert main(["plan", str(CONFIGS / "demo.yaml"), "--wanted", "scale=often"]) == 2
+    assert main(["plan", str(CONFIGS / "demo.yaml"), "--target-uncertainty", "scale=often"]) == 2
     loose = tmp_path / "loose.yaml"  # no section may say so, and nothing has to end before
-    assert main(["plan", str(CONFIGS / "by_hand.yaml"), "--wanted", "scale=0.2", "--write", str(loose)]) == 0
-    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.wanted_scale_u is None  # type: ignore[attr-defined]
+    assert (
+        main(["plan", str(CONFIGS / "by_hand.yaml"), "--target-uncertainty", "scale=0.2", "--write", str(loose)]) == 0
+    )
+    assert load(loose, (), sections(installed()), turners.sections()).config.procedure.target_scale_u is None  # type: ignore[attr-defined]

@@ -17,8 +17,8 @@ def measured(temperature_c: float, *, warming: bool = True, **others: float) -> 
     return SetMeasured(0, 6, warming, {"gyro": temperature_c, **others})
 
 
-def course(*temperatures_c: float, both_ways: bool = False) -> Course:
-    found = Course(20, 40, 5, both_ways)
+def course(*temperatures_c: float, both_directions: bool = False) -> Course:
+    found = Course(20, 40, 5, both_directions)
     found.begin(20.0)
     for temperature_c in temperatures_c:
         found.measured(measured(temperature_c))
@@ -43,14 +43,14 @@ def test_a_range_is_covered_when_no_gap_of_it_is_wider_than_allowed(
 
 
 def test_every_sensor_has_to_have_seen_the_range() -> None:
-    found = Course(20, 30, 5, both_ways=False)
+    found = Course(20, 30, 5, both_directions=False)
     for gyro_c, other_c in ((20, 20), (25, 23), (30, 26)):
         found.measured(measured(gyro_c, other=other_c))
     assert found.missing() == "other was never between 26.0 and 30.0 °C"
 
 
 def test_both_ways_are_covered_each_by_its_own_sets() -> None:
-    found = course(20, 25, 30, 35, 40, both_ways=True)
+    found = course(20, 25, 30, 35, 40, both_directions=True)
     assert found.missing() == "no set of sweeps was made while cooling"
     assert found.warming is False, "at the end it turns round"
     for temperature_c in (36, 31, 25):
@@ -63,7 +63,7 @@ def test_both_ways_are_covered_each_by_its_own_sets() -> None:
 
 
 def test_the_next_set_is_due_half_a_gap_on_for_the_slowest_sensor() -> None:
-    found = Course(20, 40, 5, both_ways=False)
+    found = Course(20, 40, 5, both_directions=False)
     found.begin(20.0)
     assert found.is_due({"gyro": 20.0, "other": 20.0})
     found.measured(measured(22.0, other=21.0))
@@ -72,10 +72,10 @@ def test_the_next_set_is_due_half_a_gap_on_for_the_slowest_sensor() -> None:
 
 
 def test_an_interrupted_way_is_gone_on() -> None:
-    found = Course(20, 40, 5, both_ways=True, sets=[measured(39.5)])
+    found = Course(20, 40, 5, both_directions=True, sets=[measured(39.5)])
     found.begin(22.0)  # it has cooled meanwhile
     assert found.warming is False
-    found = Course(20, 40, 5, both_ways=True, sets=[measured(34.5)])
+    found = Course(20, 40, 5, both_directions=True, sets=[measured(34.5)])
     found.begin(22.0)
     assert found.warming is True
 

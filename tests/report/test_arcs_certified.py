@@ -9,10 +9,10 @@ from support.dcc_rules import schema_faults
 
 
 def of_arcs(angle_rad: float) -> ResultDocument:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     turned = tuple(each.model_copy(update={"angle_rad": angle_rad}) for each in sensor.observations)
     return compared(
-        result().model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"observations": turned})}})
+        result().model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"observations": turned})}})
     )
 
 

@@ -26,11 +26,11 @@ def watched(range_c: tuple[float, float] = (18.0, 31.0), **changes: Any) -> Resu
         unit="",
         repeats=(),
         common_std=zero,
-        excess=zero,
-        moves=(),
-        false_alarm=0.02,
+        scatter_ratio=zero,
+        steps=(),
+        false_alarm_probability=0.02,
         largest_change=zero,
-        over_temperature=slope,
+        temperature_slope=slope,
         earth_rate_known=True,
     ).model_copy(update=changes)
     return result().model_copy(update={"bias_drift": {"gyro": {"rate": entry, "acceleration": entry}}})
@@ -54,7 +54,7 @@ def test_outside_of_what_was_seen_it_is_refused(range_c: tuple[float, float], wa
 
 
 def test_a_run_that_tells_no_slope_or_watched_another_sensor_is_refused() -> None:
-    confounded = watched(over_temperature=ErrorEntry(error="temperature_and_time_confounded: it warmed up"))
+    confounded = watched(temperature_slope=ErrorEntry(error="temperature_and_time_confounded: it warmed up"))
     for drift in (confounded, result()):
         with pytest.raises(Refused) as refused:
             at_temperature(calibrations(result()), drift, 25.0)

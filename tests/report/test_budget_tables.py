@@ -19,7 +19,7 @@ from rig.config.judging_sections import SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from rig.data.result_file import GyroscopeEntry, ResultDocument, read_result
 from rig.data.result_types import ErrorEntry
 from rig.estimation.coverage import coverage_factors
 from rig.plans.recorded import judged, open_run
@@ -44,8 +44,8 @@ BUDGETED = [each for each in frozen() if "budget" in (each / "result.json").read
 def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float, ...]]]:
     """In the order of the certificate, each with its scale factors."""
     rest = dict(document.accelerometers)
-    found: list[SensorEntry | AccelerometerEntry | MagnetometerEntry] = []
-    for name, sensor in document.sensors.items():
+    found: list[GyroscopeEntry | AccelerometerEntry | MagnetometerEntry] = []
+    for name, sensor in document.gyroscopes.items():
         if sensor.role == "calibrate":
             found += [sensor, *([rest.pop(name)] if name in rest else [])]
     found += rest.values()
@@ -55,7 +55,7 @@ def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float
 
 def of_the_terminal(document: ResultDocument) -> list[BudgetEntry]:
     """In the order of the terminal: kind by kind."""
-    kinds = [*document.sensors.values(), *document.accelerometers.values(), *document.magnetometers.values()]
+    kinds = [*document.gyroscopes.values(), *document.accelerometers.values(), *document.magnetometers.values()]
     return [each.budget for each in kinds if not isinstance(each, ErrorEntry) and each.budget is not None]
 
 
@@ -72,7 +72,7 @@ def elsewhere(samples: str, table: str, estimator: str | None) -> list[str]:
 
 def budgets_in(found: dict[str, Any]) -> list[BudgetEntry]:
     """Of a document of `rig solve`, kind by kind."""
-    kinds = (found["sensors"], found.get("accelerometers", {}), found.get("magnetometers", {}))
+    kinds = (found["gyroscopes"], found.get("accelerometers", {}), found.get("magnetometers", {}))
     return [BudgetEntry.model_validate(each["budget"]) for of in kinds for each in of.values()]
 
 
@@ -139,8 +139,8 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
     document = read_result(folder)
-    calibrated = {name: each for name, each in document.sensors.items() if each.role == "calibrate"}
-    document = document.model_copy(update={"sensors": calibrated})
+    calibrated = {name: each for name, each in document.gyroscopes.items() if each.role == "calibrate"}
+    document = document.model_copy(update={"gyroscopes": calibrated})
     print_outcome(document, as_json=False, whole=True)
     shown = capsys.readouterr().out
     assert "\\x" not in shown
@@ -190,7 +190,7 @@ def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() 
     document = everything()
     for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
         check_adds_up(rows, budget)
-    (sensor,) = result().sensors.values()
+    (sensor,) = result().gyroscopes.values()
     assert sensor.budget is not None
     (rows,) = printed(result())
     of_type = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
@@ -201,17 +201,17 @@ def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() 
 
 def scarce(document: ResultDocument) -> ResultDocument:
     """The same where biases are known with few degrees of freedom, differently along each axis."""
-    sensor = document.sensors["gyro"]
+    sensor = document.gyroscopes["gyro"]
     assert sensor.budget is not None
     known, factors = (4000.0, 5000.0, 6000.0, 9.0, 17.0, 26.0), (2.0, 2.0, 2.0, 2.32, 2.16, 2.10)
     changed = {
-        "freedom": known,
+        "degrees_of_freedom": known,
         "coverage_factors": factors,
         "coverage_factor": max(factors),
         "expanded": tuple(np.multiply(factors, sensor.budget.std).tolist()),
     }
     budget = sensor.budget.model_copy(update=changed)
-    return document.model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"budget": budget})}})
+    return document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"budget": budget})}})
 
 
 @pytest.mark.parametrize(
@@ -252,12 +252,12 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     """A KVH 1775 that was at rest for little time: what its bias does is known from fifteen differences."""
     run = open_run(RECORDINGS / "kvh1775")
     document = document_of(judged(run, DEFAULT_ESTIMATOR))
-    by_freedom = document.sensors["kvh"].budget
+    by_freedom = document.gyroscopes["kvh"].budget
     assert by_freedom is not None
     np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.factors, by_freedom.std), rtol=1e-9)
     assert by_freedom.factors == pytest.approx(coverage_factors(by_freedom.known))
     assert 2.0 < by_freedom.factors[0] < 2.01 and by_freedom.factors[4] > 2.1
-    noise = {each.name: each.freedom for each in by_freedom.contributors}["noise"]
+    noise = {each.name: each.degrees_of_freedom for each in by_freedom.contributors}["noise"]
     assert noise is not None and 20 < noise < 1e6
     for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
         check_adds_up(rows, budget)

@@ -14,7 +14,7 @@ from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import parse
 from rig.data.budget_entries import BudgetEntry
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
-from rig.data.result_types import ErrorEntry, ToldFromEntry
+from rig.data.result_types import DetectionLimitEntry, ErrorEntry
 from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.report.budget_entry import budget_entry
@@ -47,7 +47,7 @@ CLAUSES = [
 MARKUP = "<script>alert(1)</script>\"'><img src=x onerror=y>&amp;"
 # What a result's model holds to a few words, and times.
 FIXED = {
-    *("schema", "verdict", "role", "kind", "distribution", "axis", "direction", "joint", "correction", "name", "by"),
+    *("schema", "verdict", "role", "kind", "distribution", "axis", "direction", "joint", "correction", "name", "clock"),
     *("unit", "model", "estimator", "started_utc", "solved_utc", "resumed_utc", "verified_utc", "status"),
     *("from_utc", "to_utc", "mean_utc", "quantity", "parameter"),
     *("non_orthogonality_order", "covariance_order", "covariance_units"),
@@ -58,7 +58,7 @@ def kinds() -> dict[str, ResultDocument]:
     """What a run may find, one kind each, and all at once."""
     whole = everything()
     none: dict[str, Any] = {
-        "sensors": {},
+        "gyroscopes": {},
         "accelerometers": {},
         "magnetometers": {},
         "bias_drift": {},
@@ -72,7 +72,7 @@ def kinds() -> dict[str, ResultDocument]:
             update=none | {"bias_drift": whole.bias_drift, "accelerometers": whole.accelerometers}
         ),
         "everything": whole,
-        "verification": read_result(RECORDINGS / "verified").model_copy(update={"sensors": {}}),
+        "verification": read_result(RECORDINGS / "verified").model_copy(update={"gyroscopes": {}}),
     }
 
 
@@ -120,7 +120,7 @@ def test_what_replaces_what_is_said_by_an_amended_one() -> None:
 
 
 def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     page = read(certificate())
     values = [*sensor.scale, *sensor.bias_rad_s]
@@ -186,7 +186,7 @@ def test_every_quantity_says_when_it_holds_and_what_its_uncertainty_leaves_out(k
 
 
 def test_what_the_budget_has_of_the_run_says_nothing_of_other_speeds_and_temperatures() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     assert {"nonlinearity", "scale over temperature"} <= {each.name for each in sensor.budget.contributors}
     assert "nonlinearity at other speeds, other temperatures" in left_out_of_rates(sensor)
@@ -220,9 +220,13 @@ def test_a_simulated_laboratory_is_told_across_every_page() -> None:
 
 def test_what_a_gyroscopes_recording_would_have_told_stands_there() -> None:
     document = result()
-    told = ToldFromEntry(what="gain half-way", check="scale_changed", size=6e-4, unit="1", off_by_expanded=1.2)
-    sensors = {name: each.model_copy(update={"told_from": (told,)}) for name, each in document.sensors.items()}
-    text = read(certificate(document.model_copy(update={"sensors": sensors}))).text
+    told = DetectionLimitEntry(
+        fault="gain half-way", check="scale_changed", size=6e-4, unit="1", error_over_expanded=1.2
+    )
+    sensors = {
+        name: each.model_copy(update={"detection_limits": (told,)}) for name, each in document.gyroscopes.items()
+    }
+    text = read(certificate(document.model_copy(update={"gyroscopes": sensors}))).text
     assert "this measurement would have noticed" in text and "gain half-way" in text
 
 
@@ -253,7 +257,7 @@ def test_a_check_of_any_name_stands_where_it_says_it_belongs() -> None:
 @pytest.mark.parametrize(("guard", "words"), [(0.0, "simple acceptance"), (0.01, "guard band of w = U")])
 def test_the_decision_rule_is_said(guard: float, words: str) -> None:
     check = CheckEntry(
-        name="gyro.bias", value=0.01, limit=0.1, unit="rad/s", passed=True, uncertainty=0.01, guard=guard
+        name="gyro.bias", value=0.01, limit=0.1, unit="rad/s", passed=True, uncertainty=0.01, guard_band=guard
     )
     assert words in read(certificate(result().model_copy(update={"checks": (check,)}))).under["7.8.6"]
 
@@ -296,7 +300,7 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> 
     )
     silent = read(certificate(document, Stated()))
     assert "9.81 m/s² by the laboratory's configuration, its origin: not stated" in silent.under["7.8.4.1c"]
-    alone = read(certificate(document.model_copy(update={"sensors": {}})))
+    alone = read(certificate(document.model_copy(update={"gyroscopes": {}})))
     assert "1.01235 ± 0.00022" in alone.text
 
 
@@ -385,13 +389,13 @@ def test_a_clock_that_was_compared_with_none_was_not_found_to_be_anything() -> N
 
 
 def test_a_sensor_with_a_port_of_its_own_is_on_no_board() -> None:
-    sensor = result().sensors["gyro"].model_copy(update={"part": "kvh1775"})
-    page = read(certificate(result().model_copy(update={"sensors": {"gyro": sensor}})))
+    sensor = result().gyroscopes["gyro"].model_copy(update={"part": "kvh1775"})
+    page = read(certificate(result().model_copy(update={"gyroscopes": {"gyro": sensor}})))
     assert "on no board, with a port of its own" in page.under["7.8.2.1g"] and "firmware" not in page.under["7.8.2.1g"]
 
 
 def test_a_verification_alone_is_reported_as_that() -> None:
-    document = read_result(RECORDINGS / "verified").model_copy(update={"sensors": {}})
+    document = read_result(RECORDINGS / "verified").model_copy(update={"gyroscopes": {}})
     found = certificate(document)
     assert found.title == "Verification report"
     assert len(found.marks) == 1 and "Simulated" in found.marks[0]  # as that run was
@@ -401,16 +405,16 @@ def test_a_verification_alone_is_reported_as_that() -> None:
 
 
 def test_a_vector_model_without_a_solution_leaves_out_what_it_would_tell() -> None:
-    sensor = result().sensors["gyro"].model_copy(update={"vector_model": ErrorEntry(error="too_few_observations")})
+    sensor = result().gyroscopes["gyro"].model_copy(update={"vector_model": ErrorEntry(error="too_few_observations")})
     bare = sensor.model_copy(update={"budget": None, "covariance_combined": None, "estimator": "newton"})
-    page = read(certificate(result().model_copy(update={"sensors": {"gyro": bare}})))
+    page = read(certificate(result().model_copy(update={"gyroscopes": {"gyro": bare}})))
     assert "estimator newton" in page.text and "Angles between the axes" not in page.text
     assert "what it adds to the readings was not separated from the biases" in page.text
     assert not [tag for tag, _ in page.tags if tag == "svg"]
 
 
 def test_scarce_freedom_widens_u_and_is_said() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     assert "normal distribution" in coverage_sentence(sensor.budget)
     scarce = budget_of(freedom=8.0)
@@ -420,7 +424,7 @@ def test_scarce_freedom_widens_u_and_is_said() -> None:
     assert "approximately 95 % (95.45 %)" in coverage_sentence(scarce)
     assert scarce.expanded[0] == pytest.approx(2.366 * scarce.std[0], rel=1e-3)
     page = read(
-        certificate(result().model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"budget": scarce})}}))
+        certificate(result().model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"budget": scarce})}}))
     )
     assert "± U, expanded uncertainty, k as stated below" in page.text
 
@@ -466,7 +470,7 @@ def test_every_text_from_elsewhere_shows_as_text() -> None:
     stated = Stated(SiteSection(**said), CertificateSection(**order))
     document = hostile.model_copy(
         update={
-            "sensors": {MARKUP: hostile.sensors["gyro"]},
+            "gyroscopes": {MARKUP: hostile.gyroscopes["gyro"]},
             "accelerometers": {f"2 {MARKUP}": hostile.accelerometers["gyro"]},
             "magnetometers": {MARKUP: hostile.magnetometers["compass"]},
             "bias_drift": {MARKUP: hostile.bias_drift["gyro"]},

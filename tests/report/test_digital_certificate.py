@@ -82,10 +82,10 @@ def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
 
 
 def test_scale_factors_and_biases_say_each_how_warm_their_item_was() -> None:
-    sensor = result().sensors["gyro"]
-    assert sensor.scale_at is not None and sensor.bias_at is not None
-    colder = sensor.bias_at.model_copy(update={"temperature_c": 21.25})
-    changed = {"sensors": {"gyro": sensor.model_copy(update={"bias_at": colder})}}
+    sensor = result().gyroscopes["gyro"]
+    assert sensor.scale_conditions is not None and sensor.bias_conditions is not None
+    colder = sensor.bias_conditions.model_copy(update={"temperature_c": 21.25})
+    changed = {"gyroscopes": {"gyro": sensor.model_copy(update={"bias_conditions": colder})}}
     xml = digital_certificate(certificate(result().model_copy(update=changed), SILENT))
     conditions = {
         str(each.findtext("dcc:name/dcc:content", namespaces=NAMES)): float(
@@ -94,7 +94,7 @@ def test_scale_factors_and_biases_say_each_how_warm_their_item_was() -> None:
         for each in found(xml, "dcc:influenceCondition")
     }
     assert conditions == {
-        "temperature of the item at the scale factors, by its own thermometer": sensor.scale_at.temperature_c,
+        "temperature of the item at the scale factors, by its own thermometer": sensor.scale_conditions.temperature_c,
         "temperature of the item at the biases, by its own thermometer": 21.25,
     }
 
@@ -112,7 +112,7 @@ def test_all_that_a_run_may_find_is_valid(stated: Stated) -> None:
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []
     document = everything()
-    none: dict[str, Any] = {"sensors": {}, "accelerometers": {}, "verification": {}}
+    none: dict[str, Any] = {"gyroscopes": {}, "accelerometers": {}, "verification": {}}
     kinds: list[dict[str, Any]] = [{"bias_drift": {}}, {"magnetometers": {}, "accelerometers": document.accelerometers}]
     for update in kinds:
         part = digital_certificate(certificate(document.model_copy(update=none | update), stated))
@@ -161,7 +161,7 @@ def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over(
 
 
 def test_the_earth_s_rate_and_gravity_s_part_are_the_result_s() -> None:
-    sensor = everything().sensors["gyro"]
+    sensor = everything().gyroscopes["gyro"]
     assert isinstance(sensor.earth_rate, EarthRateEntry) and isinstance(sensor.vector_model, VectorEntry)
     results = measured(of_everything(), "calibration of gyroscope gyro")
     found = measured(of_everything(), "the Earth's rate found by gyroscope gyro")
@@ -178,7 +178,7 @@ def test_biases_by_repeat_are_the_result_s() -> None:
     drift = everything().bias_drift["gyro"]["rate"]
     for i, axis in enumerate("xyz"):
         values = results[f"bias along {axis} by repeat"].find(".//si:valueXMLList", NAMES)
-        assert values is not None and numbers(values) == [each.held.bias[i] for each in drift.repeats]
+        assert values is not None and numbers(values) == [each.scale_fixed.bias[i] for each in drift.repeats]
     assert r"\radian\second\tothe{-1}\kelvin\tothe{-1}" in of_everything().decode()
 
 
@@ -201,7 +201,7 @@ def numbers(element: Element) -> list[float]:
 
 
 def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     xml = digital_certificate(certificate())
     scale, bias, six, skew, felt = map(numbers, found(xml, "si:valueXMLList"))
@@ -211,7 +211,7 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     assert skew == [*sensor.vector_model.non_orthogonality_rad]
     vector = sensor.vector_model
     stds = [*vector.non_orthogonality_std_rad, *np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)]  # type: ignore[arg-type]
-    freedom = [*vector.non_orthogonality_freedom, *np.ravel(vector.g_sensitivity_freedom)]  # type: ignore[arg-type,misc]
+    freedom = [*vector.non_orthogonality_degrees_of_freedom, *np.ravel(vector.g_sensitivity_degrees_of_freedom)]  # type: ignore[arg-type,misc]
     factors = coverage_factors([np.inf if each is None else each for each in freedom])
     assert len(felt) == 9 and min(factors) > 2
     np.testing.assert_allclose(expanded, [*sensor.budget.expanded, *(factors * stds)], rtol=1e-12)
@@ -270,7 +270,7 @@ def half_known() -> ResultDocument:
     ("refused", "why"),
     [
         (lambda: certificate(read_result(RECORDINGS / "six_observation")), "only the noise part of the uncertainty"),
-        (lambda: certificate(result().model_copy(update={"sensors": {}})), "calibrated nothing"),
+        (lambda: certificate(result().model_copy(update={"gyroscopes": {}})), "calibrated nothing"),
         (lambda: certificate(stated=Stated()), "country is not stated"),
         (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),
     ],

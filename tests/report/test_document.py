@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome
 from rig.data.meaning import Meaning
@@ -24,7 +24,7 @@ from support.synthetic_run import Setup, synthetic_run
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
+    return calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
 @pytest.mark.slow
@@ -33,9 +33,9 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     new = json.loads(document_of(outcome).text())
     assert list(new) == list(old)
     assert list(new["provenance"]) == list(old["provenance"])
-    assert list(new["sensors"]["gyro"]) == [
-        *old["sensors"]["gyro"],
-        *("correction", "correction_matrix", "scale_at", "bias_at", "by_hand"),
+    assert list(new["gyroscopes"]["gyro"]) == [
+        *old["gyroscopes"]["gyro"],
+        *("correction", "correction_matrix", "scale_conditions", "bias_conditions", "by_hand"),
     ]
 
 
@@ -57,8 +57,8 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
 
 @pytest.mark.slow
 def test_a_reference_has_no_solution_of_the_board() -> None:
-    found = calibrated([read_run(RECORDINGS / "verified" / "run.h5")])
-    sensors = json.loads(document_of(found).text())["sensors"]
+    found = calibrate([read_run(RECORDINGS / "verified" / "run.h5")])
+    sensors = json.loads(document_of(found).text())["gyroscopes"]
     assert (sensors["gyro"]["role"], "board" in sensors["gyro"]) == ("calibrate", True)
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)
 
@@ -67,15 +67,15 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
     with pytest.raises(TypeError, match="CheckEntry has no limits"):
         entry(CheckEntry, outcome.checks[0], limits=1.0)
     with pytest.raises(ValueError, match="passed"):
-        entry(CheckEntry, object(), name="gyro.scale", value=None, limit=None, unit="1")
+        entry(CheckEntry, name="gyro.scale", value=None, limit=None, unit="1")
 
 
 @pytest.mark.slow
 def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
-    document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
     assert document.provenance.arm_kinematics is not None
     assert document.provenance.arm_kinematics.alpha_rad == NOMINAL.alpha_rad
-    sensor = json.loads(document.text())["sensors"]["gyro"]
+    sensor = json.loads(document.text())["gyroscopes"]["gyro"]
     assert sensor["speeds_rad_s"] == pytest.approx([math.pi / 3], rel=1e-3)
     assert "nonlinearity" not in sensor
     console = Console(width=150, file=io.StringIO(), record=True)

@@ -24,13 +24,15 @@ COPYABLE = ("certificate: ", "everything: ")
 
 
 def ended(result: ResultDocument, width: int = 80) -> list[str]:
-    since = SINCE if len(result.sensors) > 2 else SINCE[:1]
+    since = SINCE if len(result.gyroscopes) > 2 else SINCE[:1]
     everything, certificate = f"rig show {RUN} --all", RUN / "certificate.html"
     return [*ending(result, folder=RUN, everything=everything, certificate=certificate, since=since, width=width)]
 
 
 def entry_of(check: Check) -> CheckEntry:
-    return entry(CheckEntry, check, coverage_factor=None, **asdict(check.means))
+    means = {**asdict(check.means), "criterion": check.means.what}
+    del means["what"]
+    return entry(CheckEntry, check, coverage_factor=None, **means)
 
 
 ALL = [check.name for check in of_three_parts().checks]
@@ -53,7 +55,7 @@ def test_one_sensor_ends_in_twelve_lines(result: ResultDocument) -> None:
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
 def test_whatever_fails_the_end_fits_its_lines(folder: Path, width: int) -> None:
     result = read_result(folder)
-    calibrated = [name for name, each in result.sensors.items() if each.role != "reference"]
+    calibrated = [name for name, each in result.gyroscopes.items() if each.role != "reference"]
     beside = [*result.accelerometers, *result.magnetometers, *result.bias_drift, *result.over_temperature]
     one = len([*calibrated, *beside]) == 1
     most = 12 if one else 25

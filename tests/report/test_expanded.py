@@ -28,15 +28,15 @@ SCARCE = (7.0, 12.0, None)
 def scarce() -> ResultDocument:
     """Of which angles, gravity's share and drifts are known with few degrees of freedom."""
     document = everything()
-    sensor = document.sensors["gyro"]
+    sensor = document.gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry)
-    angles = {"non_orthogonality_freedom": SCARCE, "g_sensitivity_freedom": (SCARCE,) * 3}
+    angles = {"non_orthogonality_degrees_of_freedom": SCARCE, "g_sensitivity_degrees_of_freedom": (SCARCE,) * 3}
     sensor = sensor.model_copy(update={"vector_model": sensor.vector_model.model_copy(update=angles)})
     drifts = {
-        name: {quantity: each.model_copy(update={"freedom": SCARCE}) for quantity, each in found.items()}
+        name: {quantity: each.model_copy(update={"degrees_of_freedom": SCARCE}) for quantity, each in found.items()}
         for name, found in document.bias_drift.items()
     }
-    return document.model_copy(update={"sensors": {"gyro": sensor}, "bias_drift": drifts})
+    return document.model_copy(update={"gyroscopes": {"gyro": sensor}, "bias_drift": drifts})
 
 
 def terminal(document: ResultDocument) -> str:
@@ -47,7 +47,7 @@ def terminal(document: ResultDocument) -> str:
 
 def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
     document = scarce()
-    vector = document.sensors["gyro"].vector_model
+    vector = document.gyroscopes["gyro"].vector_model
     assert isinstance(vector, VectorEntry)
     factors = coverage_factors([7.0, 12.0, np.inf])
     widths = factors * vector.non_orthogonality_std_rad
@@ -85,8 +85,8 @@ def test_u_of_a_drift_is_by_its_freedom_at_the_terminal_and_on_the_page() -> Non
     console.print(drift_table("gyro", RATE, drift))
     assert f"± U (k ≤ {coverage_factors(7.0):.2f})" in console.export_text()
     page = " ".join(read(certificate(document)).text.split())
-    whole = np.hypot(drift.repeats[0].held.std, drift.common_std)
-    printed = pair(drift.repeats[0].held.bias[0], float(coverage_factors(7.0) * whole[0]))
+    whole = np.hypot(drift.repeats[0].scale_fixed.std, drift.common_std)
+    printed = pair(drift.repeats[0].scale_fixed.bias[0], float(coverage_factors(7.0) * whole[0]))
     assert f"{printed.value} ± {printed.uncertainty}" in page
 
 
@@ -123,19 +123,23 @@ def test_where_nobody_counted_it_says_so_and_is_two_standard_deviations() -> Non
     assert expanded([1.0, 2.0], None).widths == [2.0, 4.0]
     assert factor_words(None) == "k = 2, degrees of freedom not counted"
     document = result()
-    sensor = document.sensors["gyro"]
-    before = sensor.vector_model.model_copy(update={"non_orthogonality_freedom": None})
-    document = document.model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"vector_model": before})}})
+    sensor = document.gyroscopes["gyro"]
+    before = sensor.vector_model.model_copy(update={"non_orthogonality_degrees_of_freedom": None})
+    document = document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"vector_model": before})}})
     assert "degrees of freedom not counted" in read(certificate(document)).text
     assert "degrees of freedom not counted" in terminal(document)
 
 
 def test_what_a_run_finds_beside_scale_and_bias_has_freedom_between_the_scarcest_line_s_and_none_to_count() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.budget is not None
-    fewest = min(each.freedom for each in sensor.budget.contributors if each.freedom is not None)
+    fewest = min(each.degrees_of_freedom for each in sensor.budget.contributors if each.degrees_of_freedom is not None)
     vector = sensor.vector_model
-    for freedom in (vector.non_orthogonality_freedom, vector.mounting_freedom, *(vector.g_sensitivity_freedom or ())):
+    for freedom in (
+        vector.non_orthogonality_degrees_of_freedom,
+        vector.mounting_degrees_of_freedom,
+        *(vector.g_sensitivity_degrees_of_freedom or ()),
+    ):
         assert freedom is not None and all(each is not None and each >= fewest for each in freedom)
         factors = expanded([1.0] * 3, freedom).factors
         assert covered(factors, freedom) == pytest.approx([PROBABILITY] * 3)

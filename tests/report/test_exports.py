@@ -43,14 +43,14 @@ def rows(matrix: Array) -> Any:
 def sensed() -> ResultDocument:
     """The result with a sensor of skew axes, felt gravity, and an accelerometer beside it."""
     rng = np.random.default_rng(5)
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     vector = sensor.vector_model
     assert isinstance(vector, VectorEntry)
     changed = vector.model_copy(update={"g_sensitivity_rad_s_per_m_s2": rows(1e-3 * rng.normal(size=(3, 3)))})
     beside = accelerometer(rows(np.eye(3) + 0.02 * rng.normal(size=(3, 3))))
     return result().model_copy(
         update={
-            "sensors": {"gyro": sensor.model_copy(update={"vector_model": changed})},
+            "gyroscopes": {"gyro": sensor.model_copy(update={"vector_model": changed})},
             "accelerometers": {"gyro": beside},
         }
     )
@@ -63,7 +63,7 @@ def recordings() -> tuple[WithMotion, ...]:
 
 def felt(document: ResultDocument, rate_flange: Array, up_flange: Array) -> tuple[Array, Array]:
     """What gyroscope and accelerometer read, by the models of the result, of a rate and of gravity from above."""
-    sensor = document.sensors["gyro"]
+    sensor = document.gyroscopes["gyro"]
     vector = sensor.vector_model
     assert isinstance(vector, VectorEntry) and vector.g_sensitivity_rad_s_per_m_s2 is not None
     down = -GRAVITY_M_S2 * up_flange
@@ -88,7 +88,7 @@ def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument
     rate, up = motion()
     reading, acceleration = felt(sensed, rate, up)
     force, turned = found.calibrate(acceleration[None], reading[None], "m/s^2", "rad/s")
-    mounting = np.array(sensed.sensors["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    mounting = np.array(sensed.gyroscopes["gyro"].vector_model.mounting)  # type: ignore[union-attr]
     np.testing.assert_allclose(turned[0], mounting @ rate, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(force[0], GRAVITY_M_S2 * mounting @ up, rtol=1e-12, atol=1e-15)
     assert "b_g = -b" in found.comment and "Left out" in found.comment
@@ -112,13 +112,13 @@ def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocum
     for lower in (scaled, of_force):
         assert np.array_equal(lower, np.tril(lower))
     np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
-    mounting = np.array(sensed.sensors["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    mounting = np.array(sensed.gyroscopes["gyro"].vector_model.mounting)  # type: ignore[union-attr]
     beside = sensed.accelerometers["gyro"]
     _, body = triangular(np.linalg.inv(np.array(beside.correction_matrix)))
     rate, up = motion()
     reading, acceleration = felt(sensed, rate, up)
     rate_body, force_body = body @ mounting @ rate, GRAVITY_M_S2 * body @ mounting @ up
-    without_bias = reading + np.array(sensed.sensors["gyro"].bias_rad_s)
+    without_bias = reading + np.array(sensed.gyroscopes["gyro"].bias_rad_s)
     np.testing.assert_allclose(
         scaled @ turned @ rate_body + sensitivity @ turned @ force_body, without_bias, rtol=1e-12, atol=1e-15
     )
@@ -138,7 +138,7 @@ def test_kalibr_s_noise_is_that_of_rests_over_the_root_of_the_rate(sensed: Resul
 
 
 def test_autopilots_subtract_minus_b(sensed: ResultDocument) -> None:
-    bias = sensed.sensors["gyro"].bias_rad_s
+    bias = sensed.gyroscopes["gyro"].bias_rad_s
     px4, ardupilot = texts_of(sensed)
     lines = [line.split("\t") for line in px4.splitlines() if not line.startswith("#")]
     assert [line[2] for line in lines[:3]] == ["CAL_GYRO0_XOFF", "CAL_GYRO0_YOFF", "CAL_GYRO0_ZOFF"]
@@ -146,7 +146,7 @@ def test_autopilots_subtract_minus_b(sensed: ResultDocument) -> None:
     pairs = dict(line.split(",") for line in ardupilot.splitlines() if not line.startswith("#"))
     assert [float(pairs[f"INS_GYROFFS_{axis}"]) for axis in "XYZ"] == [-b for b in bias]
     assert pairs["INS_GYR_CAL"] == "0"
-    assert float(pairs["INS_GYR1_CALTEMP"]) == sensed.sensors["gyro"].temperature_c
+    assert float(pairs["INS_GYR1_CALTEMP"]) == sensed.gyroscopes["gyro"].temperature_c
     for text in (px4, ardupilot):
         assert "Lost: scale factors" in text and "rad/s" in text
 
@@ -183,7 +183,7 @@ def test_a_file_without_gyroscopes_leaves_their_calibration_at_boot_alone() -> N
 def test_sensors_keep_their_numbers_when_one_before_them_was_not_calibrated(sensed: ResultDocument) -> None:
     field = read_result(RECORDINGS / "magnetometer").magnetometers["compass"]
     fields = {"inner": ErrorEntry(error="no field"), "outer": field}
-    two = {"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"]), "magnetometers": fields}
+    two = {"gyroscopes": dict.fromkeys(("a", "b"), sensed.gyroscopes["gyro"]), "magnetometers": fields}
     document = sensed.model_copy(update={**two, "accelerometers": {"b": sensed.accelerometers["gyro"]}})
     px4, ardupilot = texts_of(document)
     assert "CAL_ACC1_XOFF" in px4 and "CAL_ACC0" not in px4 and "INS_ACC2OFFS_X" in ardupilot
@@ -218,15 +218,15 @@ def ellipsoid(diagonal: Array, beside: Array) -> Array:
 
 
 def test_a_second_gyroscope_has_parameters_of_its_own(sensed: ResultDocument) -> None:
-    two = sensed.model_copy(update={"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"])})
+    two = sensed.model_copy(update={"gyroscopes": dict.fromkeys(("a", "b"), sensed.gyroscopes["gyro"])})
     assert "INS_GYR2OFFS_X," in ardupilot_files(calibrations(two))["ardupilot.param"]
     assert "CAL_GYRO1_XOFF" in px4_files(calibrations(two))["px4.params"]
 
 
 @pytest.mark.parametrize("name", OF_CALIBRATIONS)
 def test_a_hostile_serial_number_stays_in_its_comment(sensed: ResultDocument, name: str) -> None:
-    sensor = sensed.sensors["gyro"].model_copy(update={"serial_number": "1\nINS_GYROFFS_X,9\n- ]}"})
-    hostile = sensed.model_copy(update={"sensors": {"gyro": sensor}})
+    sensor = sensed.gyroscopes["gyro"].model_copy(update={"serial_number": "1\nINS_GYROFFS_X,9\n- ]}"})
+    hostile = sensed.model_copy(update={"gyroscopes": {"gyro": sensor}})
     for text in texts_of_calibrations(name)(calibrations(hostile)).values():
         assert "\nINS_GYROFFS_X,9" not in text
 
@@ -244,7 +244,7 @@ def test_what_a_format_has_no_place_for_is_named_in_it(name: str) -> None:
 
 def test_nothing_calibrated_is_nothing_to_export() -> None:
     with pytest.raises(Refused, match="nothing_to_export"):
-        _ = calibrations(result().model_copy(update={"sensors": {}})).imus
+        _ = calibrations(result().model_copy(update={"gyroscopes": {}})).imus
 
 
 def test_names_stay_apart_where_blanks_are_not_taken() -> None:
@@ -259,8 +259,8 @@ def test_csv_solves_to_the_same_calibration(
     assert files == {"arm.csv", "gyro.csv", "gyro_sweeps.csv", "README.txt"}
     solving = ["solve", str(tmp_path / "gyro.csv"), "--sweeps", str(tmp_path / "gyro_sweeps.csv"), "--json"]
     assert main(solving) == 0
-    again = json.loads(capsys.readouterr().out)["sensors"]["imu"]
-    first = read_result(RECORDINGS / "six_observation").sensors["gyro"]
+    again = json.loads(capsys.readouterr().out)["gyroscopes"]["imu"]
+    first = read_result(RECORDINGS / "six_observation").gyroscopes["gyro"]
     std = np.sqrt(np.diag(first.covariance))
     off = np.array([*again["scale"], *again["bias_rad_s"]]) - np.array([*first.scale, *first.bias_rad_s])
     assert np.all(np.abs(off) < std)  # the arm's vibration is noise there
@@ -381,7 +381,7 @@ def test_readings_that_no_arm_turned_are_exported_with_what_is_known_of_their_mo
     main(["solve", str(tmp_path / readings), *options, "--json"])
     solved = json.loads(capsys.readouterr().out)
     first = json.loads((run / "result.json").read_text(encoding="utf-8"))
-    for kind in ("sensors", "accelerometers", "magnetometers"):
+    for kind in ("gyroscopes", "accelerometers", "magnetometers"):
         assert solved.get(kind, {}).keys() == first.get(kind, {}).keys()
         for name, entry in first.get(kind, {}).items():
             np.testing.assert_allclose(solved[kind][name]["scale"], entry["scale"], rtol=1e-9)

@@ -26,7 +26,7 @@ TOLD = [
 
 def entry(stage: int, turn_deg: tuple[float, float, float], std_deg: tuple[float, float, float]) -> MountEntry:
     turn, std = (tuple(np.radians(each).tolist()) for each in (turn_deg, std_deg))
-    return MountEntry.model_validate({"stage": stage, "turn_rad": turn, "std_rad": std})
+    return MountEntry.model_validate({"stage": stage, "rotation_rad": turn, "std_rad": std})
 
 
 def in_stages() -> ResultDocument:

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from rig.cli import main
 from rig.data.quantity import Quantity
-from rig.data.result_file import ResultDocument, SensorEntry
+from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.data.result_types import Freedom3, Vector3
 from rig.history.change_words import name_in_words
 from rig.history.finished import Finished, compact
@@ -54,18 +54,18 @@ DENSITY = Characteristic(
 )
 
 
-class DensityEntry(SensorEntry):
+class DensityEntry(GyroscopeEntry):
     """What the entry of a gyroscope would be with three fields more."""
 
     noise_density_rad_sqrt_s: Vector3 | None = None
     noise_density_std_rad_sqrt_s: Vector3 | None = None
-    noise_density_freedom: Freedom3 | None = None
+    noise_density_degrees_of_freedom: Freedom3 | None = None
 
 
 class DensityDocument(ResultDocument):
     """Such a result."""
 
-    sensors: dict[str, DensityEntry]  # type: ignore[assignment]  # of one kind more special
+    gyroscopes: dict[str, DensityEntry]  # type: ignore[assignment]  # of one kind more special
 
 
 def plain() -> ResultDocument:
@@ -82,10 +82,10 @@ def document(monkeypatch: pytest.MonkeyPatch) -> Iterator[ResultDocument]:
     monkeypatch.setattr(characteristics, "OF_THE_RIG", (*characteristics.OF_THE_RIG, DENSITY))
     kinds.cache_clear()
     said = plain().model_dump(mode="json", by_alias=True, exclude_unset=True)
-    said["sensors"]["gyro"] |= {
+    said["gyroscopes"]["gyro"] |= {
         "noise_density_rad_sqrt_s": VALUES,
         "noise_density_std_rad_sqrt_s": STDS,
-        "noise_density_freedom": (None, None, 12.0),
+        "noise_density_degrees_of_freedom": (None, None, 12.0),
     }
     yield DensityDocument.model_validate(said)
     monkeypatch.undo()
@@ -93,7 +93,7 @@ def document(monkeypatch: pytest.MonkeyPatch) -> Iterator[ResultDocument]:
 
 
 def test_result_json_and_its_schema_have_the_field(document: ResultDocument) -> None:
-    assert json.loads(document.text())["sensors"]["gyro"]["noise_density_rad_sqrt_s"] == list(VALUES)
+    assert json.loads(document.text())["gyroscopes"]["gyro"]["noise_density_rad_sqrt_s"] == list(VALUES)
     assert "noise_density_rad_sqrt_s" in json.dumps(type(document).model_json_schema())
 
 
@@ -133,7 +133,7 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
     assert first["bias"]["texts"][0] == "0.344" and first["bias"]["u"][0] == "0.028"
     result = Result(document)
     assert "gyro: density of noise x" in result._repr_html_()
-    found = result["gyro"].beside["density of noise"]
+    found = result["gyro"].characteristics["density of noise"]
     assert found.values.tolist() == list(VALUES) and found.unit == "rad/s/√Hz" and found.labels == ("x", "y", "z")
     assert found.expanded[:2].tolist() == pytest.approx([2 * STDS[0], 2 * STDS[1]]) and found.expanded[2] > 2 * STDS[2]
 
@@ -142,7 +142,7 @@ def test_page_and_notebook_show_it(document: ResultDocument) -> None:
 def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (of,) = (each for each in followed(document) if (each.sensor, each.quantity) == ("gyro", "rate"))
     assert [each.name for each in of.parameters if each.name in DENSITY.parameters] == ["bow_x", "bow_y", "bow_z"]
-    place, serial = str(tmp_path / "history.sqlite"), document.sensors["gyro"].serial_number
+    place, serial = str(tmp_path / "history.sqlite"), document.gyroscopes["gyro"].serial_number
     text = compact(json.loads(document.text()))
     with open_history(place) as history:
         history.enter(Finished(text, document, "bench", (), False, "here", "/runs/1", ()))
@@ -160,8 +160,8 @@ def test_a_history_follows_it(document: ResultDocument, tmp_path: Path, capsys: 
 
 def test_a_result_of_before_that_does_not_state_it_is_still_what_its_recordings_give(document: ResultDocument) -> None:
     assert not_given(plain(), document) == []
-    other = document.sensors["gyro"].model_copy(update={"noise_density_rad_sqrt_s": (1.1e-4, 2e-4, 3e-4)})
-    changed = document.model_copy(update={"sensors": {"gyro": other}})
+    other = document.gyroscopes["gyro"].model_copy(update={"noise_density_rad_sqrt_s": (1.1e-4, 2e-4, 3e-4)})
+    changed = document.model_copy(update={"gyroscopes": {"gyro": other}})
     assert any("bow_x" in each for each in not_given(changed, document))
 
 

@@ -57,7 +57,7 @@ def test_the_result_holds_the_sensor_and_agrees_with_its_calibration(
         true = warmed[1].at(row.temperature_c)
         assert (np.abs(np.array(row.scale) - true[:3]) < 3 * np.array(row.expanded_scale) + 1e-3).all()
         assert (np.abs(-np.array(row.bias) - true[3:]) < 3 * np.array(row.expanded_bias) + 5e-4).all()  # axes lean
-    calibration = result.sensors["imu"]
+    calibration = result.gyroscopes["imu"]
 
     assert calibration.temperature_c == REFERENCE_C
     assert np.allclose(entry.at(REFERENCE_C)[0], calibration.scale) and np.allclose(
@@ -130,7 +130,7 @@ def test_the_header_corrects_by_temperature(
 ) -> None:
     taken_c = min(asked_c, entry.range_c[1])
     scale, bias = (np.array(each) for each in entry.at(taken_c))
-    matrix = np.array(result.sensors["imu"].correction_matrix) * (scale / entry.scale[0])
+    matrix = np.array(result.gyroscopes["imu"].correction_matrix) * (scale / entry.scale[0])
 
     *rate, held = c_of(calibration_header(result), tmp_path, asked_c)
 

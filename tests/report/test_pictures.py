@@ -32,7 +32,7 @@ def bars(picture: Residuals) -> np.ndarray:
 
 
 def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry) and sensor.vector_model.residuals_std_rad_s is not None
     picture = residuals(Finding("gyro", RATE, sensor))
     assert picture is not None and picture.of == EXPECTED
@@ -43,7 +43,7 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
 
 
 def test_bars_of_results_of_before_are_called_what_they_are() -> None:
-    sensor = read_result(RECORDINGS / "imu").sensors["gyro"]
+    sensor = read_result(RECORDINGS / "imu").gyroscopes["gyro"]
     picture = residuals(Finding("gyro", RATE, sensor))
     assert picture is not None and picture.of == OF_SAMPLES
     assert "which holds vibration" in picture.of
@@ -94,7 +94,7 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
 
 
 def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
-    sensor = result().sensors["gyro"]
+    sensor = result().gyroscopes["gyro"]
     assert sensor.budget is not None
     table = printed_budget(sensor.budget, sensor.scale, RATE.bias)
     picture = contributions(sensor.budget, sensor.scale)

@@ -33,7 +33,7 @@ def texts_replaced(value: Any, keys: frozenset[str]) -> None:
 
 @pytest.mark.slow
 def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    keys = frozenset({"serial_number", "rig_version", "arm_model", "what", "source", "reference"})
+    keys = frozenset({"serial_number", "rig_version", "arm_model", "what", "fault", "criterion", "source", "reference"})
     folder = forged("imu", lambda document: texts_replaced(document, keys), tmp_path)
     assert main(["show", "--all", str(folder)]) == 0
     assert main(["report", str(folder)]) == 0
@@ -50,15 +50,27 @@ def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.
         ("6/verified", lambda d: d["provenance"].update(started_utc="never"), "provenance.started_utc: "),
         ("6/resumed", lambda d: d["provenance"].update(resumed_utc=["x"]), "provenance.resumed_utc.0: "),
         ("6/bias_drift", lambda d: d["bias_drift"].update(gyro={"x": d["bias_drift"]["gyro"]["rate"]}), "no quantity"),
-        ("7/six_observation", lambda d: d["sensors"]["gyro"]["covariance"][4].__setitem__(4, -1), "variance below 0"),
         (
             "7/six_observation",
-            lambda d: d["sensors"]["gyro"]["vector_model"].update(matrix_covariance=[[1e-6] * 8] * 9),
+            lambda d: d["gyroscopes"]["gyro"]["covariance"][4].__setitem__(4, -1),
+            "variance below 0",
+        ),
+        (
+            "7/six_observation",
+            lambda d: d["gyroscopes"]["gyro"]["vector_model"].update(matrix_covariance=[[1e-6] * 8] * 9),
             "must have as many columns as rows",
         ),
-        ("7/six_observation", lambda d: d["sensors"]["gyro"].update(scale=[1, 1, 1e300]), "'1e+300' is no number that"),
-        ("7/six_observation", lambda d: d["sensors"]["gyro"].update(scale=[1, 1, 10**200]), "is no number that"),
-        ("7/six_observation", lambda d: d["sensors"]["gyro"].update(scale=[1, 1, float("nan")]), "'NaN' is no number"),
+        (
+            "7/six_observation",
+            lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 1e300]),
+            "'1e+300' is no number that",
+        ),
+        ("7/six_observation", lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 10**200]), "is no number that"),
+        (
+            "7/six_observation",
+            lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, float("nan")]),
+            "'NaN' is no number",
+        ),
         ("7/verified", lambda d: d["verification"]["gyro"]["after"].update(delay_std_s=[]), "must be as many"),
     ],
 )
@@ -89,7 +101,7 @@ def test_nesting_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_a_size_that_a_later_version_finds_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def forge(document: Any) -> None:
-        document["sensors"]["gyro"]["by_hand"]["sizes"][0]["name"] = "tremor_rad"
+        document["gyroscopes"]["gyro"]["by_hand"]["errors"][0]["name"] = "tremor_rad"
 
     assert main(["show", "--all", str(forged("by_hand", forge, tmp_path))]) == 0
     assert "by hand: " in capsys.readouterr().out

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
@@ -21,7 +21,7 @@ from support.waiting import PATIENCE_S
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return calibrated([read_run(RECORDINGS / "six_observation" / "run.h5")])
+    return calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])
 
 
 def test_the_folder_holds_header_certificate_and_result(outcome: Outcome, tmp_path: Path) -> None:
@@ -70,10 +70,10 @@ def write_toy(outcome, document, folder):
 RUN = """
 import sys
 from pathlib import Path
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
-print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))]))))
+print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrate([read_run(Path(sys.argv[1]))]))))
 """
 
 

@@ -49,7 +49,7 @@ def drawn(seed: int) -> dict[str, Any]:
             "seed": seed,
             "time_scale": 15,  # faster, and a busy machine asks the board too late for what it keeps
             "arm": {
-                "residue": {
+                "unmodelled": {
                     "twist_rad": (ERROR_RAD * np.array([0, 0, 0, 1, 1, 0]) * rng.normal(size=6)).tolist(),
                     "zero_rad": (ERROR_RAD * WRISTS * rng.normal(size=6)).tolist(),
                     "encoder_once_rad": 0.7 * ERROR_RAD,  # as tests/support/arm_attitudes.py has them
@@ -85,11 +85,11 @@ def test_scale_and_bias_hold_on_an_arm_that_is_off_by_a_milliradian(tmp_path: Pa
             truth = np.array(simulated["accelerometer"]["scale"] + simulated["accelerometer"]["bias_m_s2"])
             errors.append(np.array(found["scale"] + found["bias_m_s2"]) - truth)
             stds.append(np.sqrt(np.diag(found["covariance"])))
-            alone = found["beside"]["as_published"], found["beside"]["attitude_weighted"]
+            alone = found["other_methods"]["as_published"], found["other_methods"]["attitude_weighted"]
             published.append([np.array(each["scale"] + each["bias_m_s2"]) - truth for each in alone])
             levers.append(1e3 * np.array(found["lever_arm_m"]) - simulated["offset_mm"])
             xy, xz, yz = simulated.get("non_orthogonality_deg", (0, 0, 0))
-            gyro = np.degrees(result["sensors"][name]["vector_model"]["non_orthogonality_rad"])
+            gyro = np.degrees(result["gyroscopes"][name]["vector_model"]["non_orthogonality_rad"])
             skews.append(gyro - _between(xy, xz, yz))
         scale, bias = 1e6 * rms(np.array(errors)[:, :3]), rms(np.array(errors)[:, 3:]) / MICRO_G
         over = rms(np.array(errors) / stds)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
@@ -92,8 +92,8 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
     out, result, world, printed = in_attitudes
     assert np.abs(over_std(result, world)).max() < 4
     found = result["accelerometers"]["gyro"]
-    assert result["sensors"] == {} and found["lever_arm_m"] is None and found["alignment"] is None
-    assert len(found["dwells"]) == 9 and found["held_out"]["dwells"] == 9
+    assert result["gyroscopes"] == {} and found["lever_arm_m"] is None and found["alignment"] is None
+    assert len(found["dwells"]) == 9 and found["validation"]["dwells"] == 9
     skew = np.array(found["non_orthogonality_rad"]) - np.radians([0.1, -0.2, 0.3])
     assert np.all(np.abs(skew) < 4 * np.array(found["non_orthogonality_std_rad"]))
     assert {check["name"] for check in result["checks"] if check["unit"] != "1" or "scale" in check["name"]} == {
@@ -123,7 +123,7 @@ def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
     """Where it sits, how late it is, and how its axes lie to the gyroscope's: that takes sweeps."""
     _, result, world, printed = imu
     assert np.abs(over_std(result, world)).max() < 4
-    found, gyro = result["accelerometers"]["gyro"], result["sensors"]["gyro"]
+    found, gyro = result["accelerometers"]["gyro"], result["gyroscopes"]["gyro"]
     assert found["sweeps"] == 6 and len(gyro["rests"]) >= 9, "a dwell is a rest for the gyroscope"
     lever = np.array(found["lever_arm_m"]) - 1e-3 * np.array(world["offset_mm"])
     assert np.all(np.abs(lever) < 4 * np.array(found["lever_arm_std_m"]))
@@ -211,7 +211,7 @@ def saturated(counts: np.ndarray) -> np.ndarray:
 def test_a_recording_that_is_wrong_is_refused_by_name(in_attitudes: Finished, damage: Damage, name: str) -> None:
     run = read_run(in_attitudes[0] / "run.h5")
     with pytest.raises(Fault) as refused:
-        calibrated([damage(run)])
+        calibrate([damage(run)])
     assert re.fullmatch(name, refused.value.name), refused.value
 
 

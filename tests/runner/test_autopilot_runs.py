@@ -37,7 +37,7 @@ def configuration(folder: Path, *changes: dict[str, Any]) -> Path:
 
 def off(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """(6,) how far scale and bias are from the truth, and their standard deviations."""
-    entry = json.loads((folder / "result.json").read_text(encoding="utf-8"))["sensors"]["imu1"]
+    entry = json.loads((folder / "result.json").read_text(encoding="utf-8"))["gyroscopes"]["imu1"]
     return np.array(entry["scale"] + entry["bias_rad_s"]) - TRUTH, np.sqrt(np.diag(entry["covariance_combined"]))
 
 

@@ -32,7 +32,7 @@ def held(run: Path) -> None:
     """The scale factors of a run's result are those of its simulated part, by what the session itself tells."""
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
     truth = yaml.safe_load((run.parent / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
-    entry = result["sensors"]["gyro"]
+    entry = result["gyroscopes"]["gyro"]
     expanded = 3 * np.array(entry["by_hand"]["session_std"])
     assert np.all(np.abs(np.subtract(entry["scale"], truth["scale"])) < expanded), entry["scale"]
 
@@ -47,7 +47,7 @@ def test_a_run_with_mistakes_asks_again_and_passes_and_solves_again_to_the_same(
     held(out)
     again = rig_here("solve", out, "--json")
     first, second = json.loads((out / "result.json").read_text()), json.loads(again.stdout)
-    assert first["sensors"] == second["sensors"]
+    assert first["gyroscopes"] == second["gyroscopes"]
     assert "By hand: the item was turned" in (out / "certificate.html").read_text(encoding="utf-8")
     assert rig_here("show", out).returncode == 0
 

@@ -62,11 +62,11 @@ def test_a_killed_run_loses_one_dwell_at_most_and_tells_every_repeat(tmp_path: P
     truth = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
     found = result["bias_drift"]["gyro"]
     for repeat in found["acceleration"]["repeats"]:
-        off = np.array(repeat["held"]["bias"]) - truth["accelerometer"]["bias_m_s2"]
-        std = np.hypot(repeat["held"]["std"], found["acceleration"]["common_std"])
+        off = np.array(repeat["scale_fixed"]["bias"]) - truth["accelerometer"]["bias_m_s2"]
+        std = np.hypot(repeat["scale_fixed"]["std"], found["acceleration"]["common_std"])
         assert np.all(np.abs(off) < 5 * std)
-        assert "bias" in repeat["anew"]
-    assert len(found["rate"]["repeats"]) == 3 and "too_few_observations" in found["rate"]["over_temperature"]["error"]
+        assert "bias" in repeat["scale_free"]
+    assert len(found["rate"]["repeats"]) == 3 and "too_few_observations" in found["rate"]["temperature_slope"]["error"]
     assert {"gyro.bias_drift", "gyro.acceleration_bias_drift"} <= {check["name"] for check in result["checks"]}
     assert "largest change of the bias" in resumed.stdout
     assert "bias by repeat" in rig_here("show", out, "--all").stdout

@@ -124,7 +124,7 @@ SHORTEST = {"name": "shortest", "speed_deg_s": 150, "acceleration_deg_s2": 400, 
 def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_interruption(tmp_path: Path) -> None:
     """Interrupted on its way home, it has all that is wanted, and measures nothing more."""
     config, run = (
-        configuration(tmp_path, procedure={**SHORTEST, "wanted": {"scale": 0.05, "bias": 0.05}}),
+        configuration(tmp_path, procedure={**SHORTEST, "target_uncertainty": {"scale": 0.05, "bias": 0.05}}),
         tmp_path / "run",
     )
     begun = subprocess.Popen([sys.executable, "-m", "rig", "run", config, "--out", run], stderr=subprocess.DEVNULL)
@@ -134,7 +134,7 @@ def test_a_run_ends_when_what_is_wanted_is_reached_and_is_resumed_after_an_inter
     if begun.returncode == 130:  # else it was home already
         assert rig("resume", run).returncode == 0
     result = json.loads((run / "result.json").read_text(encoding="utf-8"))
-    assert len(result["sensors"]["gyro"]["observations"]) == 6
+    assert len(result["gyroscopes"]["gyro"]["observations"]) == 6
     assert {"gyro.scale_u": True, "gyro.bias_u": True}.items() <= passed(result).items()
 
 
@@ -144,7 +144,7 @@ def test_a_run_that_does_not_come_to_what_is_wanted_fails_by_its_name(tmp_path: 
     wanted = {"scale": 1e-5, "bias": 0.05}
     done = rig(
         "run",
-        configuration(tmp_path, procedure={**SHORTEST, "wanted": wanted, "repeats": 2}),
+        configuration(tmp_path, procedure={**SHORTEST, "target_uncertainty": wanted, "repeats": 2}),
         "--out",
         tmp_path / "run",
     )
@@ -152,7 +152,7 @@ def test_a_run_that_does_not_come_to_what_is_wanted_fails_by_its_name(tmp_path: 
     assert "more than wanted: 1 more repeat at most" in done.stderr
     assert "FAILED gyro.scale_u" in done.stdout
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
-    assert len(result["sensors"]["gyro"]["observations"]) == 12
+    assert len(result["gyroscopes"]["gyro"]["observations"]) == 12
     assert [name for name, good in passed(result).items() if not good] == ["gyro.scale_u"]
 
 

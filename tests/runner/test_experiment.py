@@ -57,7 +57,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     """SIX, Tables II and III: below 1e-3 in scale; the bias, as it was on the average of the run, within 2 U."""
     out, result, turntable = finished
-    gyro = result["sensors"]["gyro"]
+    gyro = result["gyroscopes"]["gyro"]
     std = np.sqrt(np.diag(gyro["covariance_combined"]))
     scale_error = np.array(gyro["scale"]) - turntable["gyro"]["scale"]
     arm_s = read_run(out / "run.h5").states["time_s"]
@@ -70,14 +70,14 @@ def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
 
 def test_the_board_solves_as_the_computer_does(finished: Finished) -> None:
     _, result, truth = finished
-    board = result["sensors"]["gyro"]["board"]
+    board = result["gyroscopes"]["gyro"]["board"]
     print(f"board and host differ by {board['scale_difference']:.1e} and {board['bias_difference_rad_s']:.1e} rad/s")
     assert board["scale_difference"] <= 1e-4 and board["bias_difference_rad_s"] <= 1e-5
     assert board["solutions"]["closed_form"]["observations"] == 6
     published = board["solutions"]["algorithm_1"]
     assert published["status"] == "solved" and np.allclose(published["scale"], truth["gyro"]["scale"], atol=2e-3)
     assert {check["name"] for check in result["checks"]} >= {"gyro.board_scale", "gyro.board_bias"}
-    assert "board" not in result["sensors"]["reference"]
+    assert "board" not in result["gyroscopes"]["reference"]
 
 
 def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
@@ -130,7 +130,7 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     log = (out / "log.txt").read_text(encoding="utf-8")
     assert "stored on the board: gyro" in log
     kept = result["provenance"]["stored_calibrations"]["gyro"]
-    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
+    assert np.allclose(kept["scale"], result["gyroscopes"]["gyro"]["scale"], rtol=1e-6)
     again = rig_here("solve", out, "--json")
     assert again.returncode == 0, again.stderr
     assert solved_otherwise(out, again.stdout) == []
@@ -140,7 +140,7 @@ def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -
     out, _, _ = finished
     alone = rig_here("solve", out / "verify.h5", "--json")
     document = json.loads(alone.stdout)
-    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    assert document["gyroscopes"] == {} and document["verification"]["gyro"]["before"] is None
     assert {check["name"] for check in document["checks"]} == VERIFIED
 
 
@@ -174,9 +174,9 @@ def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Pa
     verified = subprocess.run(again, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert verified.returncode == 0, verified.stdout + verified.stderr
     document = json.loads(verified.stdout)
-    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    assert document["gyroscopes"] == {} and document["verification"]["gyro"]["before"] is None
     kept = document["provenance"]["stored_calibrations"]["gyro"]
-    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
+    assert np.allclose(kept["scale"], result["gyroscopes"]["gyro"]["scale"], rtol=1e-6)
 
 
 @pytest.mark.proof
@@ -195,7 +195,7 @@ def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    gyro, after = result["sensors"]["gyro"], result["verification"]["gyro"]["after"]
+    gyro, after = result["gyroscopes"]["gyro"], result["verification"]["gyro"]["after"]
     largest = np.abs([turn["error_rad_s"] for turn in after["revolutions"]]).max()
     over_noise = np.array(after["movement"]["rms_rad_s"]) / after["noise_rad_s"]
     print(f"mean of a revolution {largest:.1e} rad/s at most, RMS {over_noise} of the noise")

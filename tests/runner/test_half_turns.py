@@ -21,13 +21,13 @@ def test_half_turns_recover_the_simulated_truth(tmp_path: Path) -> None:
         "procedure": {"arc_deg": 180},
         "uncertainty": {"angle_std_deg": STD_DEG},
         "limits": {"bias_std_rad_s": 0.02},  # half the readings of whole turns
-        "world": {"arm": {"residue": {"encoder_once_rad": ONCE_RAD, "encoder_twice_rad": TWICE_RAD}}},
+        "world": {"arm": {"unmodelled": {"encoder_once_rad": ONCE_RAD, "encoder_twice_rad": TWICE_RAD}}},
     }
     done = rig("run", configuration(tmp_path, changes), "--out", tmp_path / "run")
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     truth = yaml.safe_load((tmp_path / "run" / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
-    sensor = result["sensors"]["gyro"]
+    sensor = result["gyroscopes"]["gyro"]
     assert [each["angle_rad"] for each in sensor["observations"]] == pytest.approx([np.pi] * 6)
     assert "turner's encoders" in {each["name"] for each in sensor["budget"]["contributors"]}
     error = np.array(sensor["scale"] + sensor["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])

@@ -56,7 +56,7 @@ def configuration(folder: Path, *changes: dict[str, Any]) -> Path:
 
 def sensor(result: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """(6,) scale and bias of the KVH 1775 as stated, and their standard deviations."""
-    entry = result["sensors"]["kvh"]
+    entry = result["gyroscopes"]["kvh"]
     return np.array(entry["scale"] + entry["bias_rad_s"]), np.sqrt(np.diag(entry["covariance_combined"]))
 
 
@@ -156,7 +156,7 @@ def test_it_finds_the_earths_rate_beside_what_the_paper_found(tmp_path: Path) ->
         heading_deg = 47 * seed % 360
         world = {"world": {"seed": seed, "site": {"heading_deg": heading_deg}}}
         result = earth_run(tmp_path / str(seed), world)
-        earth = result["sensors"]["kvh"]["earth_rate"]
+        earth = result["gyroscopes"]["kvh"]["earth_rate"]
         off.append((earth["norm_rad_s"] - EARTH_RATE_RAD_S) / DEG_H)
         over.append((earth["norm_rad_s"] - EARTH_RATE_RAD_S) / earth["norm_std_rad_s"])
         turned = np.angle(np.exp(1j * (earth["heading_rad"] - np.radians(heading_deg))))

@@ -42,7 +42,7 @@ def calibrated(folder: Path, *changes: dict[str, Any]) -> dict[str, Any]:
     done = rig("run", configuration(folder, *changes), "--out", folder / "run")
     assert done.returncode == 0, done.stderr + done.stdout
     result: dict[str, Any] = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
-    entry: dict[str, Any] = result["sensors"]["imu"]
+    entry: dict[str, Any] = result["gyroscopes"]["imu"]
     return entry
 
 
@@ -117,7 +117,7 @@ def test_a_time_by_arrival_costs_what_the_budget_says(tmp_path: Path) -> None:
     else:
         pytest.skip("the simulated laboratory stood still again and again, and the computer's clock went on")
     assert done.returncode == 0, done.stderr + done.stdout
-    entry = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["sensors"]["imu"]
+    entry = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["gyroscopes"]["imu"]
     assert np.abs(off(entry)).max() < 4
     (stamps,) = (each for each in entry["budget"]["contributors"] if each["name"] == "times of the samples")
     assert max(stamps["std"][:3]) > 0

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.cli import main
 from rig.data.quantity import FIELD, RATE
 from rig.data.run_file import RunData, read_run
@@ -38,7 +38,7 @@ ATTITUDES = {
     "acceleration_deg_s2": 700,
 }
 # Along the axis of wrist 3, where no residual shows it; 0.36 m from the sensor, which feels 1.3 µT of it.
-IRON = {"carried_by": "wrist_2", "place_mm": [0, 0, 56.55], "moment_a_m2": [0, 0, 0.3]}
+IRON = {"carried_by": "wrist_2", "position_mm": [0, 0, 56.55], "moment_a_m2": [0, 0, 0.3]}
 ARM_FIELD_UT = 0.2 * 0.3 / 0.36**3
 OVER = {"x": "+x", "y": "-y", "z": "-z"}
 LABORATORY: dict[str, Any] = {
@@ -208,7 +208,9 @@ def test_sweeps_record_a_magnetometer_and_say_that_they_do_not_calibrate_it(tmp_
     assert done.returncode == 0, done.stdout + done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert result["magnetometers"]["compass"]["error"].startswith("no_attitudes: ")
-    assert set(result["sensors"]) == set(yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["sensors"])
+    assert set(result["gyroscopes"]) == set(
+        yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["sensors"]
+    )
     assert "compass, magnetometer, not calibrated: no_attitudes" in done.stdout.replace("\n", " ")
     assert len(recorded(out).samples["compass"]) > 100
 
@@ -252,7 +254,7 @@ def with_every_third_sample_lost(run: RunData) -> RunData:
 def test_a_field_that_does_not_calibrate_says_why_and_costs_the_accelerometer_nothing(
     finished: tuple[Path, dict[str, Any], str], damage: Damage, name: str
 ) -> None:
-    outcome = calibrated([damage(recorded(finished[0]))])
+    outcome = calibrate([damage(recorded(finished[0]))])
     assert outcome.magnetometers.faults["compass"].name == name
     assert set(outcome.accelerometers) == {"gyro"}
     wanted = [] if name == "field_strength_unknown" else ["compass.field_unsolved"]  # what asks for it is not there

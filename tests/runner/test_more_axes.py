@@ -19,7 +19,7 @@ def test_six_axes_and_two_speeds_recover_the_simulated_truth(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     truth = yaml.safe_load((tmp_path / "run" / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
-    sensor = result["sensors"]["gyro"]
+    sensor = result["gyroscopes"]["gyro"]
     assert len(sensor["observations"]) == 24
     assert np.degrees(sensor["speeds_rad_s"]) == pytest.approx([75, 150], rel=1e-2)
     odd, std = (np.array(sensor["nonlinearity"][f"odd_{each}per_rad_s"]) for each in ("", "std_"))

@@ -50,7 +50,7 @@ def document(source: str, *changes: dict[str, Any]) -> dict[str, Any]:
     for change in (own, *changes):
         found = merge(found, change)
     host = fresh_host()
-    sensor = found["sensors"][name]
+    sensor = found["gyroscopes"][name]
     if source == "lines":
         sensor["serial"]["port"] = f"socket://{host}:7341"
     else:
@@ -96,7 +96,7 @@ def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
     rest_s = on_s + 1e-6 * (np.array([last.begin_us, last.end_us]) - int(first["board_time_us"]))
     true = truth(laboratory, name, [(rest_s[0], rest_s[1])])
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    return Ran(result["sensors"][name], np.array(laboratory["world"]["sensors"][name]["scale"]), true[3:])
+    return Ran(result["gyroscopes"][name], np.array(laboratory["world"]["sensors"][name]["scale"]), true[3:])
 
 
 def began(laboratory: dict[str, Any], log: str) -> float:
@@ -120,7 +120,7 @@ def test_what_tells_its_own_time_is_calibrated_by_hand(source: str, tmp_path: Pa
     (clock,) = (each for each in entry["budget"]["contributors"] if each["name"] == "clock")
     assert clock["half_width"] == CLOCK_PPM and "the sensor's own clock" in clock["source"]
     again = json.loads(rig_here("solve", tmp_path / "run", "--json").stdout)
-    assert again["sensors"][SOURCES[source][0]]["scale"] == entry["scale"]
+    assert again["gyroscopes"][SOURCES[source][0]]["scale"] == entry["scale"]
 
 
 @pytest.mark.slow

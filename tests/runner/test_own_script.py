@@ -74,7 +74,7 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     assert resumed.returncode == 0, resumed.stderr
     assert "resuming: 2 of 6 sweeps" in resumed.stderr and "done: a short rest" in resumed.stderr
     result = json.loads((interrupted / "result.json").read_text(encoding="utf-8"))
-    observations = result["sensors"]["gyro"]["observations"]
+    observations = result["gyroscopes"]["gyro"]["observations"]
     assert [o["joint"] for o in observations] == [f"wrist_{joint}" for joint in (1, 1, 3, 3, 2, 2)]
     speeds = [o["speed_rad_s"] for o in observations]
     assert speeds == pytest.approx([radians(speed) for speed in (150, 150, 150, 150, 100, 100)], rel=1e-3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from firmware_host.answers import BoardObservation
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.analysis.calibration import observe_recordings
 from rig.data.events import BoardObserved, Recorded
 from rig.data.run_file import RunData, read_run
@@ -111,7 +111,7 @@ def test_what_was_read_at_rest_beside_a_repeated_sweep_does_not_count() -> None:
 
 def failed(runs: list[RunData]) -> set[str]:
     """The checks that failed but those of what the board solved, which these recordings tell nothing of."""
-    return {check.name for check in calibrated(runs).checks if not check.passed and "board" not in check.name}
+    return {check.name for check in calibrate(runs).checks if not check.passed and "board" not in check.name}
 
 
 def part(run: RunData, from_s: float, to_s: float) -> RunData:
@@ -145,4 +145,4 @@ def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path)
     assert resumed.returncode == 0, resumed.stderr + resumed.stdout
     assert resumed.stderr.count("done: sweep") == 2  # which of the two about one axis it was nobody can tell
     repeated = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    assert repeated["verdict"] == "pass" and len(repeated["sensors"]["gyro"]["observations"]) == 6
+    assert repeated["verdict"] == "pass" and len(repeated["gyroscopes"]["gyro"]["observations"]) == 6

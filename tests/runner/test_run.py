@@ -53,7 +53,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
 def test_a_run_recovers_the_simulated_truth(finished: tuple[Path, dict[str, Any], Any]) -> None:
     out, result, _ = finished
     truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
-    sensor = result["sensors"]["gyro"]
+    sensor = result["gyroscopes"]["gyro"]
     estimate = np.array(sensor["scale"] + sensor["bias_rad_s"])
     std = np.sqrt(np.diag(sensor["covariance"]))
     error = estimate - np.array(truth["scale"] + truth["bias_rad_s"])
@@ -64,19 +64,19 @@ def test_a_run_recovers_the_simulated_truth(finished: tuple[Path, dict[str, Any]
 def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, Any], Any]) -> None:
     out, result, done = finished
     assert result["schema"] == "rig.result/1" and result["verdict"] == "pass"
-    assert result["sensors"]["gyro"]["model"] == "g = K (m + b)"
-    assert [o["joint"] for o in result["sensors"]["gyro"]["observations"]] == [
+    assert result["gyroscopes"]["gyro"]["model"] == "g = K (m + b)"
+    assert [o["joint"] for o in result["gyroscopes"]["gyro"]["observations"]] == [
         "wrist_3", "wrist_3", "wrist_1", "wrist_1", "wrist_2", "wrist_2",
     ]  # fmt: skip
     assert "done: sweep wrist_2 ccw" in (out / "log.txt").read_text(encoding="utf-8")
-    assert f"gyro_scale[3] = {{{result['sensors']['gyro']['scale'][0]:.9e}f" in (out / "calibration.h").read_text()
+    assert f"gyro_scale[3] = {{{result['gyroscopes']['gyro']['scale'][0]:.9e}f" in (out / "calibration.h").read_text()
     certificate = (out / "certificate.html").read_text(encoding="utf-8")
     assert "Simulated laboratory: no real item was calibrated" in certificate and "± U" in certificate
     assert "Equipment: robot arm Universal Robots UR10e or UR12e, serial number 20265500123" in certificate
     assert result["provenance"]["arm_model"] == "UR10e or UR12e"
     *lines, last = done.stdout.splitlines()
     assert last == "verdict: PASS" and len(lines) < 12
-    assert float(lines[1].split()[1]) == pytest.approx(result["sensors"]["gyro"]["scale"][0], abs=1e-4)
+    assert float(lines[1].split()[1]) == pytest.approx(result["gyroscopes"]["gyro"]["scale"][0], abs=1e-4)
     assert f"everything: rig show {out} --all" in lines
     whole = rig("show", out, "--all").stdout
     assert ", vector" in whole and "six_observation: k" in whole and "non-orthogonality" in whole
@@ -112,9 +112,9 @@ def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any]
 
 def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any]) -> None:
     out, result, _ = finished
-    published = json.loads(rig_here("solve", out, "--estimator", "algorithm_1", "--json").stdout)["sensors"]["gyro"]
+    published = json.loads(rig_here("solve", out, "--estimator", "algorithm_1", "--json").stdout)["gyroscopes"]["gyro"]
     assert published["estimator"] == "algorithm_1" and published["iterations"] >= 2
-    beside = result["sensors"]["gyro"]
+    beside = result["gyroscopes"]["gyro"]
     assert beside["estimator"] == "vector" and beside["six_observation"]["estimator"] == "newton"
     assert np.allclose(published["scale"], beside["six_observation"]["scale"], atol=1e-4)
     assert beside["algorithm_1"] == {name: published[name] for name in beside["algorithm_1"]}
@@ -123,9 +123,10 @@ def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any])
 @pytest.mark.parametrize("estimator", ["vector", "newton", "levenberg_marquardt"])
 def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any], Any], estimator: str) -> None:
     out, result, _ = finished
-    solved = json.loads(rig_here("solve", out, "--estimator", estimator, "--json").stdout)["sensors"]["gyro"]
+    solved = json.loads(rig_here("solve", out, "--estimator", estimator, "--json").stdout)["gyroscopes"]["gyro"]
     assert (
-        solved["estimator"] == estimator and solved["six_observation"] == result["sensors"]["gyro"]["six_observation"]
+        solved["estimator"] == estimator
+        and solved["six_observation"] == result["gyroscopes"]["gyro"]["six_observation"]
     )
     truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
     error = np.array(solved["scale"] + solved["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
@@ -157,8 +158,8 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    assert [o["sweep"] for o in result["sensors"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
-    assert len(result["sensors"]["gyro"]["time_bases"]) == 2
+    assert [o["sweep"] for o in result["gyroscopes"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
+    assert len(result["gyroscopes"]["gyro"]["time_bases"]) == 2
     assert swept < 6 and resumed.stderr.count("done: sweep") == 6 - swept
     assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
 

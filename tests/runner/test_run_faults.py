@@ -342,7 +342,8 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     assert resumed.returncode == 0, resumed.stderr
     assert "resuming: 5 of 6 sweeps and dwells are recorded and sound" in resumed.stderr
     assert resumed.stderr.count("done: sweep") == 1
-    observations = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))["sensors"]["gyro"]["observations"]
+    result = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))
+    observations = result["gyroscopes"]["gyro"]["observations"]
     assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
 
 
@@ -445,7 +446,7 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     for name in taken:
         handle.control({"do": "register_in_use", "name": name})
     missing = command("check", config)
-    assert missing.returncode == 2 and "not ready: 3 to mend" in missing.stdout
+    assert missing.returncode == 2 and "not ready: 3 to correct" in missing.stdout
     assert "missing: speed_slider: the speed slider is at 30 %" in missing.stderr
     assert "missing: registers_in_use: " in missing.stderr and "URCaps" in missing.stderr
     state = handle.state()

@@ -51,15 +51,15 @@ def test_a_run_that_lost_its_supply_is_resumed_and_solved(tmp_path: Path) -> Non
     assert "stage 1 of 3" not in "".join(rest.said).lower()
 
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    gyro = result["sensors"]["gyro"]
+    gyro = result["gyroscopes"]["gyro"]
     assert (result["verdict"], gyro["estimator"], result["provenance"]["turner_kind"]) == ("pass", "newton", "servo")
     u = np.sqrt(np.diag(gyro["covariance_combined"]))[:3]
     assert np.all(np.abs(np.array(gyro["scale"]) - SCALE) < 4 * u)
     assert "A servo turns the items" in (out / "certificate.html").read_text(encoding="utf-8").replace("\n", " ")
 
     again = rig_here("solve", out, "--json")
-    assert json.loads(again.stdout)["sensors"]["gyro"]["scale"] == gyro["scale"]
-    beside = json.loads(rig_here("solve", out, "--json", "--estimator", "vector").stdout)["sensors"]["gyro"]
+    assert json.loads(again.stdout)["gyroscopes"]["gyro"]["scale"] == gyro["scale"]
+    beside = json.loads(rig_here("solve", out, "--json", "--estimator", "vector").stdout)["gyroscopes"]["gyro"]
     assert beside["estimator"] == "vector"
     assert "verdict: PASS" in rig_here("show", out).stdout
 

@@ -30,17 +30,17 @@ def in_stages(truth: list[dict[str, Any]], stages: list[dict[str, Any]] = STAGES
 @pytest.mark.slow
 def test_a_board_that_is_mounted_anew_gives_one_calibration(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    config = configuration(tmp_path, in_stages([{}, {**QUARTER, "turned_deg": [0.4, -0.6, 0.5]}]))
+    config = configuration(tmp_path, in_stages([{}, {**QUARTER, "rotation_deg": [0.4, -0.6, 0.5]}]))
     done = rig("run", config, "--out", out, "--json")
     assert done.returncode == 0, done.stderr + done.stdout
     assert [read_run(out / name).settings.stage for name in ("run.h5", "run-2.h5")] == [0, 1]
     result = json.loads(done.stdout)
-    (sensor,) = result["sensors"].values()
+    (sensor,) = result["gyroscopes"].values()
     truth = np.array([1.1771, 1.1554, 1.1440])
     assert np.abs(np.array(sensor["scale"]) - truth).max() < 0.01
     (mount,) = result["mounts"]
     assert mount["stage"] == 2
-    assert np.degrees(mount["turn_rad"]) == pytest.approx([0.4, -0.6, 0.5], abs=0.35)
+    assert np.degrees(mount["rotation_rad"]) == pytest.approx([0.4, -0.6, 0.5], abs=0.35)
     log = (out / "log.txt").read_text(encoding="utf-8")
     assert "Stage 2 of 2: turn the board by 90° about wrist 3" in log
 

@@ -36,7 +36,7 @@ def laboratory(seed: int, stages: list[dict[str, Any]], mounts: list[dict[str, A
 
 def a_little_off(rng: np.random.Generator, mount: dict[str, str]) -> dict[str, Any]:
     """As the operator mounts it: off by as much as is stated, about each axis."""
-    return {**mount, "turned_deg": rng.uniform(-STATED.mount_deg, STATED.mount_deg, 3).tolist()}
+    return {**mount, "rotation_deg": rng.uniform(-STATED.mount_deg, STATED.mount_deg, 3).tolist()}
 
 
 def ran(document: dict[str, Any], folder: Path) -> tuple[int, str]:
@@ -50,7 +50,7 @@ def ran(document: dict[str, Any], folder: Path) -> tuple[int, str]:
 
 def scale(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """(3,) scale factors of a run, and their U."""
-    (sensor,) = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["sensors"].values()
+    (sensor,) = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))["gyroscopes"].values()
     return np.array(sensor["scale"]), np.array(sensor["budget"]["expanded"][:3])
 
 
@@ -95,7 +95,7 @@ def test_a_board_put_on_90_degrees_wrong_is_refused_before_it_is_swept(tmp_path:
     for seed in SEEDS if thorough else FEW:
         axis, angle_deg = WRONGLY[seed % len(WRONGLY)]
         turned = np.eye(3)[axis] * angle_deg + np.random.default_rng(seed).uniform(-1, 1, 3)
-        document = laboratory(seed, THREE[:1], [{"turned_deg": turned.tolist()}])
+        document = laboratory(seed, THREE[:1], [{"rotation_deg": turned.tolist()}])
         felt = seed % 2 == 1
         if felt:
             document["sensors"]["gyro"]["acceleration"] = {}

@@ -27,10 +27,10 @@ PROCEDURE: dict[str, Any] = {
     "name": "thermal",
     "from_c": 25,
     "to_c": 39,
-    "gap_k": 4,
-    "most_rate_k_per_min": 30,
+    "max_step_k": 4,
+    "max_rate_k_per_min": 30,
     "reference_c": 30,
-    "both_ways": False,
+    "both_directions": False,
     "heater_power": 1,
     "speed_deg_s": 150,
     "acceleration_deg_s2": 400,
@@ -153,14 +153,14 @@ FELT = merge(
         },
     },
 )
-IN_ATTITUDES = {"with_attitudes": True, "attitudes": "faces", "dwell_s": 1, "to_c": 40, "gap_k": 5}
+IN_ATTITUDES = {"with_attitudes": True, "attitudes": "faces", "dwell_s": 1, "to_c": 40, "max_step_k": 5}
 
 
 @pytest.mark.thorough
 @pytest.mark.proof
 @pytest.mark.timeout(3000)
 def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(tmp_path: Path) -> None:
-    quick = {"speed_deg_s": 170, "acceleration_deg_s2": 700, "most_rate_k_per_min": 40}
+    quick = {"speed_deg_s": 170, "acceleration_deg_s2": 700, "max_rate_k_per_min": 40}
     config, out = configuration(tmp_path, FELT, {**PROCEDURE, **IN_ATTITUDES, **quick}), tmp_path / "run"
     ended = rig("run", config, "--out", out, "--yes", timeout_s=2900)
     assert ended.returncode == 0, ended.stdout + ended.stderr
@@ -180,9 +180,9 @@ def test_attitudes_in_each_set_calibrate_the_accelerometer_over_temperature_too(
 @pytest.mark.parametrize(
     ("procedure", "body", "name"),
     [
-        ({"heater_power": 0, "most_rate_k_per_min": 1}, {"air_c": [[0, 80]], "capacity_j_k": 60}, "too_fast"),
-        ({"heater_power": 0, "hottest_c": 39.5, "most_rate_k_per_min": 100}, {"air_c": [[0, 80]]}, "overheated"),
-        ({"heater_power": 0, "patience_min": 0.2}, {}, "range_not_reached"),
+        ({"heater_power": 0, "max_rate_k_per_min": 1}, {"air_c": [[0, 80]], "capacity_j_k": 60}, "too_fast"),
+        ({"heater_power": 0, "max_temperature_c": 39.5, "max_rate_k_per_min": 100}, {"air_c": [[0, 80]]}, "overheated"),
+        ({"heater_power": 0, "timeout_min": 0.2}, {}, "range_not_reached"),
         ({"repeats": 2}, {}, "range_not_reached"),
     ],
     ids=["too fast", "overheated", "nobody warms", "too few sets"],
@@ -245,10 +245,10 @@ def test_a_killed_rig_leaves_the_heater_on_for_two_and_a_half_seconds_at_most(tm
     ("changes", "words"),
     [
         ({"to_c": 36, "reference_c": 30}, "3 gaps apart"),
-        ({"to_c": 36, "both_ways": True}, "10 K and a gap apart at least: 14 K"),
+        ({"to_c": 36, "both_directions": True}, "10 K and a gap apart at least: 14 K"),
         ({"reference_c": 40}, "reference_c must lie between"),
         ({"reference_c": 26}, "half a gap from each"),
-        ({"hottest_c": 34}, "hottest_c must lie above"),
+        ({"max_temperature_c": 34}, "max_temperature_c must lie above"),
         ({"to_c": 68}, "too hot for the heater"),
         ({"arc_deg": 180}, "leave it at 360"),
         ({"with_attitudes": True}, "attitudes calibrate accelerometers"),

@@ -31,7 +31,7 @@ def warmed(looks: Iterable[tuple[float, float]], k_per_min: float) -> None:
     """Watch a sensor that warms so fast from 25 °C on; `looks` are when by the board, and by the controller as seen."""
     acquisition = Acquisition()
     acquisition.expect("gyro", SENSOR)
-    section = ThermalSection(from_c=20, to_c=60, most_rate_k_per_min=LIMIT_K_PER_MIN)
+    section = ThermalSection(from_c=20, to_c=60, max_rate_k_per_min=LIMIT_K_PER_MIN)
     warming = Warming(section, acquisition, ignore, ("gyro",), None, 40.0, Course(20, 60, 5, True))
     heard_s = 0.0
     for board_s, controller_s in looks:

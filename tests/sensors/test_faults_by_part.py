@@ -95,7 +95,7 @@ def of_lines(fault: str, patience: Patience) -> Iterator[Bench]:
 @contextmanager
 def of_mavlink(fault: str, patience: Patience) -> Iterator[Bench]:
     """An autopilot."""
-    with autopilots.autopilot_on_a_wire(dead=fault == "silent", on_for_s=100.0) as wire:
+    with autopilots.autopilot_on_a_wire(dead=fault == "silent", uptime_s=100.0) as wire:
         spoil: dict[str, Callable[[], object]] = {
             "wrong baud rate": lambda: None,
             "other device": partial(setattr, wire.faults, "camera", True),

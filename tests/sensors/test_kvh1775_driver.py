@@ -314,8 +314,8 @@ def test_what_happens_in_a_stream_is_named(happens: Callable[[KvhOnAWire], None]
 def test_the_microseconds_wrap_while_it_streams() -> None:
     """71.6 min after it was switched on."""
     wrap_us = 2**32
-    on_for_s = wrap_us * 1e-6 - 30.0
-    with kvh_on_a_wire(on_for_s=on_for_s) as wire, streaming(wire, rate_hz=100) as (source, collected):
+    uptime_s = wrap_us * 1e-6 - 30.0
+    with kvh_on_a_wire(uptime_s=uptime_s) as wire, streaming(wire, rate_hz=100) as (source, collected):
         begins_us = int(collected.wait(source)["board_time_us"][0])
         assert begins_us < wrap_us, "it had wrapped before it streamed"
         wire.wire.clock.pace(100.0)

@@ -138,7 +138,7 @@ def test_lost_messages_are_missing_and_doubled_ones_are_not_there_twice() -> Non
 def test_milliseconds_that_begin_anew_go_on() -> None:
     wrap_us = 2**32 * 1e3
     with (
-        autopilot_on_a_wire(on_for_s=wrap_us * 1e-6 - 30.0, pace=1.0) as wire,
+        autopilot_on_a_wire(uptime_s=wrap_us * 1e-6 - 30.0, pace=1.0) as wire,
         Listening({"imu": section(wire.port, "SCALED_IMU")}) as heard,
     ):
         assert heard.hear(1)["board_time_us"][0] < wrap_us, "they had begun anew before it streamed"
@@ -195,7 +195,7 @@ def test_what_is_not_ready_is_refused(
 
 @pytest.mark.slow
 def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
-    with autopilot_on_a_wire(on_for_s=100.0) as wire, Listening({"imu": section(wire.port)}) as heard:
+    with autopilot_on_a_wire(uptime_s=100.0) as wire, Listening({"imu": section(wire.port)}) as heard:
         heard.hear(10)
         assert wire.autopilot is not None
         wire.autopilot.armed = True

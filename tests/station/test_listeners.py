@@ -61,7 +61,7 @@ def test_a_line_is_made_of_what_the_event_holds() -> None:
     kept = "the data are kept in a run"
     again = f"{kept}; to repeat refused sweeps: rig resume 'a run'"
     assert line(Advice(Path("a run"), "rig resume 'a run'", repeats=True)) == again
-    going_on = f"{kept}; when it is mended, go on with: rig resume 'a run'"
+    going_on = f"{kept}; when it is corrected, go on with: rig resume 'a run'"
     assert line(Advice(Path("a run"), "rig resume 'a run'", repeats=False)) == going_on
     assert line(Remembered("h", (8,))) == "entered in h as calibration 8 (rig history show 8)"
     assert line(Remembered("h", (8, 9, 10))) == "entered in h as calibrations 8 to 10 (rig history show 8)"

@@ -46,7 +46,7 @@ class AutopilotOnAWire:
         *,
         imus: int = 1,
         pace: float = 4.0,
-        on_for_s: float = 5.0,
+        uptime_s: float = 5.0,
         file: Path | None = None,
         dead: bool = False,
         armed: bool = False,
@@ -57,7 +57,7 @@ class AutopilotOnAWire:
     ) -> None:
         self.parameters = Parameters(firmware, imus, left, file)
         self._firmware, self._motion_at, self._imus = firmware, motion_at, imus
-        self._on_for_s, self._armed = on_for_s, armed
+        self._on_for_s, self._armed = uptime_s, armed
         self._simulated, self._clock_ppm = simulated, clock_ppm
         self._provides_temperature, self._mavlink_version = provides_temperature, mavlink_version
         self.autopilot: SimulatedAutopilot | None = None
@@ -84,7 +84,7 @@ class AutopilotOnAWire:
             baud=921600,
             uid=UID,
             clock_ppm=self._clock_ppm,
-            on_for_s=self._on_for_s,
+            uptime_s=self._on_for_s,
             armed=self._armed,
             provides_temperature=self._provides_temperature,
             mavlink_version=self._mavlink_version,

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.analyses import calibrated
+from rig.analysis.analyses import calibrate
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
@@ -61,7 +61,7 @@ LABORATORY = Stated(
 @functools.cache
 def result() -> ResultDocument:
     """Of a recording in which all that a budget needs is known. No board took part: the checks of one are left out."""
-    document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
+    document = document_of(calibrate([synthetic_run(Setup(told=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
 
@@ -96,14 +96,14 @@ def accelerometer(
             "reference_m_s2": (0.0, 0.0, 9.81),
             "attitude_error_rad": 5e-4,
             "attitude_error_std_rad": 1e-4,
-            **dict.fromkeys(("lever_arm_m", "lever_arm_std_m", "delay_s", "delay_std_s", "alignment", "held_out")),
+            **dict.fromkeys(("lever_arm_m", "lever_arm_std_m", "delay_s", "delay_std_s", "alignment", "validation")),
             "dwells": ({**dwell, "temperature_c": 22.0},),
             "sweeps": 6,
             "rank": 14,
             "condition": 1.9,
             "temperature_c": 22.0,
             "correction_matrix": correction,
-            "beside": {},
+            "other_methods": {},
             "warnings": (),
         }
     )
@@ -170,7 +170,7 @@ def magnetometer() -> MagnetometerEntry:
             "rank": 14,
             "condition": 2.0,
             "correction_matrix": IDENTITY,
-            "beside": {},
+            "other_methods": {},
             "warnings": (),
         }
     )
@@ -215,17 +215,17 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
                 {
                     "time_s": 600.0 * i,
                     "temperature_c": 22.0 + 2 * i,
-                    "held": {"bias": bias, "std": std},
-                    "anew": {"error": "too_few_observations: of these"},
+                    "scale_fixed": {"bias": bias, "std": std},
+                    "scale_free": {"error": "too_few_observations: of these"},
                 }
                 for i, (bias, std) in enumerate(zip(biases, stds, strict=True))
             ],
             "common_std": (4e-7, 4e-7, 4e-7),
-            "excess": (1.0, 1.0, 1.0),
-            "moves": [{"repeat": 3, "axis": "x", "change": biases[2], "std": stds[2]}],
-            "false_alarm": 0.02,
+            "scatter_ratio": (1.0, 1.0, 1.0),
+            "steps": [{"repeat": 3, "axis": "x", "change": biases[2], "std": stds[2]}],
+            "false_alarm_probability": 0.02,
             "largest_change": (8e-6, 2e-6, 1e-6),
-            "over_temperature": found if slope else {"error": "temperature_range_too_small: 1 °C"},
+            "temperature_slope": found if slope else {"error": "temperature_range_too_small: 1 °C"},
             "earth_rate_known": False,
         }
     )
@@ -268,7 +268,7 @@ def everything() -> ResultDocument:
             update={"second_order_s2_m": (9.72e-6, -9.478e-5, 0.0), "second_order_std_s2_m": (4.6e-6,) * 3}
         )
     )
-    sensor = document.sensors["gyro"]
+    sensor = document.gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry)
     felt = {
         "g_sensitivity_rad_s_per_m_s2": ((1e-4, 2e-5, 0.0), (0.0, -1e-4, 0.0), (3e-5, 0.0, 1.2e-4)),
@@ -284,14 +284,14 @@ def everything() -> ResultDocument:
         heading_rad=-1.9987,
         heading_std_rad=0.008,
         up=(0.0, 0.0, 1.0),
-        vertical_held=False,
-        scatter=0.8,
+        vertical_fixed=False,
+        birge_ratio=0.8,
     )
     seen = {"vector_model": sensor.vector_model.model_copy(update=felt), "earth_rate": turning}
     drifts = {"rate": bias_drift("rad/s", slope=True), "acceleration": bias_drift("m/s²", slope=False)}
     return document.model_copy(
         update={
-            "sensors": {"gyro": sensor.model_copy(update=seen)},
+            "gyroscopes": {"gyro": sensor.model_copy(update=seen)},
             "magnetometers": {"compass": magnetometer()},
             "bias_drift": {"gyro": drifts},
         }
@@ -302,7 +302,7 @@ def compared(document: ResultDocument) -> ResultDocument:
     """The same where the computer's clock was one that the controller's could be held against."""
     assert document.clock is not None
     clock = document.clock.model_copy(
-        update={"comparisons": (ClockComparisonEntry(by="the computer's clock", error=1e-6, std=1e-6),)}
+        update={"comparisons": (ClockComparisonEntry(clock="the computer's clock", error=1e-6, std=1e-6),)}
     )
     return document.model_copy(update={"clock": clock})
 

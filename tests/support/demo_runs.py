@@ -21,7 +21,7 @@ def normalised_errors(rig: Sequence[str | Path], config: Path, seed: int, out: P
         command += ["--set", f"{path}={value}"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=out.parent)
     assert done.returncode == 0, done.stderr
-    sensor = json.loads(done.stdout)["sensors"]["gyro"]
+    sensor = json.loads(done.stdout)["gyroscopes"]["gyro"]
     truth = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
     error = np.array(sensor["scale"] + sensor["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
     return np.asarray(error / np.sqrt(np.diag(sensor["covariance"])))

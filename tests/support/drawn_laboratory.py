@@ -82,7 +82,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
             "delta_theta_rad": (6e-4 * wrists * rng.standard_normal(JOINTS)).tolist(),
             "delta_d_mm": rng.normal(0, 0.2, JOINTS).tolist(),
         },
-        "residue": {
+        "unmodelled": {
             "twist_rad": (AXIS_RAD * wrists * rng.uniform(-1, 1, JOINTS)).tolist(),
             "zero_rad": (AXIS_RAD * wrists * rng.uniform(-1, 1, JOINTS)).tolist(),
             "encoder_once_rad": float(rng.rayleigh(WAVE_RAD)),
@@ -96,8 +96,8 @@ def seen_vibration(rng: np.random.Generator) -> dict[str, float]:
     """Of the servo, beside the one that no encoder sees; what is drawn after it is what it was without."""
     of_its_own = rng.spawn(1)[0]
     return {
-        "vibration_seen_rms_rad_s": float(of_its_own.uniform(0, 0.002)),
-        "vibration_seen_hz": float(of_its_own.uniform(8, 30)),
+        "vibration_measured_rms_rad_s": float(of_its_own.uniform(0, 0.002)),
+        "vibration_measured_hz": float(of_its_own.uniform(8, 30)),
     }
 
 

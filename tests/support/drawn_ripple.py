@@ -39,9 +39,9 @@ def in_the_world(ripple: Ripple) -> dict[str, Any]:
         "vibration_fraction": ripple.fraction,
         "vibration_rms_rad_s": ripple.unseen_rad_s,
         "vibration_hz": ripple.unseen_hz[0],
-        "vibration_more_hz": list(ripple.unseen_hz[1:]),
-        "vibration_seen_rms_rad_s": ripple.seen_rad_s,
-        "vibration_seen_hz": ripple.seen_hz,
+        "vibration_further_hz": list(ripple.unseen_hz[1:]),
+        "vibration_measured_rms_rad_s": ripple.seen_rad_s,
+        "vibration_measured_hz": ripple.seen_hz,
     }
 
 

@@ -19,7 +19,7 @@ def of_three_parts() -> ResultDocument:
     return one.model_copy(
         update={
             "checks": tuple(checks),
-            "sensors": {name: one.sensors["gyro"].model_copy(update=serial) for name, serial in serials.items()},
+            "gyroscopes": {name: one.gyroscopes["gyro"].model_copy(update=serial) for name, serial in serials.items()},
             "accelerometers": {
                 name: one.accelerometers["gyro"].model_copy(update=serial) for name, serial in serials.items()
             },

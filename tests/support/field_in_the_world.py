@@ -27,7 +27,7 @@ TRUTH = {
 UPRIGHT = {"x": "+x", "y": "+y", "z": "+z"}
 OVER = {"x": "+x", "y": "-y", "z": "-z"}
 ROUND = {"x": "-x", "y": "-y", "z": "+z"}
-HOUSING = {"carried_by": "wrist_2", "place_mm": [0, 0, 60]}  # of joint wrist 3, between that joint and the flange
+HOUSING = {"carried_by": "wrist_2", "position_mm": [0, 0, 60]}  # of joint wrist 3, between that joint and the flange
 ARM = np.radians([0.0, -90.0, 90.0])
 
 

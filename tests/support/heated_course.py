@@ -45,7 +45,7 @@ class Warmed:
 
 def warmed() -> Warmed:
     """The board taken up through its range by its heater and down again."""
-    body, course = HeatedBody(BOARD), Course(FROM_C, TO_C, GAP_K, both_ways=True)
+    body, course = HeatedBody(BOARD), Course(FROM_C, TO_C, GAP_K, both_directions=True)
     part, ramp, rows, starts, duty = (
         body.part("gyro"),
         Ramp(0.6 * GAP_K / SET_S, 1.0),

@@ -102,7 +102,7 @@ def kvh(seed: int) -> dict[str, Any]:
         "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
         "accelerometer": _accelerometer(rng, document["sensors"]["kvh"]),
-        "kvh1775": {"oscillator_ppm": float(rng.uniform(-20, 20)), "on_for_s": float(rng.uniform(1, 4000))},
+        "kvh1775": {"oscillator_ppm": float(rng.uniform(-20, 20)), "uptime_s": float(rng.uniform(1, 4000))},
     }
     changed: dict[str, Any] = merge(document, {"world": {"sensors": {"kvh": sensor}}})
     return changed
@@ -194,7 +194,7 @@ def with_digits(decimals: int, noise_rad_s: float, *, vibrates: bool, seed: int)
 
 
 def _shaking(document: dict[str, Any], *, vibrates: bool) -> dict[str, Any]:
-    still = dict.fromkeys(("vibration_fraction", "vibration_rms_rad_s", "vibration_seen_rms_rad_s"), 0.0)
+    still = dict.fromkeys(("vibration_fraction", "vibration_rms_rad_s", "vibration_measured_rms_rad_s"), 0.0)
     shaken: dict[str, Any] = document if vibrates else merge(document, {"world": {"arm": still}})
     return shaken
 
@@ -310,7 +310,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
             "delta_theta_rad": (6e-4 * WRISTS * rng.standard_normal(JOINTS)).tolist(),
             "delta_d_mm": rng.normal(0, 0.2, JOINTS).tolist(),
         },
-        "residue": {
+        "unmodelled": {
             "twist_rad": (axis_rad * WRISTS * rng.uniform(-1, 1, JOINTS)).tolist(),
             "zero_rad": (axis_rad * WRISTS * rng.uniform(-1, 1, JOINTS)).tolist(),
             "encoder_once_rad": float(rng.rayleigh(WAVE_RAD)),

@@ -30,7 +30,7 @@ def run_folder(folder: Path, serial_number: str, second: int) -> Path:
     """A finished run of that sensor: a short result, and a recording that nobody solves."""
     folder.mkdir(parents=True)
     result = json.loads((RECORDINGS / "six_observation" / "result.json").read_text(encoding="utf-8"))
-    result["sensors"]["gyro"] |= {"serial_number": serial_number, "observations": [], "rests": []}
+    result["gyroscopes"]["gyro"] |= {"serial_number": serial_number, "observations": [], "rests": []}
     moment = (FIRST + timedelta(seconds=second)).isoformat()
     result["provenance"] |= {"started_utc": moment, "solved_utc": moment}
     (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")

@@ -11,8 +11,8 @@ import yaml
 from rig.config.load import Loaded, load, parse
 
 OF_THE_ARM = {
-    "vibration_rms_rad_s", "vibration_hz", "vibration_seen_rms_rad_s", "vibration_seen_hz", "settling_rad",
-    "settling_hz", "settling_decay_s", "clock_ppm", "state_jitter_s", "calibration", "residue",
+    "vibration_rms_rad_s", "vibration_hz", "vibration_measured_rms_rad_s", "vibration_measured_hz", "settling_rad",
+    "settling_hz", "settling_decay_s", "clock_ppm", "state_jitter_s", "calibration", "unmodelled",
 }  # fmt: skip
 OF_A_SENSOR = {
     "offset_mm", "start_temperature_c", "warm_up_s", "bias_rad_s_per_k", "scale_per_k", "g_sensitivity_rad_s_per_g",

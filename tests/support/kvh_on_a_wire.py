@@ -38,14 +38,14 @@ class KvhOnAWire:
         left: Mapping[str, str],
         motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
         pace: float = 1.0,
-        on_for_s: float = 3.0,
+        uptime_s: float = 3.0,
         field_at: Callable[[float], Sequence[float]] = no_field,
         *,
         dead: bool = False,
     ) -> None:
         self.memory = Memory(left)
         self._field_at = field_at
-        self._motion_at, self._on_for_s = motion_at, on_for_s
+        self._motion_at, self._on_for_s = motion_at, uptime_s
         self.kvh: Kvh1775 | None = None
         self.wire = DeviceOnAWire(lambda: self.kvh, TICK_S, pace, dead=dead)
         self.line, self.port = self.wire.line, self.wire.port
@@ -62,7 +62,7 @@ class KvhOnAWire:
             field_at=self._field_at,
             serial_number=SERIAL_NUMBER,
             oscillator_ppm=SimulatedKvhSection().oscillator_ppm,
-            on_for_s=self._on_for_s,
+            uptime_s=self._on_for_s,
             seed=np.random.SeedSequence(1),
             time_s=self.wire.time_s,
         )
@@ -90,12 +90,12 @@ def kvh_on_a_wire(
     motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
     *,
     pace: float = 1.0,
-    on_for_s: float = 3.0,
+    uptime_s: float = 3.0,
     field_at: Callable[[float], Sequence[float]] = no_field,
     dead: bool = False,
 ) -> Iterator[KvhOnAWire]:
     """For the length of the `with` block; over a `dead` line nothing has ever come."""
-    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s, field_at, dead=dead)
+    wire = KvhOnAWire(left or {}, motion_at, pace, uptime_s, field_at, dead=dead)
     try:
         yield wire
     finally:

@@ -197,7 +197,7 @@ def _run(bench: Bench, number: int) -> Calibration:
     wall_s = time.monotonic() - began_s
     if status != 0:
         return Calibration(number, in_station, status, wall_s)
-    gyro = read_result(out).sensors["gyro"]
+    gyro = read_result(out).gyroscopes["gyro"]
     times_us = read_run(out / "run.h5").samples["gyro"]["board_time_us"]
     bench.world.state()  # it has heard by now that the rig has hung up
     return Calibration(

@@ -81,7 +81,7 @@ def document(
         each.model_copy(update={"passed": passed or each.name != "gyro.condition", "limit": 0.02}) for each in checks
     )
     return VERIFIED.model_copy(
-        update={"sensors": {"gyro": sensor}, "verification": {}, "checks": checks, "provenance": provenance}
+        update={"gyroscopes": {"gyro": sensor}, "verification": {}, "checks": checks, "provenance": provenance}
     )
 
 

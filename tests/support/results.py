@@ -2,20 +2,20 @@
 
 from collections.abc import Mapping
 
-from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from rig.data.result_file import GyroscopeEntry, ResultDocument, read_result
 from support.paths import RECORDINGS
 
 VERIFIED = read_result(RECORDINGS / "verified")
-SENSOR, REFERENCE = VERIFIED.sensors["gyro"], VERIFIED.sensors["reference"]
+SENSOR, REFERENCE = VERIFIED.gyroscopes["gyro"], VERIFIED.gyroscopes["reference"]
 
 
-def result_document(sensors: Mapping[str, SensorEntry], *, passed: bool = True) -> ResultDocument:
+def result_document(sensors: Mapping[str, GyroscopeEntry], *, passed: bool = True) -> ResultDocument:
     """A result of these sensors whose last check passed or did not."""
     last = VERIFIED.checks[-1].model_copy(update={"passed": passed})
     return VERIFIED.model_copy(
         update={
             "verdict": "pass" if passed else "fail",
             "checks": (*VERIFIED.checks[:-1], last),
-            "sensors": dict(sensors),
+            "gyroscopes": dict(sensors),
         }
     )

@@ -79,11 +79,11 @@ def _numbers(document: ResultDocument) -> Iterator[Number]:
     for name, drifts in document.bias_drift.items():
         for quantity, drift in drifts.items():
             for i, repeat in enumerate(drift.repeats):
-                yield from _vector(f"{name} {quantity} repeat {i}", repeat.held.bias, repeat.held.std)
+                yield from _vector(f"{name} {quantity} repeat {i}", repeat.scale_fixed.bias, repeat.scale_fixed.std)
 
 
 def _of_gyroscopes(document: ResultDocument) -> Iterator[Number]:
-    for name, gyroscope in document.sensors.items():
+    for name, gyroscope in document.gyroscopes.items():
         averages: list[ObservationEntry | AverageEntry] = [*gyroscope.observations, *gyroscope.rests]
         for i, average in enumerate(averages):
             yield f"{name} average {i} samples", average.samples, 0.0

@@ -39,7 +39,7 @@ def six_found() -> ResultDocument:
     return one.model_copy(
         update={
             "checks": checks,
-            "sensors": dict.fromkeys(PARTS, one.sensors["gyro"]),
+            "gyroscopes": dict.fromkeys(PARTS, one.gyroscopes["gyro"]),
             "accelerometers": dict.fromkeys(PARTS, one.accelerometers["gyro"]),
         }
     )
@@ -68,7 +68,10 @@ def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = (
 
 
 def _since(found: ResultDocument) -> Iterator[Since]:
-    scale, bias = found.sensors["gyro" if "gyro" in found.sensors else "lsm9ds1"].scale, (0.00766, -0.00977, -0.00452)
+    scale, bias = (
+        found.gyroscopes["gyro" if "gyro" in found.gyroscopes else "lsm9ds1"].scale,
+        (0.00766, -0.00977, -0.00452),
+    )
     names = ("kx", "ky", "kz", "bx", "by", "bz")
     values = [*scale[:2], scale[2] - 0.004, *bias]
     before = {name: (value, 0.0012 if name[0] == "k" else 0.0005) for name, value in zip(names, values, strict=True)}

@@ -83,15 +83,15 @@ class Session:
     warming_k_s: Array
 
 
-def session(repeats: int = 14, *, both_ways: bool = True) -> Session:
-    """From 20 to 60 °C and, if `both_ways`, back again."""
+def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
+    """From 20 to 60 °C and, if `both_directions`, back again."""
     felt = np.tile(PLACES, (repeats, 1))
     lasted = np.where(felt.any(axis=1), SWEPT_S, RESTED_S)
     ends = np.cumsum(lasted + BETWEEN_S)
     windows = np.column_stack([ends - lasted, ends])
     middle = windows.mean(axis=1)
     done = (middle - middle[0]) / (middle[-1] - middle[0])
-    temperature_c = FROM_C + (TO_C - FROM_C) * (1 - np.abs(1 - 2 * done) if both_ways else done)
+    temperature_c = FROM_C + (TO_C - FROM_C) * (1 - np.abs(1 - 2 * done) if both_directions else done)
     places = np.tile(np.arange(len(PLACES)), repeats)
     return Session(windows, felt, places, temperature_c, np.gradient(temperature_c, middle))
 

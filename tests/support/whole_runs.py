@@ -26,12 +26,12 @@ class WholeRun:
 
     def stated(self, sensor: str) -> np.ndarray:
         """(6,) scale and bias."""
-        entry = self.result["sensors"][sensor]
+        entry = self.result["gyroscopes"][sensor]
         return np.array(entry["scale"] + entry["bias_rad_s"])
 
     def stated_std(self, sensor: str) -> np.ndarray:
         """(6,) their combined standard uncertainties."""
-        return np.asarray(np.sqrt(np.diag(self.result["sensors"][sensor]["covariance_combined"])))
+        return np.asarray(np.sqrt(np.diag(self.result["gyroscopes"][sensor]["covariance_combined"])))
 
     def truth(self, sensor: str, speed_rad_s: float) -> np.ndarray:
         """(6,) of the simulated sensor over the time of this run's averages, the scale at that speed."""

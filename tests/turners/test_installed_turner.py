@@ -101,7 +101,7 @@ def test_it_is_planned_and_looked_at_by_its_configuration(recorded: Path, instal
     plan = ran(installed, "-m", "rig", "plan", config)
     assert "joint 1 +0.0 → " in plan and "2 sweeps" in plan
     assert "that the checks notice in 95 of 100 runs" in " ".join(plan.split())
-    told = json.loads(ran(installed, "-m", "rig", "plan", config, "--json"))["told_from"]["gyro"]
+    told = json.loads(ran(installed, "-m", "rig", "plan", config, "--json"))["detection_limits"]["gyro"]
     assert all(each["size"] is None or each["size"] > 0 for each in told) and any(each["size"] for each in told)
     assert "joint_speed" in ran(installed, "-m", "rig", "plan", config, "--set", "procedure.speed_deg_s=400", status=2)
     checked = json.loads(ran(installed, "-m", "rig", "check", config, "--json", status=2).partition("\n}")[0] + "}")

@@ -246,7 +246,7 @@ EXTRA = {
 
 def test_the_controller_reports_the_calibration_of_its_arm() -> None:
     """KinematicsInfo (sub-package 5 of the primary port), and the pose that RTDE tells."""
-    one = laboratory(arm={"calibration": KNOWN, "residue": {"twist_rad": [0, 0, 0, 0.01, 0.01, 0]}})
+    one = laboratory(arm={"calibration": KNOWN, "unmodelled": {"twist_rad": [0, 0, 0, 0.01, 0.01, 0]}})
     package = PrimarySession(one.laboratory.robot).greeting()
     at = package.index(struct.pack(">iB", 5 + 6 * 4 + 24 * 8 + 4, 5))
     theta, a, d, alpha = np.array(struct.unpack_from(">24d", package, at + 5 + 24)).reshape(4, 6)
@@ -317,7 +317,7 @@ def test_twists_turn_the_axis_that_the_sensor_feels() -> None:
     one = laboratory(
         arm={
             "calibration": {"delta_alpha_rad": [0, 0, 0, 0, 0.03, 0]},
-            "residue": {"twist_rad": [0, 0, 0, 0, 0.02, 0]},
+            "unmodelled": {"twist_rad": [0, 0, 0, 0, 0.02, 0]},
         }
     )
     turning(one, 4, 2.0)
@@ -326,7 +326,7 @@ def test_twists_turn_the_axis_that_the_sensor_feels() -> None:
 
 
 def test_an_encoders_error_shows_once_and_twice_in_a_turn_of_the_rate() -> None:
-    one = laboratory(arm={"residue": {"encoder_once_rad": 0.01, "encoder_twice_rad": 0.004}})
+    one = laboratory(arm={"unmodelled": {"encoder_once_rad": 0.01, "encoder_twice_rad": 0.004}})
     turning(one, 5, 2.0)
     seen = rates(one, round(math.pi * TICKS_PER_SECOND) + 5)[: round(math.pi * 238), 2]
     angle = 2 * math.pi * np.arange(len(seen)) / (math.pi * 238)
@@ -337,7 +337,7 @@ def test_an_encoders_error_shows_once_and_twice_in_a_turn_of_the_rate() -> None:
 
 def test_hysteresis_is_missing_from_a_way_back() -> None:
     """The angle that the sensor's readings add up to, twice forth and once back, each by a radian."""
-    one = laboratory(arm={"residue": {"hysteresis_rad": 1e-3}})
+    one = laboratory(arm={"unmodelled": {"hysteresis_rad": 1e-3}})
     turned = []
     for target in (1.0, 2.0, 3.0, 2.0):
         one.ticks(50)
@@ -358,7 +358,7 @@ def test_a_standing_arm_vibrates_unseen_by_its_encoders() -> None:
 
 
 def test_a_vibration_that_encoders_see_is_in_their_angles_and_speeds_as_sensors_feel_it() -> None:
-    one = laboratory(arm={"vibration_seen_rms_rad_s": 0.01, "vibration_seen_hz": 17})
+    one = laboratory(arm={"vibration_measured_rms_rad_s": 0.01, "vibration_measured_hz": 17})
     felt = rates(one, 1000)
     assert np.sqrt(np.mean(felt**2, axis=0)) == pytest.approx([0.01] * 3, rel=0.05)
     *seen, time_s = np.transpose(states(one, 500, "actual_q", "actual_qd", "timestamp"))
@@ -374,7 +374,7 @@ def test_a_vibration_that_encoders_see_is_in_their_angles_and_speeds_as_sensors_
 
 def test_a_vibration_that_encoders_see_is_felt_when_they_see_it() -> None:
     """Standing and turning."""
-    one = laboratory(arm={"vibration_seen_rms_rad_s": 0.05, "vibration_seen_hz": 11})
+    one = laboratory(arm={"vibration_measured_rms_rad_s": 0.05, "vibration_measured_hz": 11})
     robot, arm = one.laboratory.robot, one.laboratory.on_arm.arm
     for speed_rad_s in (0.0, 1.0):
         turning(one, 5, speed_rad_s)
@@ -437,7 +437,7 @@ def test_left_out_or_written_as_its_default_an_imperfection_is_none() -> None:
     said = []
     for section in (demo, written):
         loaded = load(DEMO, [f"world={json.dumps(section)}"])
-        assert world_section(loaded).arm.residue.encoder_once_rad == 0.0
+        assert world_section(loaded).arm.unmodelled.encoder_once_rad == 0.0
         one = host(loaded)
         one.laboratory.robot.motion.move(TILTED, 1.0, 4.0)
         said.append((states(one, 500, "actual_q", "actual_TCP_pose").tobytes(), bytes(one.received)))

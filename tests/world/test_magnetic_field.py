@@ -67,7 +67,7 @@ def test_a_gradient_changes_it_with_place_and_a_drift_with_time() -> None:
 
 
 def test_iron_is_a_dipole_that_moves_with_its_link() -> None:
-    iron = IronSection(carried_by="wrist_2", place_mm=(0.0, 0.0, 60.0), moment_a_m2=(0.0, 0.0, 0.2))
+    iron = IronSection(carried_by="wrist_2", position_mm=(0.0, 0.0, 60.0), moment_a_m2=(0.0, 0.0, 0.2))
     field = field_of((iron,))
     for angles in ((0.0, -1.5, 1.5, 0.3, -1.5, 0.0), (0.5, -1.0, 1.2, -2.0, 0.7, 2.0)):
         pose = list(frames(angles))

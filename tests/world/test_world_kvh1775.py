@@ -27,7 +27,7 @@ def instrument(
         memory,
         serial_number="42",
         oscillator_ppm=ppm,
-        on_for_s=0.0,
+        uptime_s=0.0,
         seed=np.random.SeedSequence(1),
         time_s=0.0,
     )

@@ -51,7 +51,7 @@ class RestFound:
 class MoveFound:
     """A move by `angle_rad` in all, a flip or so many whole `turns` on a face, which missed by `closure_rad`."""
 
-    kind: Literal["flip", "turn", "left out"]
+    kind: Literal["flip", "turn", "omitted"]
     angle_rad: float
     turns: int
     pull: float
@@ -289,7 +289,7 @@ def _move_found(fit: Fit, row: int) -> MoveFound:
     move, turns = fit.session.moves[row], fit.faced.turns[row]
     closure = next((each for each in fit.factors if each.kind == CLOSURE and each.at == row), None)
     return MoveFound(
-        kind="left out" if not move.tells else "turn" if turns else "flip",
+        kind="omitted" if not move.tells else "turn" if turns else "flip",
         angle_rad=float(np.linalg.norm(np.linalg.solve(fit.state.matrix, fit.moved.swept_rad[row]))),
         turns=turns,
         pull=_pull(fit, row, (MOVE, CLOSURE)),

@@ -53,9 +53,9 @@ def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
 
 def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
     """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT, with U."""
-    scale = expanded(entry.scale_std, entry.scale_freedom).widths
-    bias = expanded(entry.bias_std_t, entry.bias_freedom).widths
-    field = expanded(entry.arm_field_std_t, entry.arm_field_freedom).widths
+    scale = expanded(entry.scale_std, entry.scale_degrees_of_freedom).widths
+    bias = expanded(entry.bias_std_t, entry.bias_degrees_of_freedom).widths
+    field = expanded(entry.arm_field_std_t, entry.arm_field_degrees_of_freedom).widths
     return [
         ReversalRow(
             axis,
@@ -70,11 +70,13 @@ def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
 
 def drift_rows(entry: DriftEntry) -> list[DriftRow]:
     """The rows of a drift, in its own unit, with U."""
-    bias, std = (np.array([getattr(each.held, name) for each in entry.repeats]) for name in ("bias", "std"))
+    bias, std = (np.array([getattr(each.scale_fixed, name) for each in entry.repeats]) for name in ("bias", "std"))
     whole = np.hypot(std, entry.common_std)  # what all repeats share is no part of a change
-    changed, slope = largest_change_std(bias, std), entry.over_temperature
-    first, last, change = (expanded(each.tolist(), entry.freedom).widths for each in (whole[0], whole[-1], changed))
-    per_c = () if isinstance(slope, ErrorEntry) else expanded(slope.std, slope.freedom).widths
+    changed, slope = largest_change_std(bias, std), entry.temperature_slope
+    first, last, change = (
+        expanded(each.tolist(), entry.degrees_of_freedom).widths for each in (whole[0], whole[-1], changed)
+    )
+    per_c = () if isinstance(slope, ErrorEntry) else expanded(slope.std, slope.degrees_of_freedom).widths
     return [
         DriftRow(
             axis,

@@ -12,7 +12,14 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.provenance import calls_itself_simulated
 from rig.data.quantity import FIELD
-from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
+from rig.data.result_file import (
+    CheckEntry,
+    FileEntry,
+    GyroscopeEntry,
+    ProvenanceEntry,
+    ResultDocument,
+    VerificationEntry,
+)
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
@@ -32,7 +39,7 @@ class Gyroscope:
     """One calibrated gyroscope: its result, and its verification if there was one."""
 
     name: str
-    sensor: SensorEntry
+    sensor: GyroscopeEntry
     verification: VerificationEntry | None
 
 
@@ -112,7 +119,7 @@ class Certificate:
     def levelled(self) -> bool:
         """Whether an accelerometer told the faces on which a hand laid them."""
         found = (each.sensor.by_hand for each in self.gyroscopes)
-        return any(size.name == "acceleration_m_s2" for each in found if each is not None for size in each.sizes)
+        return any(size.name == "acceleration_m_s2" for each in found if each is not None for size in each.errors)
 
     @property
     def turns(self) -> str:
@@ -179,8 +186,8 @@ class Certificate:
     @property
     def temperature_source(self) -> str:
         """What tells how warm the items were; of results of before, which do not say when, their thermometers do."""
-        found = [each.sensor.bias_at for each in self.gyroscopes]
-        found += [getattr(entry, "found_at", None) for each in self.held_still for entry in each.entries]
+        found = [each.sensor.bias_conditions for each in self.gyroscopes]
+        found += [getattr(entry, "conditions", None) for each in self.held_still for entry in each.entries]
         dated = [when for when in found if when is not None]
         known = [when for when in dated if when.temperature_c is not None]
         if dated and not known:
@@ -213,7 +220,7 @@ class Certificate:
     @property
     def guarded(self) -> bool:
         """Whether values had to stay below their limits by U."""
-        return any(check.guard > 0 for check in self.conformity)
+        return any(check.guard_band > 0 for check in self.conformity)
 
 
 def certificate_of(
@@ -226,10 +233,10 @@ def certificate_of(
     _check_same(result, reversals)
     gyroscopes = tuple(
         Gyroscope(name, sensor, result.verification.get(name))
-        for name, sensor in result.sensors.items()
+        for name, sensor in result.gyroscopes.items()
         if sensor.role == "calibrate"
     )
-    verified = {name: found for name, found in result.verification.items() if name not in result.sensors}
+    verified = {name: found for name, found in result.verification.items() if name not in result.gyroscopes}
     conformity, fitness = (
         tuple(check for check in result.checks if check.means.kind == kind) for kind in ("conformity", "fitness")
     )
@@ -311,7 +318,7 @@ def _marks(result: ResultDocument, stated: Stated, fitness: Sequence[CheckEntry]
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
     """How far the sweeps went; those of results of before were whole turns."""
-    for sensor in result.sensors.values():
+    for sensor in result.gyroscopes.values():
         yield from (each.angle_rad for each in sensor.observations if each.angle_rad is not None)
     for found in result.verification.values():
         yield from (each.angle_rad for each in found.after.revolutions if each.angle_rad is not None)
@@ -322,8 +329,8 @@ def _traceable(result: ResultDocument, stated: Stated) -> bool:
 
     Encoders, which tell how far an arc went, hang on none.
     """
-    compared = result.clock is not None and any(each.by == BY_COMPUTER for each in result.clock.comparisons)
-    measured = bool(result.sensors) and not is_simulated(result, stated)
+    compared = result.clock is not None and any(each.clock == BY_COMPUTER for each in result.clock.comparisons)
+    measured = bool(result.gyroscopes) and not is_simulated(result, stated)
     whole = all(map(closes, _angles_rad(result)))
     return measured and compared and whole and stated.where.time_reference is not None
 
@@ -349,8 +356,8 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
     provenance = result.provenance
     if provenance.resumed_utc:
         yield f"The measurement was interrupted and gone on with at {', '.join(provenance.resumed_utc)} (UTC)."
-    for name, sensor in result.sensors.items():
-        lost = sum(turn.lost for turn in sensor.observations)
+    for name, sensor in result.gyroscopes.items():
+        lost = sum(turn.lost_samples for turn in sensor.observations)
         if lost:
             yield f"{name}: {lost} samples were lost within sweeps and left out."
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))

@@ -9,8 +9,8 @@ from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.result_file import SensorEntry, VerificationEntry
-from rig.data.result_types import Freedom, Matrix6, ToldFromEntry, WhenEntry
+from rig.data.result_file import GyroscopeEntry, VerificationEntry
+from rig.data.result_types import ConditionsEntry, DetectionLimitEntry, Freedom, Matrix6
 from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
@@ -30,14 +30,15 @@ JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
 
 
-def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
+def gyroscope(sensor: GyroscopeEntry) -> Iterator[Element]:
     """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
     budget, covariance = _known_whole(sensor)
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{_told(sensor.told_from)}{covered}",
+    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_conditions)}"
+                  f"{_told(sensor.detection_limits)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
-    yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
+    yield _result("bias", f"{model} {_at(sensor.bias_conditions)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE.d_si], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], covariance, RATE.d_si)
 
@@ -76,8 +77,8 @@ def _reversed(entry: ReversalEntry) -> Iterator[Element]:
     said = f"From runs of {began}, between which it was turned over. ± U"
     if mixed:
         said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
-    yield _spread("scale factor", said, AXES, (entry.scale, entry.scale_std, entry.scale_freedom), ONE)
-    yield _spread("own bias", said, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_freedom), FIELD.d_si)
+    yield _spread("scale factor", said, AXES, (entry.scale, entry.scale_std, entry.scale_degrees_of_freedom), ONE)
+    yield _spread("own bias", said, AXES, (entry.bias_t, entry.bias_std_t, entry.bias_degrees_of_freedom), FIELD.d_si)
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*entry.bias_t, *entry.arm_field_t]
     yield _result(
@@ -93,10 +94,12 @@ def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
     """The bias of each repeat."""
     labels = [str(number) for number in range(1, len(entry.repeats) + 1)]
     for i, axis in enumerate(AXES):
-        values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in entry.repeats), strict=True)
+        values, stds = zip(
+            *((each.scale_fixed.bias[i], each.scale_fixed.std[i]) for each in entry.repeats), strict=True
+        )
         said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
 deviation of {entry.common_std[i]!r} {entry.unit}. ± U of what differs"
-        freedom = None if entry.freedom is None else [entry.freedom[i]] * len(labels)
+        freedom = None if entry.degrees_of_freedom is None else [entry.degrees_of_freedom[i]] * len(labels)
         yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
 
 
@@ -144,14 +147,14 @@ def _relative(
     entry: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, statement: str, how: str = ""
 ) -> Iterator[Element]:
     budget, covariance = _known_whole(entry)
-    statement = f"{statement} {_at(entry.found_at)}{_told(entry.told_from)}{coverage_sentence(budget)}"
+    statement = f"{statement} {_at(entry.conditions)}{_told(entry.detection_limits)}{coverage_sentence(budget)}"
     scale, bias = _expanded(budget)
     yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, covariance, unit, how)
 
 
-def _known_whole(entry: SensorEntry | AccelerometerEntry | MagnetometerEntry) -> tuple[BudgetEntry, Matrix6]:
+def _known_whole(entry: GyroscopeEntry | AccelerometerEntry | MagnetometerEntry) -> tuple[BudgetEntry, Matrix6]:
     """The budget and the covariance that combines it. Raises Refused `no_digital_certificate` where one is missing."""
     if entry.budget is None or entry.covariance_combined is None:
         raise Refused(
@@ -162,18 +165,18 @@ def _known_whole(entry: SensorEntry | AccelerometerEntry | MagnetometerEntry) ->
     return entry.budget, entry.covariance_combined
 
 
-def _at(when: WhenEntry | None) -> str:
+def _at(when: ConditionsEntry | None) -> str:
     """When it was read, and how warm it was; of results of before the temperature is a condition alone."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
 
-def _told(damages: Sequence[ToldFromEntry]) -> str:
+def _told(damages: Sequence[DetectionLimitEntry]) -> str:
     """What would have contradicted itself."""
     return f"Told in 95 of 100 measurements: {told_words(damages)}. " if damages else ""
 
 
-def _speed(sensor: SensorEntry) -> str:
+def _speed(sensor: GyroscopeEntry) -> str:
     """The rates at which a gyroscope was calibrated, in words."""
     loads = load_words(sensor)
     along = "" if loads is None else f"; along the item's own axes the sweeps turned it by {loads} °/s"

@@ -9,7 +9,7 @@ import numpy as np
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.quantity import Unit
-from rig.data.result_file import SensorEntry
+from rig.data.result_file import GyroscopeEntry
 from rig.report.certificate.tables import AXES
 from rig.report.kinds.finding import Finding
 from rig.report.kinds.unexplained import Unexplained, of_attitudes, of_repeats, of_sweeps_and_rests
@@ -61,7 +61,7 @@ class Contributions:
     end: float
 
 
-def residuals(finding: Finding[SensorEntry]) -> Residuals | None:
+def residuals(finding: Finding[GyroscopeEntry]) -> Residuals | None:
     """What is left of a gyroscope's sweeps and rests; None where nothing is."""
     left = of_sweeps_and_rests(finding)
     return None if left is None else _drawn(left)
@@ -115,9 +115,10 @@ def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
     def place(share: float) -> float:
         return round(NAMES + across * (DECADES + float(np.log10(np.clip(np.sqrt(share), 10.0**-DECADES, 1.0)))), 1)
 
-    lines = sorted(budget.contributors, key=lambda line: -max(line.share[k], line.share[b]))
+    lines = sorted(budget.contributors, key=lambda line: -max(line.variance_fraction[k], line.variance_fraction[b]))
     rows = tuple(
-        (line.name, TOP + ROW * (i + 0.5), place(line.share[k]), place(line.share[b])) for i, line in enumerate(lines)
+        (line.name, TOP + ROW * (i + 0.5), place(line.variance_fraction[k]), place(line.variance_fraction[b]))
+        for i, line in enumerate(lines)
     )
     labels = ("0.01 %", "0.1 %", "1 %", "10 %", "100 %")
     ticks = tuple((NAMES + across * i, label) for i, label in enumerate(labels))

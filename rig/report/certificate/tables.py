@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.motion_file import NOT_STATED
-from rig.data.result_file import CheckEntry, SensorEntry, VerificationEntry
+from rig.data.result_file import CheckEntry, GyroscopeEntry, VerificationEntry
 from rig.report.expanded import expanded
 from rig.report.kinds.characteristic import Term
 from rig.report.rounding import percent, rounded
@@ -63,7 +63,7 @@ def pair(value: float, uncertainty: float) -> Pair:
     return Pair(found.value_text, found.uncertainty_text)
 
 
-def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
+def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
     """A gyroscope's axes with U of the budget; without one, with the noise's deviation, as the page then says."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _spread(sensor), too=degrees_of(sensor)[1])
 
@@ -87,12 +87,12 @@ def rows_of(
     ]
 
 
-def degrees_of(sensor: SensorEntry) -> tuple[str, float]:
+def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
     """The unit that biases are printed in beside rad/s, and what takes rad/s there: hours where it is a fine one."""
     return ("°/s", DEG) if DEG * max(_spread(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
-def _spread(sensor: SensorEntry) -> Sequence[float]:
+def _spread(sensor: GyroscopeEntry) -> Sequence[float]:
     if sensor.budget is None:
         return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
     return sensor.budget.expanded
@@ -105,7 +105,7 @@ def check_row(check: CheckEntry) -> CheckRow:
         found = pair(check.value, check.uncertainty)
         value, uncertainty = found.value, found.uncertainty
     limit = "not set" if check.limit is None else f"{check.limit:g}"
-    risk = "–" if check.false_acceptance is None else percent(check.false_acceptance)
+    risk = "–" if check.false_acceptance_probability is None else percent(check.false_acceptance_probability)
     return CheckRow(check.name, value, uncertainty, limit, risk, check.passed, check.unit)
 
 

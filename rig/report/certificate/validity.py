@@ -2,7 +2,7 @@
 
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
-from rig.data.result_file import SensorEntry
+from rig.data.result_file import GyroscopeEntry
 
 # What a budget has of it, it has of the run: a value is that of one temperature, one power-up and one mounting.
 ALWAYS = (
@@ -22,7 +22,7 @@ def in_budget(budget: BudgetEntry | None, name: str) -> bool:
     return budget is not None and any(name in line.name for line in budget.contributors)
 
 
-def left_out_of_rates(sensor: SensorEntry, *, elsewhere: bool = False) -> str:
+def left_out_of_rates(sensor: GyroscopeEntry, *, elsewhere: bool = False) -> str:
     """What a gyroscope's U leaves out; where a file tells the motion, errors of it that the readings do not show."""
     bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
     return ", ".join(("what gravity adds to it", *OF_THE_FILE, *bent) if elsewhere else bent)

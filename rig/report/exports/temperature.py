@@ -45,7 +45,7 @@ def _change(drift: ResultDocument, sensor: Corrected, to_c: float) -> Array:
             "Leave out --at-temperature; calibrate it where its thermometer is read",
         )
     watched = drift.bias_drift.get(name, {}).get(quantity)
-    slope = None if watched is None else watched.over_temperature
+    slope = None if watched is None else watched.temperature_slope
     if not isinstance(slope, SlopeEntry):
         why = "it did not watch that bias" if slope is None else slope.error
         raise Refused(

@@ -8,7 +8,7 @@ from rig.analysis.acceleration import AccelerometerResult, HeldOut
 from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
 from rig.analysis.read_when import of_accelerometer
-from rig.data.accelerometer_entries import AccelerometerEntry, AlignmentEntry, HeldOutEntry
+from rig.data.accelerometer_entries import AccelerometerEntry, AlignmentEntry, ValidationEntry
 from rig.data.quantity import ACCELERATION
 from rig.estimation.accelerometer_model import DELAY, SECOND
 from rig.estimation.imu import MODEL
@@ -49,10 +49,10 @@ def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> Accelero
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
-        non_orthogonality_freedom=counted(of_acceleration_angles(result)),
-        second_order_freedom=counted(of_second_order(result)),
-        held_out=None if result.held_out is None else _held_out(result.held_out),
-        found_at=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        non_orthogonality_degrees_of_freedom=counted(of_acceleration_angles(result)),
+        second_order_degrees_of_freedom=counted(of_second_order(result)),
+        validation=None if result.held_out is None else _held_out(result.held_out),
+        conditions=when_entry(of_accelerometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
         **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
@@ -60,26 +60,27 @@ def _entry(outcome: Outcome, name: str, result: AccelerometerResult) -> Accelero
 def _alignment(alignment: Alignment) -> AlignmentEntry:
     return entry(
         AlignmentEntry, alignment,
-        rotation_rad=alignment.vector_rad,
         std_rad=np.sqrt(np.diag(alignment.covariance_rad2)),
     )  # fmt: skip
 
 
-def _held_out(held: HeldOut) -> HeldOutEntry:
-    return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
+def _held_out(held: HeldOut) -> ValidationEntry:
+    return ValidationEntry(
+        dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max())
+    )
 
 
 def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
     """What stands below the table."""
     entry = finding.entry
-    swept = "" if entry.laid_down is not None else f", {entry.sweeps} sweeps"
+    swept = "" if entry.placement is not None else f", {entry.sweeps} sweeps"
     yield f"relative to gravity, {entry.gravity_m_s2:.6g} m/s²; {len(entry.dwells)} attitudes{swept}"
-    if entry.found_at is not None:
-        yield f"scale and bias: {when_words(entry.found_at)}"
+    if entry.conditions is not None:
+        yield f"scale and bias: {when_words(entry.conditions)}"
     if entry.budget is not None and any(line.name == NONLINEARITY for line in entry.budget.contributors):
         yield "k by the readings at 1 g up and down, b at 0 g"
     yield from assumed_lines(entry.budget)
-    yield from told_lines(entry.told_from)
+    yield from told_lines(entry.detection_limits)
     yield from attitude_lines(finding)
     if entry.second_order_s2_m is not None and entry.second_order_std_s2_m is not None:
         yield line_of(SECOND_ORDER.of(finding), "second order", "+.2e", ".1e")
@@ -93,8 +94,8 @@ def _lines(finding: Finding[AccelerometerEntry]) -> Iterator[str]:
         std_deg = 2 * np.degrees(max(entry.alignment.std_rad))
         yield f"turned against its gyroscope by: {turned} ° (± {std_deg:.4f})"
     yield from method_lines(entry, ACCELERATION, ", attitudes alone")
-    if entry.held_out is not None:
-        held = entry.held_out
+    if entry.validation is not None:
+        held = entry.validation
         yield (
             f"gravity's size in {held.dwells} attitudes held out: RMS {held.rms_m_s2:.5f} m/s², "
             f"at most {held.max_m_s2:.5f} off"
@@ -107,7 +108,7 @@ def _model(entry: AccelerometerEntry) -> str:
 
 
 def _temperatures_c(entry: AccelerometerEntry) -> dict[str, float | None]:
-    return {"": entry.temperature_c} if entry.found_at is None else warmth(entry.found_at)
+    return {"": entry.temperature_c} if entry.conditions is None else warmth(entry.conditions)
 
 
 def _method(swept: bool) -> str:

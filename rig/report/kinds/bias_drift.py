@@ -7,7 +7,7 @@ from rich.table import Table
 
 from rig.analysis.bias_drift import SLOPE, Anew, BiasDrift
 from rig.analysis.outcome import Outcome
-from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
+from rig.data.drift_entries import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
 from rig.data.recorded_sensor import RecordedSensor
@@ -48,30 +48,32 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
             RepeatEntry(
                 time_s=float(drift.time_s[repeat]),
                 temperature_c=_known(float(drift.temperature_c[repeat])),
-                held=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
-                anew=anew[repeat],
+                scale_fixed=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
+                scale_free=anew[repeat],
             )
             for repeat in range(len(held.bias))
         ),
         common_std=_vector(drift.common_std),
-        excess=_vector(held.excess),
-        moves=tuple(
-            MoveEntry(repeat=move.repeat + 1, axis="xyz"[move.axis], change=_vector(move.change), std=_vector(move.std))
+        scatter_ratio=_vector(held.excess),
+        steps=tuple(
+            BiasStepEntry(
+                repeat=move.repeat + 1, axis="xyz"[move.axis], change=_vector(move.change), std=_vector(move.std)
+            )
             for move in held.moves
         ),
-        false_alarm=FALSE_ALARM,
+        false_alarm_probability=FALSE_ALARM,
         largest_change=_vector(held.largest_change),
-        over_temperature=error_entry(drift.faults[SLOPE])
+        temperature_slope=error_entry(drift.faults[SLOPE])
         if slope is None
         else SlopeEntry(
             slope=_vector(slope.slope),
             std=_vector(slope.std),
             range_c=slope.range_c,
             correlation_with_time=slope.correlation,
-            freedom=counted(drift.slope_freedom),
+            degrees_of_freedom=counted(drift.slope_freedom),
         ),
         earth_rate_known=drift.earth_rate_known,
-        freedom=counted(drift.freedom),
+        degrees_of_freedom=counted(drift.freedom),
         part=sensor.part,
         serial_number=sensor.serial_number,
         full_scale=sensor.channel(quantity).range,
@@ -133,10 +135,10 @@ def _measured(finding: Finding[DriftEntry], _: object) -> Measured:
 def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
     """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
     unit, size = of.drift.name, of.drift.size
-    known = expanded((1.0, 1.0, 1.0), entry.freedom)
+    known = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
     table = Table(title=plain(f"{name}, {of.sensor}: bias by repeat, scale and axes held", "table.title"))
     table.title_justify = "left"
-    moved = {move.repeat: move.axis for move in entry.moves}
+    moved = {move.repeat: move.axis for move in entry.steps}
     for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
         table.add_column(heading, justify="right")
     for number, repeat in enumerate(entry.repeats, 1):
@@ -144,8 +146,8 @@ def drift_table(name: str, of: Quantity, entry: DriftEntry) -> Table:
             str(number),
             f"{repeat.time_s / 3600:.2f}",
             "" if repeat.temperature_c is None else f"{repeat.temperature_c:.1f}",
-            *(f"{bias / size:+.4g}" for bias in repeat.held.bias),
-            f"{max(np.multiply(known.factors, repeat.held.std)) / size:.2g}",
+            *(f"{bias / size:+.4g}" for bias in repeat.scale_fixed.bias),
+            f"{max(np.multiply(known.factors, repeat.scale_fixed.std)) / size:.2g}",
             moved.get(number, ""),
         )
     return table
@@ -155,34 +157,34 @@ def _lines(finding: Finding[DriftEntry]) -> Iterator[str]:
     """What stands below the table."""
     entry, quantity, shown = finding.entry, finding.quantity, finding.quantity.drift
     unit, size = shown.name, shown.size
-    if entry.moves:
-        for move in entry.moves:
+    if entry.steps:
+        for move in entry.steps:
             change = " ".join(f"{each / size:+.3g}" for each in move.change)
             yield f"moved before repeat {move.repeat}, most along {move.axis}: {change} {unit}"
     else:
         yield "the bias did not move beyond its noise"
-    yield f"a steady one is said to have moved in {100 * entry.false_alarm:g} % of runs"
-    if max(entry.excess) > 1.5:
-        yield f"repeats scatter {max(entry.excess):.1f} times as much as noise would have it; U allows for that"
-    anew = [repeat.anew for repeat in entry.repeats]
+    yield f"a steady one is said to have moved in {100 * entry.false_alarm_probability:g} % of runs"
+    if max(entry.scatter_ratio) > 1.5:
+        yield f"repeats scatter {max(entry.scatter_ratio):.1f} times as much as noise would have it; U allows for that"
+    anew = [repeat.scale_free for repeat in entry.repeats]
     refused = [each for each in anew if isinstance(each, ErrorEntry)]
     if refused:
         yield f"everything found anew: not in {len(refused)} of {len(anew)} repeats; {refused[0].error}"
     else:
         apart = [
-            np.subtract(each.bias, repeat.held.bias)
+            np.subtract(each.bias, repeat.scale_fixed.bias)
             for each, repeat in zip(anew, entry.repeats, strict=True)
             if not isinstance(each, ErrorEntry)
         ]
         rms = float(np.sqrt(np.mean(np.square(apart)))) / size
         yield f"everything found anew in each repeat: {rms:.3g} {unit} RMS from these"
-    slope = entry.over_temperature
+    slope = entry.temperature_slope
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
     else:
         terms = "  ".join(f"{a:+.3g} ± {b:.1g}" for _, a, b in DRIFT_SLOPE.of(finding).printed)
         low, high = slope.range_c
-        words = factor_words(slope.freedom)
+        words = factor_words(slope.degrees_of_freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
     if quantity == RATE and not entry.earth_rate_known:
         yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"

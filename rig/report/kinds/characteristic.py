@@ -129,7 +129,7 @@ def terms(
 
 
 def named(what: str, suffix: str, sign: int = 1) -> Callable[[Any], Known | None]:
-    """Numbers that an entry, or the vector model in it, has at `what_suffix`, `what_std_suffix` and `what_freedom`.
+    """Numbers of an entry, or of its vector model: `what_suffix`, `what_std_suffix`, `what_degrees_of_freedom`.
 
     A matrix is read row by row. Values change by the `sign` where the entry has those of the opposite.
     """
@@ -138,7 +138,7 @@ def named(what: str, suffix: str, sign: int = 1) -> Callable[[Any], Known | None
         for held in (entry, getattr(entry, "vector_model", None)):
             values, stds = (getattr(held, f"{name}_{suffix}", None) for name in (what, f"{what}_std"))
             if values is not None and stds is not None:
-                freedom = getattr(held, f"{what}_freedom", None)
+                freedom = getattr(held, f"{what}_degrees_of_freedom", None)
                 counted = None if freedom is None else _flat(freedom)
                 return Known([sign * each for each in _flat(values)], _flat(stds), counted)
         return None

@@ -32,17 +32,17 @@ def _per_kelvin(quantity: Quantity) -> Units:
 def _largest_change(entry: Any) -> Known:
     from rig.estimation.bias_by_repeat import largest_change_std
 
-    bias, std = (np.array([getattr(each.held, name) for each in entry.repeats]) for name in ("bias", "std"))
-    return Known(entry.largest_change, largest_change_std(bias, std).tolist(), entry.freedom)
+    bias, std = (np.array([getattr(each.scale_fixed, name) for each in entry.repeats]) for name in ("bias", "std"))
+    return Known(entry.largest_change, largest_change_std(bias, std).tolist(), entry.degrees_of_freedom)
 
 
 def _drift_slope(entry: Any) -> Known | None:
-    slope = entry.over_temperature
-    return None if isinstance(slope, ErrorEntry) else Known(slope.slope, slope.std, slope.freedom)
+    slope = entry.temperature_slope
+    return None if isinstance(slope, ErrorEntry) else Known(slope.slope, slope.std, slope.degrees_of_freedom)
 
 
 def _drift_range(entry: Any) -> str:
-    low, high = entry.over_temperature.range_c
+    low, high = entry.temperature_slope.range_c
     return f"Holds from {low!r} to {high!r} °C only."
 
 

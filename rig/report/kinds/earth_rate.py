@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.quantity import RATE
-from rig.data.result_file import ResultDocument, SensorEntry
+from rig.data.result_file import GyroscopeEntry, ResultDocument
 from rig.report.certificate import dcc_results
 from rig.report.kinds.characteristics import EARTH_RATE, EARTHS_RATES
 from rig.report.kinds.finding import Finding
@@ -13,26 +13,26 @@ from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
+def _found(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
     """Every sensor that has found it."""
-    for name, sensor in document.sensors.items():
+    for name, sensor in document.gyroscopes.items():
         if isinstance(sensor.earth_rate, EarthRateEntry):
             yield Finding(name, RATE, sensor)
 
 
-def _of(finding: Finding[SensorEntry]) -> EarthRateEntry:
+def _of(finding: Finding[GyroscopeEntry]) -> EarthRateEntry:
     rate = finding.entry.earth_rate
     if not isinstance(rate, EarthRateEntry):
         raise TypeError(f"{finding.sensor} has not found the Earth's rate")
     return rate
 
 
-def _shown(finding: Finding[SensorEntry]) -> Shown:
+def _shown(finding: Finding[GyroscopeEntry]) -> Shown:
     """The Earth's rate in the axes of the arm's base."""
     return row_of(EARTH_RATE.of(finding))
 
 
-def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
+def _followed(finding: Finding[GyroscopeEntry], _: object) -> Followed:
     sensor = finding.entry
     return Followed(
         finding.sensor,
@@ -45,7 +45,7 @@ def _followed(finding: Finding[SensorEntry], _: object) -> Followed:
     )
 
 
-def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
+def _measured(finding: Finding[GyroscopeEntry], _: object) -> Measured | None:
     """The item is its gyroscope, as warm as that was; a reference is none."""
     sensor = finding.entry
     if finding.known:
@@ -58,7 +58,7 @@ def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
 AMONG = Without("it stands among the lines of its gyroscope")
 EARTHS_RATE = ResultKind(
     name="Earth's rate",
-    key="sensors",
+    key="gyroscopes",
     entries=Without("it is part of its gyroscope's entry"),
     found=_found,
     printed=AMONG,

@@ -8,10 +8,10 @@ from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.analysis.read_when import of_gyroscope
-from rig.data.attitude_entries import InAttitudesRatesEntry
+from rig.data.attitude_entries import AttitudesEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.quantity import RATE
-from rig.data.result_file import BoardEntry, EstimateEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
+from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, ResultDocument, TimeBaseEntry, VectorEntry
 from rig.data.result_types import ErrorEntry, Role
 from rig.estimation.arrays import in_units_of
 from rig.estimation.six_observation import PARAMETERS
@@ -33,14 +33,14 @@ from rig.report.validity_words import load_words, speed_words, warmth, when_word
 from rig.report.when_entry import when_entry
 
 
-def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
+def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:
     """The entry is there of every run, empty where no sweeps were made."""
     made = {}
     for name, result in outcome.results.items():
         role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
         if (elsewhere := outcome.elsewhere.get(name)) is not None:
             made[name] = sensor_entry(
-                result, role, in_attitudes=rates_in_attitudes(elsewhere), turned=turned(elsewhere)
+                result, role, in_attitudes=rates_in_attitudes(elsewhere), by_angles=turned(elsewhere)
             )
             continue
         if outcome.settings.by_hand is not None:
@@ -51,31 +51,31 @@ def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
             result,
             role,
             agreed,
-            scale_at=when_entry(held.scale),
-            bias_at=when_entry(held.bias),
+            scale_conditions=when_entry(held.scale),
+            bias_conditions=when_entry(held.bias),
             **told_from(outcome.told_from.get(name, ())),
         )
     return made
 
 
-def _found(document: ResultDocument) -> Iterator[Finding[SensorEntry]]:
-    return (Finding(name, RATE, entry) for name, entry in document.sensors.items())
+def _found(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
+    return (Finding(name, RATE, entry) for name, entry in document.gyroscopes.items())
 
 
-def _printed(finding: Finding[SensorEntry]) -> Iterator[Table | str]:
+def _printed(finding: Finding[GyroscopeEntry]) -> Iterator[Table | str]:
     sensor, reference = finding.entry, " (known)" if finding.known else ""
     title = f"{finding.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
     yield from tables(title, RATE, sensor)
     yield from _beside(finding)
 
 
-def _shown(finding: Finding[SensorEntry]) -> Shown:
+def _shown(finding: Finding[GyroscopeEntry]) -> Shown:
     speeds = speed_words(finding.entry)
     held_at = f"at {speeds} °/s" if speeds else ""
     return replace(shown_of(finding), held_at=held_at, model=finding.entry.model)
 
 
-def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
+def _measured(finding: Finding[GyroscopeEntry], _: object) -> Measured | None:
     """The item's results; nothing of a reference."""
     sensor = finding.entry
     if finding.known:
@@ -85,7 +85,7 @@ def _measured(finding: Finding[SensorEntry], _: object) -> Measured | None:
     return Measured("gyroscope", finding.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
-def _corrected(finding: Finding[SensorEntry]) -> Corrected | None:
+def _corrected(finding: Finding[GyroscopeEntry]) -> Corrected | None:
     """Readings to rates, in the frame nearest to its axes."""
     sensor = finding.entry
     if finding.known:
@@ -111,21 +111,21 @@ def _corrected(finding: Finding[SensorEntry]) -> Corrected | None:
     )
 
 
-def temperatures_c(sensor: SensorEntry) -> dict[str, float | None]:
+def temperatures_c(sensor: GyroscopeEntry) -> dict[str, float | None]:
     """How warm a gyroscope was, by what of it was read then: scale factors come from the sweeps alone."""
-    if sensor.scale_at is None or sensor.bias_at is None:
+    if sensor.scale_conditions is None or sensor.bias_conditions is None:
         return {"": sensor.temperature_c}
-    return warmth(sensor.scale_at, " at the scale factors") | warmth(sensor.bias_at, " at the biases")
+    return warmth(sensor.scale_conditions, " at the scale factors") | warmth(sensor.bias_conditions, " at the biases")
 
 
-def _beside(finding: Finding[SensorEntry]) -> Iterator[str]:
+def _beside(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
     """What stands beside a gyroscope's values: speeds, the other estimators, what the vector model says of the axes."""
     sensor = finding.entry
     yield from _speeds(sensor)
-    if sensor.scale_at is not None and sensor.bias_at is not None:
-        yield f"scale: {when_words(sensor.scale_at)}"
-        yield f"bias: {when_words(sensor.bias_at)}"
-    yield from told_lines(sensor.told_from)
+    if sensor.scale_conditions is not None and sensor.bias_conditions is not None:
+        yield f"scale: {when_words(sensor.scale_conditions)}"
+        yield f"bias: {when_words(sensor.bias_conditions)}"
+    yield from told_lines(sensor.detection_limits)
     yield from _in_attitudes(sensor.in_attitudes, sensor.time_bases)
     yield from _turned(sensor)
     if sensor.by_hand is not None:
@@ -152,7 +152,7 @@ def _beside(finding: Finding[SensorEntry]) -> Iterator[str]:
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 
-def _differs(sensor: SensorEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
+def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
     """Which of two estimators to believe, where they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*each.scale, *each.bias_rad_s) for each in (sensor, other))
@@ -165,9 +165,9 @@ def _differs(sensor: SensorEntry, other: EstimateEntry | VectorEntry) -> Iterato
         )
 
 
-def _turned(sensor: SensorEntry) -> Iterator[str]:
+def _turned(sensor: GyroscopeEntry) -> Iterator[str]:
     """How sweeps of a file were read, and what was taken as known of them."""
-    if (found := sensor.turned) is None:
+    if (found := sensor.by_angles) is None:
         if sensor.range_rad_s is None and sensor.in_attitudes is None and sensor.by_hand is None:
             yield "the axes of the sweeps are taken as given: an error of theirs is an error of F across its rows"
         return
@@ -181,7 +181,7 @@ def _turned(sensor: SensorEntry) -> Iterator[str]:
         yield f"the turns contradict each other by more, and count as {found.widened:.2g} times as uncertain"
 
 
-def _in_attitudes(attitudes: InAttitudesRatesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
+def _in_attitudes(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
     """What attitudes of a file told beside scale and bias."""
     if attitudes is None:
         return
@@ -195,26 +195,26 @@ def _in_attitudes(attitudes: InAttitudesRatesEntry | None, clocks: Iterable[Time
     else:
         rate, known = triple(attitudes.earth_rate_rad_s, "+.3e"), 2 * max(attitudes.earth_rate_std_rad_s)
         yield f"Earth's rate in table coordinates: {rate} rad/s (± {known:.1e}, k = 2)"
-    if (way := attitudes.followed) is not None:
+    if (way := attitudes.by_increments) is not None:
         yield (
             f"increments: {way.increments} between attitudes, means over windows of {way.window_s:.3g} s; residuals "
             f"{1e3 * way.residual_rms_rad:.3g} mrad"
         )
         yield (
-            f"found beside: attitudes off by {1e3 * way.fix_std_rad:.2g} mrad a window, angle random walk "
-            f"{way.random_walk_rad_sqrt_s:.2g} rad/√s; from one stretch of the recording to another F differs by "
+            f"found beside: attitudes off by {1e3 * way.attitude_std_rad:.2g} mrad a window, angle random walk "
+            f"{way.angle_random_walk_rad_sqrt_s:.2g} rad/√s; from one stretch of the recording to another F differs by "
             f"{way.matrix_scatter:.1e}, b by {way.bias_scatter_rad_s:.1e} rad/s"
         )
-        late_ms, known_ms = 1e3 * way.clock_s, 2e3 * way.clock_std_s
+        late_ms, known_ms = 1e3 * way.clock_offset_s, 2e3 * way.clock_offset_std_s
         yield f"the attitudes' clock is {late_ms:+.2f} ± {known_ms:.2g} ms off the samples', which is allowed for"
-    for method, other in attitudes.beside.items():
+    for method, other in attitudes.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"
         else:
             yield f"{method}: k {triple(other.scale, '.6g')}, b {triple(other.bias_rad_s, '+.6g')} rad/s"
 
 
-def _speeds(sensor: SensorEntry) -> Iterator[str]:
+def _speeds(sensor: GyroscopeEntry) -> Iterator[str]:
     """Where a calibration is valid, in words: one speed does not tell how far the sensor is from linear."""
     speeds, loads, found = speed_words(sensor), load_words(sensor), sensor.nonlinearity
     if loads is not None:
@@ -244,7 +244,7 @@ def _on_the_board(board: BoardEntry) -> Iterator[str]:
 
 GYROSCOPE = ResultKind(
     name="gyroscope",
-    key="sensors",
+    key="gyroscopes",
     entries=_entries,
     found=_found,
     printed=_printed,

@@ -50,8 +50,8 @@ def _entry(outcome: Outcome, name: str, result: MagnetometerResult) -> Magnetome
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
         hard_iron_t=hard_iron(result.solution),
         field_base_t=result.solution.reference,
-        non_orthogonality_freedom=counted(of_field_angles(result)),
-        found_at=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
+        non_orthogonality_degrees_of_freedom=counted(of_field_angles(result)),
+        conditions=when_entry(of_magnetometer(outcome.recordings, name, [dwell.index for dwell in result.dwells])),
         **told_from(outcome.told_from_in_reference.get(name, ())),
     )  # fmt: skip
 
@@ -61,10 +61,10 @@ def _lines(finding: Finding[MagnetometerEntry]) -> Iterator[str]:
     entry = finding.entry
     field_ut = entry.field_t / FIELD.bias.size
     yield f"relative to a field of {field_ut:g} µT; {len(entry.dwells)} attitudes; no limit judges it"
-    if entry.found_at is not None:
-        yield f"scale and bias: {when_words(entry.found_at)}"
+    if entry.conditions is not None:
+        yield f"scale and bias: {when_words(entry.conditions)}"
     yield from assumed_lines(entry.budget)
-    yield from told_lines(entry.told_from)
+    yield from told_lines(entry.detection_limits)
     yield "iron and currents that turn with it are part of what is found"
     base = "table's axes"
     if entry.arm_field_in_bias:

@@ -94,12 +94,13 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
     if entry.attitude_error_rad is not None:
         known = "" if entry.attitude_error_std_rad is None else f" (± {2e3 * entry.attitude_error_std_rad:.2f})"
         yield f"attitude error found: {1e3 * entry.attitude_error_rad:.2f} mrad about each axis{known}"
-    laid, unit = entry.laid_down, quantity.unit
+    laid, unit = entry.placement, quantity.unit
     if laid is None:
         return
     if laid.placement_std is not None:
         told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
-        beside = f", {laid.rests_elsewhere} more rests have helped to find it" if laid.rests_elsewhere else ""
+        count = laid.rests_without_attitude
+        beside = f", {count} more rests have helped to find it" if count else ""
         yield f"a placement found to change each reading by {told} beside its attitude{beside}"
         if laid.placement_uncertainty > laid.placement_std / 2:
             yield "this is hardly known: lay it down in the same attitudes again, and the uncertainty becomes smaller"
@@ -107,7 +108,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
     """What each of the other methods finds, or why it finds nothing."""
-    for method, other in entry.beside.items():
+    for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"
         else:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.data.drift_entries import DriftEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
+from rig.data.result_file import AverageEntry, GyroscopeEntry, ObservationEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
 from rig.report.kinds.finding import Finding
@@ -41,7 +41,7 @@ class Unexplained:
     split: int | None = None
 
 
-def of_sweeps_and_rests(finding: Finding[SensorEntry]) -> Unexplained | None:
+def of_sweeps_and_rests(finding: Finding[GyroscopeEntry]) -> Unexplained | None:
     """A gyroscope's sweeps and rests; None where the vector model left nothing, or that of other sweeps and rests."""
     sensor, vector = finding.entry, finding.entry.vector_model
     averages: list[ObservationEntry | AverageEntry] = [*sensor.observations, *sensor.rests]
@@ -67,7 +67,7 @@ def of_attitudes(finding: Finding[Any]) -> Unexplained:
     labels, left = [each.name for each in dwells], np.array([of(dwell, "residual") for dwell in dwells])
     expected = [told for dwell in dwells if (told := of(dwell, "residual_std")) is not None]
     if len(expected) == len(left):
-        what = EXPECTED_OF_FILES if entry.laid_down is not None else EXPECTED_IN_ATTITUDES[quantity]
+        what = EXPECTED_OF_FILES if entry.placement is not None else EXPECTED_IN_ATTITUDES[quantity]
         return Unexplained(quantity, labels, left, np.array(expected), what)
     std, mean = (np.array([of(dwell, name) for dwell in dwells]) for name in ("mean_std", "mean"))
     turned = _turned(np.array(entry.matrix), mean - np.array(of(entry, "bias")), entry.attitude_error_rad)
@@ -77,8 +77,8 @@ def of_attitudes(finding: Finding[Any]) -> Unexplained:
 def of_repeats(finding: Finding[DriftEntry]) -> Unexplained:
     """The biases by repeat, less their mean over the repeats."""
     repeats = finding.entry.repeats
-    bias = np.array([each.held.bias for each in repeats])
-    std = np.array([each.held.std for each in repeats])
+    bias = np.array([each.scale_fixed.bias for each in repeats])
+    std = np.array([each.scale_fixed.std for each in repeats])
     labels = [f"repeat {number}" for number in range(1, len(repeats) + 1)]
     return Unexplained(finding.quantity, labels, bias - bias.mean(axis=0), std, OF_REPEATS, shown=FROM_MEAN)
 

@@ -47,7 +47,7 @@ def _comparison(comparison: Comparison) -> ComparisonEntry:
         ComparisonEntry, comparison,
         movement=entry(DeviationEntry, comparison.movement),
         sweeps=entry(DeviationEntry, comparison.sweeps),
-        revolutions=[entry(RevolutionErrorEntry, turn, joint=turn.joint_name) for turn in comparison.revolutions],
+        revolutions=[entry(RevolutionErrorEntry, turn) for turn in comparison.revolutions],
     )  # fmt: skip
 
 

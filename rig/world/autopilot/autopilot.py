@@ -44,7 +44,7 @@ class Faults:
 
 
 class SimulatedAutopilot:
-    """The autopilot, switched on at the virtual time `time_s`, by when it has counted `on_for_s` seconds."""
+    """The autopilot, switched on at the virtual time `time_s`, by when it has counted `uptime_s` seconds."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class SimulatedAutopilot:
         baud: float,
         uid: str,
         clock_ppm: float,
-        on_for_s: float,
+        uptime_s: float,
         armed: bool,
         provides_temperature: bool = True,
         mavlink_version: int = 2,
@@ -77,7 +77,7 @@ class SimulatedAutopilot:
         self._provides_temperature, self._next_pressure_s = provides_temperature, 0.0
         self._uid, self.armed = bytes.fromhex(uid), armed
         self.faults = Faults()
-        self._speed, self._began_s, self._on_for_s = 1.0 + 1e-6 * clock_ppm, time_s, on_for_s
+        self._speed, self._began_s, self._on_for_s = 1.0 + 1e-6 * clock_ppm, time_s, uptime_s
         self._random = Random(f"autopilot {seed}")
         self._sent = bytearray()
         self._steps = 0

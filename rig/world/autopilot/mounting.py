@@ -55,7 +55,7 @@ class AutopilotMount:
             baud=section.baud or self.configured_baud,
             uid=section.uid,
             clock_ppm=section.clock_ppm,
-            on_for_s=section.on_for_s,
+            uptime_s=section.uptime_s,
             armed=section.armed,
             provides_temperature=section.provides_temperature,
             mavlink_version=section.mavlink_version,

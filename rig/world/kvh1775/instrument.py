@@ -42,7 +42,7 @@ class Faults:
 
 
 class Kvh1775:
-    """The instrument, switched on at the virtual time `time_s`, by when it has counted `on_for_s`.
+    """The instrument, switched on at the virtual time `time_s`, by when it has counted `uptime_s`.
 
     `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
     `magnetometer` the errors of what reads that. `memory`: its settings, which it changes.
@@ -58,7 +58,7 @@ class Kvh1775:
         magnetometer: MagnetometerTruth = PERFECT,
         serial_number: str,
         oscillator_ppm: float,
-        on_for_s: float,
+        uptime_s: float,
         seed: np.random.SeedSequence,
         time_s: float,
         faulty: SimulatedFaultySection = FAULTLESS,
@@ -67,7 +67,7 @@ class Kvh1775:
         self._truth, self._motion_at, self._memory = truth, motion_at, memory
         self._serial_number = serial_number
         self._speed = 1.0 + 1e-6 * oscillator_ppm
-        self._counted_from_s = time_s - on_for_s / self._speed
+        self._counted_from_s = time_s - uptime_s / self._speed
         self._felt: Sequence[float] = ()
         gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
         self._gyroscope, self._repeats = FrozenGyroscope(gyroscope, faulty), Repeats(faulty, seed)

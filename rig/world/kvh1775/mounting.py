@@ -52,7 +52,7 @@ class Mount:
             magnetometer=magnetometer.truth,
             serial_number=section.serial_number or sensor.serial_number,
             oscillator_ppm=section.oscillator_ppm,
-            on_for_s=section.on_for_s,
+            uptime_s=section.uptime_s,
             seed=np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(self.name)]),
             time_s=time_s,
             faulty=simulated.faulty,

@@ -43,7 +43,7 @@ class Faults:
 
 
 class Printer:
-    """A device switched on at the virtual time `time_s`, by when it has counted `on_for_s`.
+    """A device switched on at the virtual time `time_s`, by when it has counted `uptime_s`.
 
     `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
     `magnetometer` the errors of what reads that.
@@ -68,7 +68,7 @@ class Printer:
         self.baud_rate = baud_rate
         self._section, self._prints, self._motion_at = section, prints, motion_at
         self._speed = 1.0 + 1e-6 * section.oscillator_ppm
-        self._counted_from_s = time_s - section.on_for_s / self._speed
+        self._counted_from_s = time_s - section.uptime_s / self._speed
         self._step_s = 1.0 / rate_hz / self._speed
         self._began_s, self._samples, self._printed = time_s, 0, 0
         gyroscope = Gyroscope(motion_at, truth.gyro, seed, truth.temperature_c)

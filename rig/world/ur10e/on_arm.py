@@ -89,8 +89,8 @@ class OnArm:
 
 
 def _seen_vibration(arm: SimulatedArmSection, seed: int) -> Vibration | None:
-    if not arm.vibration_seen_rms_rad_s:
+    if not arm.vibration_measured_rms_rad_s:
         return None
     random = Random(f"vibration {seed}")
     phases_rad = [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]
-    return Vibration(arm.vibration_seen_rms_rad_s, [(2.0 * pi * arm.vibration_seen_hz, phases_rad)])
+    return Vibration(arm.vibration_measured_rms_rad_s, [(2.0 * pi * arm.vibration_measured_hz, phases_rad)])

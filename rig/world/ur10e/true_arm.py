@@ -41,7 +41,7 @@ class TrueArm:
     ) -> None:
         self._motion, self._site = motion, site
         self._speed = 1.0 + 1e-6 * section.clock_ppm
-        self._links = known_links(section.calibration, section.residue.twist_rad, drawing)
+        self._links = known_links(section.calibration, section.unmodelled.twist_rad, drawing)
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
         self._at_rest: Felt | None = None
@@ -112,13 +112,13 @@ class TrueArm:
 
 
 def _errors(section: SimulatedArmSection) -> Errors:
-    residue = section.residue
+    unmodelled = section.unmodelled
     return Errors(
-        residue.zero_rad,
-        residue.encoder_once_rad,
-        residue.encoder_twice_rad,
-        residue.hysteresis_rad,
-        [2.0 * pi * hertz for hertz in (section.vibration_hz, *section.vibration_more_hz)],
+        unmodelled.zero_rad,
+        unmodelled.encoder_once_rad,
+        unmodelled.encoder_twice_rad,
+        unmodelled.hysteresis_rad,
+        [2.0 * pi * hertz for hertz in (section.vibration_hz, *section.vibration_further_hz)],
         section.vibration_rms_rad_s,
         section.settling_rad,
         2.0 * pi * section.settling_hz,

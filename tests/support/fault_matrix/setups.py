@@ -50,7 +50,7 @@ SETUPS: Mapping[str, dict[str, Any]] = {
 def errors_in_u(folder: Path) -> float:
     """The largest error of what the run in `folder` states, in its expanded uncertainties."""
     result = read_result(folder)
-    gyro = result.sensors["gyro"]
+    gyro = result.gyroscopes["gyro"]
     combined = gyro.covariance_combined if gyro.covariance_combined is not None else gyro.covariance
     errors = [_largest([*gyro.scale, *gyro.bias_rad_s], combined, [v for part in TRUTH["gyro"].values() for v in part])]
     for found in (result.accelerometers or {}).values():

@@ -41,8 +41,8 @@ def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() 
             for by_deg in (60.0, -60.0):
                 before_rad = wire.angle_rad
                 servo.move(turn(servo.latest.q_rad[0], by_deg))
-                turned_deg = math.degrees(wire.angle_rad - before_rad)
-                assert abs(turned_deg - by_deg) < 4.0, "the encoder is out by 1.3° either way, and there is play"
+                rotation_deg = math.degrees(wire.angle_rad - before_rad)
+                assert abs(rotation_deg - by_deg) < 4.0, "the encoder is out by 1.3° either way, and there is play"
                 assert abs(wire.rate_rad_s) < STANDS_RAD_S
         assert wire.do("register", "Torque Enable") == 1
         assert wire.do("register", "Bus Watchdog") == 0

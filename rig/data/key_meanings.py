@@ -1,0 +1,33 @@
+"""What the keys of `result.json` mean: the table that its JSON schema and the page of public names are made from."""
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+_TABLE = Path(__file__).with_name("key_meanings.txt")
+_STD = re.compile(r"(.+)_std((?:_[a-z0-9_]+)?)")
+_DEGREES_OF_FREEDOM = re.compile(r"(.+)_degrees_of_freedom")
+
+
+@cache
+def meanings() -> Mapping[str, str]:
+    """Return the table: a meaning for each `key`, and for each `Entry.key` that means another thing in that entry."""
+    lines = _TABLE.read_text(encoding="utf-8").splitlines()
+    rows = (line.partition(" | ") for line in lines if line and not line.startswith("#"))
+    return {key: meaning for key, _, meaning in rows}
+
+
+def meaning_of(entry: str, key: str) -> str:
+    """Return what a key means in an entry, which is named without its ending `Entry`. Raises KeyError if none is told.
+
+    Standard uncertainties and their degrees of freedom have the meaning that their name says.
+    """
+    table = meanings()
+    if (found := table.get(f"{entry}.{key}", table.get(key))) is not None:
+        return found
+    if (named := _DEGREES_OF_FREEDOM.fullmatch(key)) is not None:
+        return f"degrees of freedom of the standard uncertainty of `{named[1]}`; null if infinite"
+    if (named := _STD.fullmatch(key)) is not None:
+        return f"standard uncertainty of `{named[1]}{named[2]}`"
+    raise KeyError(f"{entry}.{key}")
