@@ -11,7 +11,7 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.config.judged_by import OF_SENSORS, OfSensor
+from rig.config.judged_by import OF_SENSORS
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.sensor_catalogue import PARTS
@@ -211,7 +211,7 @@ def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array
     return counts
 
 
-def sizes_of(parts: Mapping[str, str]) -> dict[OfSensor, dict[str, float]]:
+def sizes_of(parts: Mapping[str, str]) -> dict[str, dict[str, float]]:
     """Return what `uncertainty` states of sensors of these parts, by name, where the configuration says nothing."""
     return {what: {name: float(getattr(PARTS[part], what)) for name, part in parts.items()} for what in OF_SENSORS}
 

@@ -177,8 +177,8 @@ def _turned(sensor: GyroscopeEntry) -> Iterator[str]:
         f"a turn ends within {1e3 * found.angle_std_rad:.1f} mrad of what is said of it, its axis leans by "
         f"{1e3 * found.axis_std_rad:.0f} mrad (one standard deviation: angle_std_rad, axis_std_rad)"
     )
-    if found.widened > 1:
-        yield f"the turns contradict each other by more, and count as {found.widened:.2g} times as uncertain"
+    if found.uncertainty_inflation > 1:
+        yield f"the turns contradict each other by more, and count as {found.uncertainty_inflation:.2g} times as uncertain"
 
 
 def _in_attitudes(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
