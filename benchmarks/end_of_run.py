@@ -15,14 +15,14 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 FIXTURE = ROOT / "tests" / "fixtures" / "recordings" / "verified"
 
-SOLVE = "calibrated(runs)"
-END = "list(write_outcome(folder, verified(calibrated(runs), repeated)))"
+SOLVE = "calibrate(runs)"
+END = "list(write_outcome(folder, verify_calibration(calibrate(runs), repeated)))"
 MEASURE = """
 import resource, sys
 from pathlib import Path
 import scipy.interpolate
 import rig.cli
-from rig.analysis.analyses import calibrated, verified
+from rig.analysis.analyses import calibrate, verify_calibration
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
 

@@ -70,7 +70,7 @@ def test_degrees_are_refused_with_what_to_do(gyro: rig.Calibration) -> None:
 
 
 def test_a_sensor_whose_range_nobody_said_takes_what_some_part_could_read() -> None:
-    gyro = rig.load_result(IMU.parents[1] / "sweeps")
+    gyro = rig.load_result(IMU.parent / "sweeps")
     (calibration,) = gyro.values()
     assert np.isfinite(calibration.apply(np.array([[0.0, 60.0, 0.0]]))).all()
     with pytest.raises(Refused, match=r"wrong_unit: .*no such sensor reads more"):

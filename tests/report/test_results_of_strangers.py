@@ -47,37 +47,37 @@ def test_what_texts_hide_is_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.
 @pytest.mark.parametrize(
     ("name", "forge", "why"),
     [
-        ("6/verified", lambda d: d["provenance"].update(started_utc="never"), "provenance.started_utc: "),
-        ("6/resumed", lambda d: d["provenance"].update(resumed_utc=["x"]), "provenance.resumed_utc.0: "),
-        ("6/bias_drift", lambda d: d["bias_drift"].update(gyro={"x": d["bias_drift"]["gyro"]["rate"]}), "no quantity"),
+        ("verified", lambda d: d["provenance"].update(started_utc="never"), "provenance.started_utc: "),
+        ("resumed", lambda d: d["provenance"].update(resumed_utc=["x"]), "provenance.resumed_utc.0: "),
+        ("bias_drift", lambda d: d["bias_drift"].update(gyro={"x": d["bias_drift"]["gyro"]["rate"]}), "no quantity"),
         (
-            "7/six_observation",
+            "six_observation",
             lambda d: d["gyroscopes"]["gyro"]["covariance"][4].__setitem__(4, -1),
             "variance below 0",
         ),
         (
-            "7/six_observation",
+            "six_observation",
             lambda d: d["gyroscopes"]["gyro"]["vector_model"].update(matrix_covariance=[[1e-6] * 8] * 9),
             "must have as many columns as rows",
         ),
         (
-            "7/six_observation",
+            "six_observation",
             lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 1e300]),
             "'1e+300' is no number that",
         ),
-        ("7/six_observation", lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 10**200]), "is no number that"),
+        ("six_observation", lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, 10**200]), "is no number that"),
         (
-            "7/six_observation",
+            "six_observation",
             lambda d: d["gyroscopes"]["gyro"].update(scale=[1, 1, float("nan")]),
             "'NaN' is no number",
         ),
-        ("7/verified", lambda d: d["verification"]["gyro"]["after"].update(delay_std_s=[]), "must be as many"),
+        ("verified", lambda d: d["verification"]["gyro"]["after"].update(delay_std_s=[]), "must be as many"),
     ],
 )
 def test_what_contradicts_itself_is_refused_by_its_place(
     name: str, forge: Callable[[Any], object], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = forged(f"rig.settings-{name}", forge, tmp_path)
+    folder = forged(name, forge, tmp_path)
     for command in ("show", "report"):
         assert main([command, str(folder)]) == 2
         printed = capsys.readouterr().err
