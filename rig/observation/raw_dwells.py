@@ -35,7 +35,7 @@ class RawDwell:
     @property
     def still_counts(self) -> Array:
         """(n, 3) the counts of an arm that does not swing."""
-        return self.counts - self.swing_counts
+        return np.asarray(self.counts - self.swing_counts, dtype=np.float64)
 
     @property
     def middle_s(self) -> float:

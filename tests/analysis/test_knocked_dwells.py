@@ -25,7 +25,9 @@ def dwells(rng: np.random.Generator, hertz: float | None, step: Array | None = N
         if step is not None and index == 4:
             readings += np.where(time_s[:, None] < LASTING_S / 2, 0.0, step)
         counts = np.round(readings).astype(np.int64)
-        found.append(RawDwell(index, counts, time_s, Window(0.0, LASTING_S), np.zeros(6), 0.0))
+        found.append(
+            RawDwell(index, counts, np.asarray(time_s, dtype=np.float64), Window(0.0, LASTING_S), np.zeros(6), 0.0)
+        )
     return found
 
 

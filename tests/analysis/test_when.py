@@ -38,7 +38,7 @@ def warming(run: RunData) -> RunData:
     return replace(run, samples={"gyro": samples})
 
 
-def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_of_their_own_readings() -> None:
+def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temperatures_of_their_own_readings() -> None:
     run = warming(synthetic_run(Setup()))
     recordings = observe_recordings([run])
     held, seen = of_gyroscope(recordings, "gyro"), recordings[0].sensors["gyro"]
@@ -60,10 +60,10 @@ def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_o
 def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     document = document_of(calibrate([warming(synthetic_run(Setup()))]))
     sensor = document.gyroscopes["gyro"]
-    assert sensor.scale_at is not None and sensor.bias_at is not None
-    assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
-    low, high = sensor.bias_at.temperature_range_c or (0.0, 0.0)
-    assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_at)
+    assert sensor.scale_conditions is not None and sensor.bias_conditions is not None
+    assert sensor.scale_conditions.temperature_c == pytest.approx(sensor.temperature_c)
+    low, high = sensor.bias_conditions.temperature_range_c or (0.0, 0.0)
+    assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_conditions)
 
 
 def without_thermometer(run: RunData) -> RunData:
@@ -86,8 +86,12 @@ def parsed_attributes(sensor: RecordedSensor) -> dict[str, Any]:
 def test_a_sensor_without_thermometer_is_certified_at_the_temperature_that_was_stated() -> None:
     document = document_of(calibrate([without_thermometer(synthetic_run(Setup(told=NOMINAL)))]))
     sensor = document.gyroscopes["gyro"]
-    assert sensor.bias_at is not None and sensor.bias_at.temperature_stated and sensor.temperature_c == 22.0
-    assert when_words(sensor.bias_at).startswith("at 22.0 °C, as stated, mean over")
+    assert (
+        sensor.bias_conditions is not None
+        and sensor.bias_conditions.temperature_stated
+        and sensor.temperature_c == 22.0
+    )
+    assert when_words(sensor.bias_conditions).startswith("at 22.0 °C, as stated, mean over")
     certificate = certificate_of(document, Stated())
     said = " ".join(read(certificate).text.split())
     assert "Temperature and time, as stated, for the item provided no temperature: scale factors at 22.0 °C" in said

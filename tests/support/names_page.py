@@ -9,6 +9,8 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any
 
+from pydantic import BaseModel
+
 import rig
 import rig.procedure
 from rig import cli
@@ -18,7 +20,7 @@ from rig.data.result_file import ResultDocument
 from support.paths import DOCS
 
 PAGE = DOCS / "names.md"
-DOCUMENTS = {"result.json": ResultDocument, "rig.reversal/1": ReversalDocument}
+DOCUMENTS: dict[str, type[BaseModel]] = {"result.json": ResultDocument, "rig.reversal/1": ReversalDocument}
 
 
 def page_text() -> str:

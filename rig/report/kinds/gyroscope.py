@@ -178,7 +178,8 @@ def _turned(sensor: GyroscopeEntry) -> Iterator[str]:
         f"{1e3 * found.axis_std_rad:.0f} mrad (one standard deviation: angle_std_rad, axis_std_rad)"
     )
     if found.uncertainty_inflation > 1:
-        yield f"the turns contradict each other by more, and count as {found.uncertainty_inflation:.2g} times as uncertain"
+        inflation = f"{found.uncertainty_inflation:.2g}"
+        yield f"the rotations contradict each other by more, and count as {inflation} times as uncertain"
 
 
 def _in_attitudes(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
