@@ -51,7 +51,7 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
     for index, turn in sweeps.results.items():
         windows[index] = Window(turn.average.start_s, turn.average.end_s)
     spiky = {index for index, window in windows.items() if _spiky(stream, window)}
-    return (finished_sweeps(run) | finished_dwells(run)) - sweeps.faults.keys() - dwells.faults.keys() - spiky
+    return (finished_sweeps(run) | finished_dwells(run)).difference(sweeps.faults, dwells.faults, spiky)
 
 
 def _spiky(stream: Stream, window: Window) -> bool:
