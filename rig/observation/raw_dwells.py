@@ -35,7 +35,8 @@ class RawDwell:
     @property
     def still_counts(self) -> Array:
         """(n, 3) the counts of an arm that does not swing."""
-        return np.asarray(self.counts - self.swing_counts, dtype=np.float64)
+        still: Array = self.counts - self.swing_counts
+        return still
 
     @property
     def middle_s(self) -> float:

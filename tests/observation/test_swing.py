@@ -28,10 +28,10 @@ def test_a_swing_about_where_it_stands_moves_no_joint(hertz: float, phase: float
 
 
 MOVES: dict[str, Callable[[Array], Any]] = {
-    "a step": lambda share: 1.0 * (share > 0.4),
-    "a step at the end": lambda share: 1.0 * (share > 0.9),
-    "half a second's push": lambda share: np.clip((share - 0.3) / 0.17, 0, 1),
-    "there and back": lambda share: 1.0 * (np.abs(share - 0.5) < 0.1),
+    "a step": lambda share: np.where(share > 0.4, 1.0, 0.0),
+    "a step at the end": lambda share: np.where(share > 0.9, 1.0, 0.0),
+    "half a second's push": lambda share: np.interp(share, [0.3, 0.47], [0.0, 1.0]),
+    "there and back": lambda share: np.where(np.abs(share - 0.5) < 0.1, 1.0, 0.0),
     "a creep": lambda share: share,
 }
 
