@@ -17,7 +17,7 @@ FEWEST, FEWEST_S = 2, 1.0  # rests, which tell by their scatter how well each is
 
 @dataclass(frozen=True, slots=True)
 class MeansAtRest:
-    """Of k rests the gyroscope's mean `readings_rad_s` (k, 3), and by the reference how fast the body turned (k, 3)."""
+    """The gyroscope's mean `readings_rad_s` (k, 3) of k rests, and how fast the body turned by the reference (k, 3)."""
 
     readings_rad_s: Array
     rates_rad_s: Array

@@ -129,9 +129,9 @@ class Table:
     def _creeping(self, rates: Array) -> Array:
         """(n, 3) what the item turns in the rest in which it creeps, and back as the hand takes it up."""
         turning = np.zeros_like(rates)
-        for row, still in enumerate((rates == 0).all(axis=1)):
-            self._laid_down += bool(still and not self._still)
-            self._still = bool(still)
+        for row, still in enumerate((~rates.any(axis=1)).tolist()):
+            self._laid_down += still and not self._still
+            self._still = still
             if still and self._laid_down == self.creeps:
                 turning[row] = CREEP_RAD_S
                 self._crept += 1
