@@ -35,8 +35,7 @@ class RawDwell:
     @property
     def still_counts(self) -> Array:
         """(n, 3) the counts of an arm that does not swing."""
-        still: Array = self.counts - self.swing_counts
-        return still
+        return np.subtract(self.counts, self.swing_counts, dtype=np.float64)
 
     @property
     def middle_s(self) -> float:

@@ -17,7 +17,7 @@ def dwells(rng: np.random.Generator, hertz: float | None, step: Array | None = N
     """Eighteen, of which the fifth has a step half-way."""
     found = []
     for index in range(DWELLS):
-        time_s: Array = LASTING_S / SAMPLES * (np.arange(SAMPLES) + 0.5)
+        time_s = LASTING_S / SAMPLES * (np.arange(SAMPLES, dtype=np.float64) + 0.5)
         readings = 1000 + NOISE * rng.normal(size=(SAMPLES, 3))
         if hertz is not None:
             phase = 2 * np.pi * hertz * time_s + rng.uniform(0, 2 * np.pi)

@@ -129,7 +129,7 @@ class Table:
     def _creeping(self, rates: Array) -> Array:
         """(n, 3) what the item turns in the rest in which it creeps, and back as the hand takes it up."""
         turning = np.zeros_like(rates)
-        for row, still in enumerate((~rates.any(axis=1)).tolist()):
+        for row, still in enumerate(not rate.any() for rate in rates):
             self._laid_down += still and not self._still
             self._still = still
             if still and self._laid_down == self.creeps:
