@@ -46,9 +46,9 @@ def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
     """Yield that rows with an angle were solved by their mean speed, if they were."""
     if not data.by_mean:
         return
-    why = "before or after them the body does not lie still"
+    why = "the body moves before or after them"
     if isinstance(solution, TurnedSolution):
         rows = ", ".join(map(str, data.by_mean))
-        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed, for {why}: rows {rows}"
+        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed, since {why}: rows {rows}"
     else:
-        yield f"all {len(data.sweeps)} turns count by their mean speed, not by their angle, for {why}"
+        yield f"all {len(data.sweeps)} turns count by their mean speed: {why}"

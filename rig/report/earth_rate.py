@@ -14,7 +14,8 @@ from rig.report.expanded import expanded, factor_words
 
 def earth_rate_entry(earth_rate: EarthRate) -> EarthRateEntry:
     """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
-    return entry(EarthRateEntry, earth_rate, freedom=earth_rate.freedom if np.isfinite(earth_rate.freedom) else None)
+    known = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
+    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=known)
 
 
 def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:

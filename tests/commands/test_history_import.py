@@ -80,7 +80,7 @@ def board(result: Document) -> None:
         (limit, "max_deviation"),
         (kind, "gyro.scale_std"),
         (serial_number, "serial_number of gyro"),
-        (mean, "sensors.gyro.observations.2.mean_rad_s.1 "),
+        (mean, "gyroscopes.gyro.observations.2.mean_rad_s.1 "),
         (board, "provenance.board_unique_id"),
     ],
 )

@@ -211,9 +211,7 @@ def test_turns_that_count_by_their_mean_speed_are_told(tmp_path: Path, capsys: p
     cut[2, 5] *= 0.7
     log = type(log)(log.time_s, log.readings, cut)
     said = in_brief(capsys, *_interleave(write_rates(tmp_path, log, None, "angle_rad")))
-    assert (
-        "1 of 6 turns count by their mean speed, for before or after them the body does not lie still: rows 3" in said
-    )
+    assert "1 of 6 turns count by their mean speed, since the body moves before or after them: rows 3" in said
 
 
 @pytest.mark.parametrize(

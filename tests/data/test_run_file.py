@@ -162,7 +162,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     assert {other.controller_time_s for other in others} == {states[-1].time_s}  # the arm's time when it happened
     assert finished.controller_time_s == 123.5
     with h5py.File(path, "r") as file:  # any HDF5 tool opens it
-        assert file.attrs["schema"] == "rig.run/4"
+        assert file.attrs["schema"] == "rig.run/1"
 
 
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ from support.certified import (
     with_accelerometer,
 )
 from support.paths import CONFIGS, RECORDINGS
+from support.results import without_budget
 
 CLAUSES = [
     *(f"7.8.2.1{letter}" for letter in "abcdefghijlmnop"),
@@ -134,8 +135,8 @@ def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
 
 
 def test_noise_is_not_called_uncertainty() -> None:
-    """A result of before there were budgets makes no certificate."""
-    found = certificate(read_result(RECORDINGS / "six_observation"))
+    """A result of an estimator without a budget makes no certificate."""
+    found = certificate(without_budget(read_result(RECORDINGS / "six_observation")))
     page = read(found)
     assert found.title == "Calibration record"
     assert any("uncertainty is not known" in mark for mark in found.marks)

@@ -28,6 +28,7 @@ from support.certified import (
 )
 from support.dcc_rules import rule_faults, schema_faults
 from support.paths import RECORDINGS
+from support.results import without_budget
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 HOSTILE = "a <b>&amp;\x00\x1b[31m ]]> \"'  "
@@ -269,7 +270,10 @@ def half_known() -> ResultDocument:
 @pytest.mark.parametrize(
     ("refused", "why"),
     [
-        (lambda: certificate(read_result(RECORDINGS / "six_observation")), "only the noise part of the uncertainty"),
+        (
+            lambda: certificate(without_budget(read_result(RECORDINGS / "six_observation"))),
+            "only the noise part of the uncertainty",
+        ),
         (lambda: certificate(result().model_copy(update={"gyroscopes": {}})), "calibrated nothing"),
         (lambda: certificate(stated=Stated()), "country is not stated"),
         (lambda: certificate(half_known()), "only a part of the uncertainty of lsm9ds1 LSM9DS1-001 is known"),

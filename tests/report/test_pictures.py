@@ -42,9 +42,11 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
     assert EXPECTED in read(certificate()).text
 
 
-def test_bars_of_results_of_before_are_called_what_they_are() -> None:
+def test_bars_of_results_without_a_model_of_their_scatter_are_called_what_they_are() -> None:
     sensor = read_result(RECORDINGS / "imu").gyroscopes["gyro"]
-    picture = residuals(Finding("gyro", RATE, sensor))
+    assert isinstance(sensor.vector_model, VectorEntry)
+    alone = sensor.vector_model.model_copy(update={"residuals_std_rad_s": None})
+    picture = residuals(Finding("gyro", RATE, sensor.model_copy(update={"vector_model": alone})))
     assert picture is not None and picture.of == OF_SAMPLES
     assert "which holds vibration" in picture.of
 

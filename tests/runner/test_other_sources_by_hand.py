@@ -50,7 +50,7 @@ def document(source: str, *changes: dict[str, Any]) -> dict[str, Any]:
     for change in (own, *changes):
         found = merge(found, change)
     host = fresh_host()
-    sensor = found["gyroscopes"][name]
+    sensor = found["sensors"][name]
     if source == "lines":
         sensor["serial"]["port"] = f"socket://{host}:7341"
     else:

@@ -34,7 +34,9 @@ def six_found() -> ResultDocument:
     """What a recording of one of them gave, of all."""
     one = read_result(IMU)
     checks = tuple(
-        each.model_copy(update={"name": each.name.replace("gyro", name)}) for name in PARTS for each in one.checks
+        each.model_copy(update={"name": each.name.replace("gyro", name), "sensor": each.sensor and name})
+        for name in PARTS
+        for each in one.checks
     )
     return one.model_copy(
         update={
