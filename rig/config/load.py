@@ -308,7 +308,7 @@ def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             annotation = annotation.model_fields[str(part)].annotation
         else:
-            annotation = typing.get_args(annotation)[-1]  # dict[str, Section] → Section
+            annotation = [each for each in typing.get_args(annotation) if each is not ...][-1]  # of dict[str, Section]
         if isinstance(annotation, types.UnionType):
             annotation = typing.get_args(annotation)[0]
     return list(annotation.model_fields)

@@ -9,6 +9,7 @@ from rig.config import ranges
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.procedure_sections import SixObservationSection
 from rig.config.sensor_sections import SensorSection
+from rig.turners.registry import sections
 from rig.world.section import world_section
 from support.paths import CONFIGS
 
@@ -312,3 +313,9 @@ def test_another_file_given_for_a_configuration_is_named_as_what_it_is(tmp_path:
 def test_yes_and_on_are_no_numbers(key: str) -> None:
     (found,) = problems_of(demo_text(), f"{key}=on")
     assert key in found and "must be a number; YAML reads yes, no, on and off as true and false" in found
+
+
+def test_an_unknown_key_in_a_list_of_sections_is_named_with_its_place() -> None:
+    text = (CONFIGS / "servo.yaml").read_text(encoding="utf-8").replace("{rotation_deg: [0.6", "{turned: [0.6")
+    with pytest.raises(ConfigurationRefused, match=r"world\.mounts\.2\.turned \(line \d+\): unknown key.*rotation_deg"):
+        parse(text, sections=world_section, turners=sections())
