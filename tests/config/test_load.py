@@ -315,7 +315,8 @@ def test_yes_and_on_are_no_numbers(key: str) -> None:
     assert key in found and "must be a number; YAML reads yes, no, on and off as true and false" in found
 
 
-def test_an_unknown_key_in_a_list_of_sections_is_named_with_its_place() -> None:
+def test_an_unknown_key_in_a_list_of_sections_is_named_with_its_place(tmp_path: Path) -> None:
     text = (CONFIGS / "servo.yaml").read_text(encoding="utf-8").replace("{rotation_deg: [0.6", "{turned: [0.6")
+    (tmp_path / "servo.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ConfigurationRefused, match=r"world\.mounts\.2\.turned \(line \d+\): unknown key.*rotation_deg"):
-        parse(text, sections=world_section, turners=sections())
+        load(tmp_path / "servo.yaml", turners=sections())
