@@ -14,7 +14,7 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py hidden_worlds.py)
+LONG := benchmarks/wire/damaged_frames.py $(addprefix benchmarks/laboratory/, faults.py long_life.py hidden_worlds.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
 .PHONY: demo all-extras system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
@@ -76,7 +76,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/lint-imports
 
 bench: $(VENV)/dev.installed
-	for benchmark in $(filter-out $(LONG), $(wildcard benchmarks/*.py)); do $(BIN)/python $$benchmark || exit 1; done
+	for benchmark in $(filter-out $(LONG), $(wildcard benchmarks/*/*.py)); do $(BIN)/python $$benchmark || exit 1; done
 
 figures: $(VENV)/dev.installed
 	for study in $(STUDIES); do $(BIN)/rig study $$study --jobs 2 --out build/studies || exit 1; \
@@ -84,10 +84,10 @@ figures: $(VENV)/dev.installed
 	for experiment in lsm9ds1 mpu9250; do rm -rf build/$$experiment; \
 	  $(BIN)/rig run configs/$${experiment}_adis16465.yaml --out build/$$experiment || exit 1; \
 	  for when in before after; do \
-	    cp build/$$experiment/verification_gyro_$$when.png docs/figures/$$experiment-$$when.png; done; done
+	    cp build/$$experiment/verification_gyro_$$when.png docs/figures/instruments/$$experiment-$$when.png; done; done
 	for run in earth:earth_rate drift:bias_drift; do rm -rf build/kvh1775_$${run%%:*}; \
-	  $(BIN)/rig run configs/kvh1775_$${run%%:*}.yaml --out build/kvh1775_$${run%%:*} || exit 1; \
-	  cp build/kvh1775_$${run%%:*}/$${run##*:}_kvh.png docs/figures/kvh1775-$${run%%:*}.png; done
+	  $(BIN)/rig run configs/own_port/kvh1775_$${run%%:*}.yaml --out build/kvh1775_$${run%%:*} || exit 1; \
+	  cp build/kvh1775_$${run%%:*}/$${run##*:}_kvh.png docs/figures/instruments/kvh1775-$${run%%:*}.png; done
 
 docs: $(VENV)/docs.installed
 	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -d build/doctrees -c docs . build/docs

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from rig.config.hand_sections import HandSection
+from rig.config.procedures.hand_sections import HandSection
 from rig.motion.state import Made
 from rig.turners.hand.kind import GEOMETRY, HAND
 

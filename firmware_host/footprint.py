@@ -16,10 +16,10 @@ import numpy as np
 from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 
-from firmware_host.emulator.flash_memory import FlashMemory
-from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.chip.flash_memory import FlashMemory
 from firmware_host.emulator.machine import EmulatedBoard
-from firmware_host.emulator.magnetometer import MagnetometerTruth
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from firmware_host.emulator.parts.magnetometer import MagnetometerTruth
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
 from firmware_host.protocol import METHODS

@@ -1,8 +1,8 @@
 """The parts that the board has drivers for: one table for Python and, through `parts_header.py`, for C.
 
 A new part is one entry here, of at most eight: the messages name sensors by a mask of as many bits. What its data sheet
-says of its errors stands in the rig's catalogue (`rig/config/sensor_catalogue.py`), how it behaves at its registers in
-the model that the entry names.
+says of its errors stands in the rig's catalogue (`rig/config/sensors/sensor_catalogue.py`), how it behaves at its
+registers in the model that the entry names.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from firmware_host.emulator.spi_device import SpiDevice
+    from firmware_host.emulator.chip.spi_device import SpiDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class BoardPart:
     def register_model(self) -> "Callable[..., SpiDevice]":
         """The class that simulates the part at its registers."""
         module, name = self.model.split(":")
-        found: Callable[..., Any] = getattr(import_module(f"firmware_host.emulator.{module}"), name)
+        found: Callable[..., Any] = getattr(import_module(f"firmware_host.emulator.parts.{module}"), name)
         return found
 
     def another(self, who_am_i: int) -> str:

@@ -12,9 +12,9 @@ In a notebook:
     rig.changes(rig.load("runs/of_last_year"), run)               # E_n
     rig.calibrations("LSM9DS1-001").to_frame()                    # all of a sensor, out of the history
 
-docs/how-to/notebook.md goes through all of it. These names are the public ones; where they are made may change. To
-import them loads no arm driver. What is refused raises `Refused`, what fails `Fault`: `error.name` finds it in
-docs/errors.md.
+docs/how-to/with-code/notebook.md goes through all of it. These names are the public ones; where they are made may
+change. To import them loads no arm driver. What is refused raises `Refused`, what fails `Fault`: `error.name` finds it
+in docs/errors.md.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from rig.notebook.readings import Readings, Signal
     from rig.notebook.results import Result, load_result, solve
     from rig.notebook.runs import Run, load
-    from rig.report.plan_table import DryRun
+    from rig.report.terminal.plan_table import DryRun
 
 __version__ = VERSION
 __all__ = [
@@ -72,7 +72,7 @@ _PLACES = {
     **dict.fromkeys(("Readings", "Signal"), "rig.notebook.readings"),
     **dict.fromkeys(("Result", "load_result", "solve"), "rig.notebook.results"),
     **dict.fromkeys(("Run", "load"), "rig.notebook.runs"),
-    "DryRun": "rig.report.plan_table",
+    "DryRun": "rig.report.terminal.plan_table",
 }
 
 

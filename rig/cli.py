@@ -25,38 +25,53 @@ if "numpy" not in sys.modules:
 
 # Of each its module, in which `add` says what it takes and `run` does it, and its help line.
 _COMMANDS = {
-    "run": ("rig.commands.run", "run the procedure the file names"),
-    "plan": ("rig.commands.plan", "dry run: every motion, its time and limits; connects to nothing"),
-    "check": ("rig.commands.check", "connect and look; nothing moves, no program is stopped"),
-    "record": ("rig.commands.record", "record the sensors alone, while something else turns them; nothing moves"),
-    "resume": ("rig.commands.resume", "go on with an interrupted run"),
-    "station": ("rig.commands.station", "one part after the other: number, checks, run, verdict, label"),
-    "floor": ("rig.commands.floor", "what several rigs that share a history do now, in a browser"),
-    "watch": ("rig.commands.watch", "a recorded run in a browser, as it was"),
-    "solve": ("rig.commands.solve", "recompute the calibration from a recording"),
+    "run": ("rig.commands.measure.run", "run the procedure the file names"),
+    "plan": ("rig.commands.measure.plan", "dry run: every motion, its time and limits; connects to nothing"),
+    "check": ("rig.commands.measure.check", "connect and look; nothing moves, no program is stopped"),
+    "record": (
+        "rig.commands.measure.record",
+        "record the sensors alone, while something else turns them; nothing moves",
+    ),
+    "resume": ("rig.commands.measure.resume", "go on with an interrupted run"),
+    "station": ("rig.commands.station.station", "one part after the other: number, checks, run, verdict, label"),
+    "floor": ("rig.commands.station.floor", "what several rigs that share a history do now, in a browser"),
+    "watch": ("rig.commands.station.watch", "a recorded run in a browser, as it was"),
+    "solve": ("rig.commands.offline.solve", "recompute the calibration from a recording"),
     "allan": (
-        "rig.commands.allan",
+        "rig.commands.offline.allan",
         "random walk and bias instability, by the Allan deviation of what was recorded at rest",
     ),
-    "reversal": ("rig.commands.reversal", "a magnetometer's own bias, from runs between which it was turned over"),
-    "show": ("rig.commands.show", "what a finished run amounts to: values, budgets, checks"),
-    "explain": ("rig.commands.explain", "what a check, an error, a limit or a word means, and what to do"),
-    "report": ("rig.commands.report", "the certificate of a finished run: HTML, PDF, digital certificate"),
+    "reversal": (
+        "rig.commands.offline.reversal",
+        "a magnetometer's own bias, from runs between which it was turned over",
+    ),
+    "show": ("rig.commands.documents.show", "what a finished run amounts to: values, budgets, checks"),
+    "explain": ("rig.commands.documents.explain", "what a check, an error, a limit or a word means, and what to do"),
+    "report": ("rig.commands.documents.report", "the certificate of a finished run: HTML, PDF, digital certificate"),
     "verify": (
-        "rig.commands.verify",
+        "rig.commands.documents.verify",
         "who signed a certificate, when, whether it is unchanged, and whether a history knows it",
     ),
-    "export": ("rig.commands.export", "what was calibrated and recorded, in the files of other programs"),
-    "history": ("rig.commands.history", "what the laboratory remembers: calibrations, trends, check standards"),
-    "study": ("rig.commands.study", "Monte-Carlo studies of the papers' figures and tables; without a name, list them"),
-    "board": ("rig.commands.board", "look at the board, read and change its stored calibrations, flash its firmware"),
-    "kvh": ("rig.commands.kvh", "look at a KVH 1775"),
+    "export": ("rig.commands.documents.export", "what was calibrated and recorded, in the files of other programs"),
+    "history": ("rig.commands.history.command", "what the laboratory remembers: calibrations, trends, check standards"),
+    "study": (
+        "rig.commands.offline.study",
+        "Monte-Carlo studies of the papers' figures and tables; without a name, list them",
+    ),
+    "board": (
+        "rig.commands.devices.board",
+        "look at the board, read and change its stored calibrations, flash its firmware",
+    ),
+    "kvh": ("rig.commands.devices.kvh", "look at a KVH 1775"),
     "autopilot": (
-        "rig.commands.autopilot",
+        "rig.commands.devices.autopilot",
         "write a calibration into an autopilot's parameters, and bring the old ones back",
     ),
-    "lines": ("rig.commands.lines", "look at a device that prints lines, and write its section of a configuration"),
-    "world": ("rig.commands.world", "only the simulated laboratory, in the foreground, for any client"),
+    "lines": (
+        "rig.commands.devices.lines",
+        "look at a device that prints lines, and write its section of a configuration",
+    ),
+    "world": ("rig.commands.laboratory.world", "only the simulated laboratory, in the foreground, for any client"),
 }
 _AT_ONCE = {  # what a command that begins by loading libraries for a second says before
     "run": "reading the configuration",
@@ -91,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     keep_streams_usable()  # help too is read by `head`, and by terminals that know no °
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words[:1] == ["history"]:
-        from rig.commands.history import with_usual_command
+        from rig.commands.history.command import with_usual_command
 
         words = with_usual_command(words)
     meant = next((word for word in words if not word.startswith("-")), None)
@@ -168,7 +183,7 @@ def run_script(procedure: "AnyProcedure") -> int:
 
     It is this procedure that runs, whatever the configuration names.
     """
-    from rig.commands.run import add, run
+    from rig.commands.measure.run import add, run
     from rig.plans.script_file import script_in
 
     script = sys.modules["__main__"]

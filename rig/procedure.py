@@ -2,7 +2,7 @@
 
     from rig.procedure import Plan, Procedure, Rest, Sweep, Transfer, Verbs, run_script
 
-These names are the public ones; where they are made may change. docs/how-to/own-procedure.md shows their use.
+These names are the public ones; where they are made may change. docs/how-to/with-code/own-procedure.md shows their use.
 """
 
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
@@ -17,9 +17,9 @@ from rig.analysis.analyses import (
 )
 from rig.analysis.check import Check, fitness
 from rig.analysis.outcome import Outcome
-from rig.config.hand_sections import ByHandSection, HandSection
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, TurnerSection
-from rig.config.procedure_sections import (
+from rig.config.procedures.hand_sections import ByHandSection, HandSection
+from rig.config.procedures.procedure_sections import (
     AttitudesSection,
     BiasDriftSection,
     ImuSection,
@@ -29,19 +29,19 @@ from rig.config.procedure_sections import (
     ThermalSection,
     VerifySection,
 )
-from rig.config.servo_procedure import ServoSixObservationSection
-from rig.config.servo_section import ServoSection
-from rig.data.run_file import RunData
+from rig.config.procedures.servo_procedure import ServoSixObservationSection
+from rig.config.procedures.servo_section import ServoSection
+from rig.data.recording.run_file import RunData
 from rig.errors import Fault, Refused
 from rig.motion.state import Joints
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.by_hand import plan_by_hand
-from rig.plans.imu import plan_imu
+from rig.plans.motions.imu import plan_imu
+from rig.plans.motions.servo_sweeps import plan_servo_six_observation
+from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.plans.motions.static_attitudes import plan_static_attitudes
+from rig.plans.motions.thermal import plan_thermal
 from rig.plans.registry import Procedure
-from rig.plans.servo_sweeps import plan_servo_six_observation
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.static_attitudes import plan_static_attitudes
-from rig.plans.thermal import plan_thermal
 from rig.plans.verbs import Verbs
 
 __all__ = [

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
-from support.warm import nursery, readers_forked, readers_of_system
-from support.worlds import world
+from support.laboratories.worlds import world
+from support.processes.warm import nursery, readers_forked, readers_of_system
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
@@ -75,7 +75,7 @@ def thorough(request: pytest.FixtureRequest) -> bool:
 @pytest.fixture
 def no_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rig takes this machine for one that nobody else uses, and stretches none of its limits."""
-    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+    monkeypatch.setattr("rig.data.processes.silence.crowding", lambda: 1.0)
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def read_by_system() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def driver() -> Iterator["Chrome"]:
     """A real browser."""
-    from support.browser import browser  # with Selenium, which few tests need
+    from support.page.browser import browser  # with Selenium, which few tests need
 
     with browser(dark=True) as found:
         yield found
@@ -97,7 +97,7 @@ def driver() -> Iterator["Chrome"]:
 @pytest.fixture
 def nothing_severe_and_nothing_from_elsewhere(driver: "Chrome") -> Iterator[None]:
     """What is asked of every page, whatever it shows."""
-    from support.browser import TABLET, asked_hosts, severe
+    from support.page.browser import TABLET, asked_hosts, severe
 
     driver.get("about:blank")  # a page of before may still ask for a server that is gone
     severe(driver)

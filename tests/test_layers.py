@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
+MOST_FILES = 18  # side by side
 LINT = [str(Path(sys.executable).with_name("lint-imports")), "--no-cache"]
 
 
@@ -93,6 +94,17 @@ def test_a_room_does_not_import_from_the_rooms_after_it(copy: Path) -> None:
 def test_at_most_four_modules_lie_flat() -> None:
     flat = sorted(path.name for path in (ROOT / "rig").glob("*.py"))
     assert len(flat) <= 4, flat
+
+
+def test_no_folder_holds_more_than_one_surveys() -> None:
+    tops = ("rig", "firmware_host", "procedures", "tests", "benchmarks", "configs", "docs", "examples")
+    folders = (folder for top in tops for folder in (ROOT / top, *(ROOT / top).rglob("*/")))
+    files = {folder: sum(path.is_file() for path in folder.glob("*")) for folder in folders if folder.is_dir()}
+    assert not [
+        f"{folder.relative_to(ROOT)}: {count}"
+        for folder, count in files.items()
+        if count > MOST_FILES and folder.name != "__pycache__"
+    ]
 
 
 def imports_of(source: Path, known: set[str]) -> set[str]:

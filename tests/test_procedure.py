@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import rig.procedure
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.procedure import Outcome, calibrate, fitness
 from support.paths import DOCS, RECORDINGS, ROOT
 
 STOCK = sorted(path for path in (ROOT / "procedures").glob("*.py") if path.name != "__init__.py")
-OWN_PAGE = DOCS / "how-to" / "own-procedure.md"
+OWN_PAGE = DOCS / "how-to" / "with-code" / "own-procedure.md"
 
 
 def imported(script: str) -> Iterator[str]:
@@ -33,7 +33,7 @@ def of_the_rig(script: str) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "script", [*STOCK, ROOT / "tests" / "support" / "unequal_sweeps.py"], ids=lambda path: path.stem
+    "script", [*STOCK, ROOT / "tests" / "support" / "motions" / "unequal_sweeps.py"], ids=lambda path: path.stem
 )
 def test_a_script_imports_nothing_of_the_rig_but_its_door(script: Path) -> None:
     assert of_the_rig(script.read_text(encoding="utf-8")) == {"rig.procedure"}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from svg import Drawing, Point
 
-from rig.config.sensor_sections import MountingSection, mounting_matrix
+from rig.config.sensors.sensor_sections import MountingSection, mounting_matrix
 from rig.motion.geometry import flange_attitude
 from rig.motion.model import turner_model
 

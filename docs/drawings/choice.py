@@ -8,34 +8,39 @@ WAYS = (  # question, answer if yes in two lines, the page
         "Is it a part that our board reads,",
         "and do you have the arm?",
         "wire it to our board",
-        "how-to/first-calibration.md",
+        "how-to/start/first-calibration.md",
     ),
     (
         "Is it in an autopilot, or does it print lines,",
         "and do you have the arm?",
         "MAVLink, or lines",
-        "how-to/autopilot.md, how-to/lines.md",
+        "how-to/at-the-rig/autopilot.md, how-to/at-the-rig/lines.md",
     ),
     ("Is it a KVH 1775,", "and do you have the arm?", "its own serial port", "kvh1775.md"),
     (
         "Is it one of these,",
         "and do you have a Dynamixel servomotor?",
         "turned by a servo",
-        "how-to/servo.md",
+        "how-to/without-an-arm/servo.md",
     ),
     (
         "Does something measure or set its attitude:",
         "a rate table, cameras, the faces of a cube?",
         "readings + attitudes as CSV",
-        "how-to/known-attitudes.md",
+        "how-to/without-an-arm/known-attitudes.md",
     ),
     (
         "Can you turn it by known angles: a turntable,",
         "another servo, by hand against a stop?",
         "readings + sweeps as CSV",
-        "how-to/data-recorded-elsewhere.md",
+        "how-to/without-an-arm/data-recorded-elsewhere.md",
     ),
-    ("Is it a gyroscope that you can lay on a table,", "side after side?", "by hand", "how-to/by-hand.md"),
+    (
+        "Is it a gyroscope that you can lay on a table,",
+        "side after side?",
+        "by hand",
+        "how-to/without-an-arm/by-hand.md",
+    ),
 )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_R0, UC_ARM_REG_SP
 
-from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.chip.bus import Violation
 from firmware_host.emulator.engine import Engine
 from firmware_host.emulator.thumb import word_accesses
 

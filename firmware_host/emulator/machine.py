@@ -3,15 +3,15 @@
 import struct
 from collections.abc import Sequence
 
-from firmware_host.emulator import rcc
 from firmware_host.emulator.alignment import AlignmentWatch
-from firmware_host.emulator.bus import Peripheral, Violation
-from firmware_host.emulator.chip import Chip
-from firmware_host.emulator.cortex import Cortex, Entry
+from firmware_host.emulator.chip import rcc
+from firmware_host.emulator.chip.bus import Peripheral, Violation
+from firmware_host.emulator.chip.chip import Chip
+from firmware_host.emulator.chip.cortex import Cortex, Entry
+from firmware_host.emulator.chip.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
+from firmware_host.emulator.chip.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.engine import Engine, EngineFault
-from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
 from firmware_host.emulator.hooks import BlockTicks
-from firmware_host.emulator.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import instructions, is_floating_point
 from firmware_host.emulator.timeline import Timeline

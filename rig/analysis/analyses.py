@@ -12,7 +12,7 @@ from rig.analysis.outcome import Outcome
 from rig.analysis.solvable import solvable
 
 if TYPE_CHECKING:
-    from rig.data.run_file import RunData
+    from rig.data.recording.run_file import RunData
 
 
 @solvable()
@@ -22,7 +22,8 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
     Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
     recordings do not hold what they should.
     """
-    from rig.analysis import external_judging, judging
+    from rig.analysis import judging
+    from rig.analysis.external import judging as external_judging
 
     if (external := runs[0].elsewhere) is not None:
         return external_judging.calibrate_external(runs, external, estimator)
@@ -46,7 +47,7 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
     Raises Fault as `rig.estimation.by_hand.solve_by_hand` does, `no_crystal` where the board's clock has none.
     """
-    from rig.analysis import hand_judging
+    from rig.analysis.by_hand import judging as hand_judging
 
     return hand_judging.calibrated_by_hand(runs)
 

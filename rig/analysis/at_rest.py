@@ -7,18 +7,18 @@ from functools import partial
 import numpy as np
 
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
-from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import accelerations
-from rig.observation.arm_motion import motion_of
+from rig.estimation.statistics.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.observation.arm_rests import still_samples
 from rig.observation.average import Stream, on_the_arms_clock
-from rig.observation.csv_samples import Samples
-from rig.observation.steadiness import check_at_rest, whole_stretches
+from rig.observation.by_hand.steadiness import check_at_rest, whole_stretches
+from rig.observation.external.csv_samples import Samples
+from rig.observation.motion.arm_motion import motion_of
+from rig.observation.reference.acceleration import accelerations
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from rig.config.limits import Parameter
+from rig.config.judging.limits import Parameter
 from rig.data.installed_kinds import quantities
 from rig.data.meaning import Meaning
 from rig.errors import Fault
-from rig.estimation.coverage import COVERAGE_FACTOR, beyond
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, beyond
 
 ONLY_RECORDED = ("no_attitudes", "field_strength_unknown")  # why a sensor was not to be calibrated
 

@@ -10,9 +10,9 @@ from itertools import combinations
 
 import numpy as np
 
-from rig.data.provenance import calls_itself_simulated
-from rig.data.settings import Uncertainty
-from rig.observation.arm_clock import compare_with_computer
+from rig.data.recording.provenance import calls_itself_simulated
+from rig.data.recording.settings import Uncertainty
+from rig.observation.consistency.arm_clock import compare_with_computer
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import NOMINAL_DRIFT
 

@@ -6,19 +6,19 @@ Its variance is split into what the budget's own lines of type A make of it, and
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.calibration import SensorResult
-from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.gyroscope.calibration import SensorResult
+from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.reference.magnetic_field import MagnetometerResult
 from rig.analysis.reversal import MagnetometerReversal
-from rig.estimation.accelerometer_model import SECOND
 from rig.estimation.arrays import Array
-from rig.estimation.budget import NOISE, WANDERING, Budget
-from rig.estimation.coverage import effective_freedom
-from rig.estimation.reference_budget import ATTITUDES, response_in_attitudes
-from rig.estimation.reference_model import F
+from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
+from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, regress
+from rig.estimation.reference.accelerometer_model import SECOND
+from rig.estimation.reference.reference_budget import ATTITUDES, response_in_attitudes
+from rig.estimation.reference.reference_model import F
 from rig.estimation.sensor_axes import SensorAxes
-from rig.estimation.vector_fit import Explained
-from rig.estimation.vector_model import VectorSolution, design_matrix, regress
+from rig.estimation.statistics.coverage import effective_freedom
 
 
 def of_angles(result: SensorResult) -> Array | None:

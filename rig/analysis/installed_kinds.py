@@ -6,10 +6,10 @@ from functools import partial
 
 from rig.analysis.check import Check
 from rig.data.installed_kinds import InstalledKind, installed_kinds
-from rig.data.motion_file import Item
 from rig.data.quantity import Quantity
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.settings import RunSettings, Site
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.settings import RunSettings, Site
 from rig.errors import Fault
 from rig.errors.attempts import attempt
 from rig.observation.observed_run import ObservedRun

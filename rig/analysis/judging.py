@@ -6,29 +6,30 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.bias_drift import bias_drifts
-from rig.analysis.board_averages import board_averages
-from rig.analysis.calibration import SensorResult, solve_observed
 from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
-from rig.analysis.comparison import Reference, turns_of
-from rig.analysis.contradictions import contradictions, in_reference
+from rig.analysis.consistency.contradictions import contradictions, in_reference
+from rig.analysis.consistency.told_from import ToldFrom
 from rig.analysis.estimators import Estimator, known_estimator
+from rig.analysis.gyroscope.board_averages import board_averages
+from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
+from rig.analysis.gyroscope.comparison import Reference, turns_of
+from rig.analysis.gyroscope.mounts import observe_as_mounted
+from rig.analysis.gyroscope.onboard_check import Agreement, agreement
+from rig.analysis.gyroscope.vector_inputs import lever_arms_m
+from rig.analysis.gyroscope.verification import Verification, verify
 from rig.analysis.installed_kinds import KindFound, kinds_on_arm
-from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
-from rig.analysis.mounts import observe_as_mounted
-from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.outcome import Outcome, origin_of
-from rig.analysis.over_temperature import (
+from rig.analysis.reference.acceleration import AccelerometerResult, calibrate_accelerometers
+from rig.analysis.reference.magnetic_field import MagnetometerResult, calibrate_magnetometers
+from rig.analysis.surroundings import surroundings_of
+from rig.analysis.temperature.bias_drift import bias_drifts
+from rig.analysis.temperature.over_temperature import (
     Polynomials,
     taken_to_reference,
     with_acceleration_polynomials,
     with_rate_polynomials,
 )
-from rig.analysis.surroundings import surroundings_of
-from rig.analysis.told_from import ToldFrom
-from rig.analysis.vector_inputs import lever_arms_m
 from rig.analysis.verdict import (
     acceleration_checks,
     clock_checks,
@@ -36,17 +37,16 @@ from rig.analysis.verdict import (
     judge,
     verification_checks,
 )
-from rig.analysis.verification import Verification, verify
-from rig.config.judged_by import DecisionRule
+from rig.config.judging.judged_by import DecisionRule
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
-from rig.data.run_file import RunData
-from rig.data.settings import RunSettings
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
 from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
-from rig.estimation.over_temperature import OverTemperature
-from rig.estimation.vector_fit import centripetal_m_s2
-from rig.estimation.vector_model import VectorSolution
+from rig.estimation.gyroscope.vector_fit import centripetal_m_s2
+from rig.estimation.gyroscope.vector_model import VectorSolution
+from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.observed_run import ObservedRun, observe_runs
 
 ResultT = TypeVar("ResultT")

@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Literal
 from rig.errors.attempts import Attempts
 
 if TYPE_CHECKING:
-    from rig.analysis.acceleration import AccelerometerResult
-    from rig.analysis.bias_drift import Drifts
-    from rig.analysis.calibration import SensorResult
     from rig.analysis.check import Check
     from rig.analysis.clock import ClockCheck
-    from rig.analysis.elsewhere import OfSensor
+    from rig.analysis.consistency.told_from import ToldFrom
+    from rig.analysis.external.elsewhere import OfSensor
+    from rig.analysis.gyroscope.calibration import SensorResult
+    from rig.analysis.gyroscope.mounts import FoundMount
+    from rig.analysis.gyroscope.onboard_check import Agreement
+    from rig.analysis.gyroscope.verification import Verification
     from rig.analysis.installed_kinds import KindFound
-    from rig.analysis.magnetic_field import MagnetometerResult
-    from rig.analysis.mounts import FoundMount
-    from rig.analysis.onboard_check import Agreement
-    from rig.analysis.over_temperature import Polynomials
-    from rig.analysis.told_from import ToldFrom
-    from rig.analysis.verification import Verification
-    from rig.data.provenance import Provenance
+    from rig.analysis.reference.acceleration import AccelerometerResult
+    from rig.analysis.reference.magnetic_field import MagnetometerResult
+    from rig.analysis.temperature.bias_drift import Drifts
+    from rig.analysis.temperature.over_temperature import Polynomials
+    from rig.data.recording.provenance import Provenance
+    from rig.data.recording.run_file import RunData
+    from rig.data.recording.settings import RunSettings
     from rig.data.result_file import StoredCalibrationEntry
-    from rig.data.run_file import RunData
-    from rig.data.settings import RunSettings
     from rig.observation.observed_run import ObservedRun
 
 

@@ -10,21 +10,21 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.calibration import solve_vector
+from rig.analysis.gyroscope.calibration import solve_vector
 from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, all_failed, attempt_each
 from rig.estimation.arrays import Array
-from rig.estimation.vector_model import VectorSolution
-from rig.observation.acceleration import DwellReading, read_each_dwell
-from rig.observation.arm_motion import ArmMotion, motion_of
+from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.average import Average, Stream, on_the_arms_clock
 from rig.observation.field import dwelt_beside, field_mean
 from rig.observation.finished import finished_dwells, finished_sweeps
-from rig.observation.mean import QuantityInDwell, ReadAtRest
+from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import Observation, observe_each_sweep, observe_sensor
 from rig.observation.observed_run import times_s
+from rig.observation.reference.acceleration import DwellReading, read_each_dwell
+from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest
 from rig.observation.timebase import TimeBase
 
 NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")

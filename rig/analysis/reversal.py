@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
-from rig.analysis.reference_budgets import SIZE_OF_FIELD
+from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.reference.reference_budgets import SIZE_OF_FIELD
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.reversal import Reversal, separate
+from rig.estimation.reference.reversal import Reversal, separate
 
 ALIKE = "Give runs of one magnetometer on one arm, in the same attitudes and at the same place, turned over in between"
 

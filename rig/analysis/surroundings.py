@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import inf, sqrt
 
 from rig.analysis.clock import ClockCheck, check_clock
-from rig.data.settings import RunSettings, Site, Uncertainty
-from rig.observation.arm_clock import state_jitter
+from rig.data.recording.settings import RunSettings, Site, Uncertainty
+from rig.observation.consistency.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun
 
 # Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.

@@ -7,19 +7,19 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.check import Check, check_name, fitness
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
-from rig.analysis.verification import Verification
-from rig.config.judged_by import DecisionRule
-from rig.config.limits import Limits, limit_of
+from rig.analysis.gyroscope.verification import Verification
+from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.temperature.bias_drift import BiasDrift
+from rig.config.judging.judged_by import DecisionRule
+from rig.config.judging.limits import Limits, limit_of
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Budget
-from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors
-from rig.estimation.estimate import Estimate
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, coverage_factors
 
 CLOCKS = "clocks_agree"
 

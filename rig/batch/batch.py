@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from rig.config.sensor_sections import checked_serial_number
-from rig.config.station_section import StationSection
+from rig.config.judging.station_section import StationSection
+from rig.config.sensors.sensor_sections import checked_serial_number
 
 Outcome = Literal["pass", "fail", "refused", "fault"]
 Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a name, which leads nowhere else

@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from rig.batch.batch import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
-from rig.config.regular_file import UnfitFile, read_regular_file
-from rig.config.written_file import opened_to_append
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.config.files.written_file import opened_to_append
 from rig.data.checked import checked, parsed
 from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
 from rig.errors import Refused

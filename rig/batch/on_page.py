@@ -12,11 +12,11 @@ from starlette.routing import Route
 
 from rig.batch.operators import Question
 from rig.batch.status import Now, Present, last
-from rig.page.application import acting, body_of
-from rig.page.control import Control
-from rig.page.guard import Door
-from rig.page.sections import Sections
-from rig.page.serving import Address, Page, serving
+from rig.page.server.application import acting, body_of
+from rig.page.server.control import Control
+from rig.page.server.guard import Door
+from rig.page.server.sections import Sections
+from rig.page.server.serving import Address, Page, serving
 
 LONGEST = 200  # characters of an answer
 LOOK_S = 0.5  # between two looks whether the page is still there

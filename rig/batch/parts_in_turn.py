@@ -11,8 +11,8 @@ from rig.batch import label, table
 from rig.batch.batch import Batch, BatchEnded, Chip, Doubt, Entry, Outcome, Part, PartBegun, PartEnded, doubt_of
 from rig.batch.journal import Journal
 from rig.batch.operators import Asked
-from rig.config.station_section import StationSection
-from rig.config.written_file import write_new
+from rig.config.files.written_file import write_new
+from rig.config.judging.station_section import StationSection
 from rig.errors import Fault, Refused
 
 LABELS = "labels"

@@ -4,7 +4,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 
 LARGEST_BYTES = 1_000_000

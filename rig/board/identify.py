@@ -7,7 +7,7 @@ from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibra
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import BoardSection, SensorsConfig
-from rig.config.sensor_sections import ConfiguredSensor, SensorSection
+from rig.config.sensors.sensor_sections import ConfiguredSensor, SensorSection
 from rig.errors import Fault, Refused, raised_as
 
 NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it

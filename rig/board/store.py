@@ -10,7 +10,7 @@ from firmware_host.client import Board, Calibration, StoredCalibration, StoredPo
 from firmware_host.errors import BoardError
 from rig.board.identify import configured_board, find_sensor
 from rig.config.models import RigConfig
-from rig.data.temperature_entries import OverTemperatureEntry
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 

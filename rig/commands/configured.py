@@ -5,7 +5,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.commands.own_address import own_address
+from rig.commands.laboratory.own_address import own_address
 from rig.config.load import Loaded, load, parse
 from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from rig.data.ending_signals import ENDING_SIGNALS, INTERRUPTS, MEANT_SIGNALS, OTHER_SIGNALS, signal_name
+from rig.data.processes.ending_signals import ENDING_SIGNALS, INTERRUPTS, MEANT_SIGNALS, OTHER_SIGNALS, signal_name
 
 _HANGING_UP = getattr(signal, "SIGHUP", None)
 _PRINTING_BEHIND = getattr(signal, "SIGTTOU", None)

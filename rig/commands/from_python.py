@@ -14,7 +14,7 @@ from rig.notebook.runs import Run, load
 from rig.report.exports.formats import FORMATS
 
 if TYPE_CHECKING:
-    from rig.report.plan_table import DryRun
+    from rig.report.terminal.plan_table import DryRun
 
 Changes = Mapping[str, object]
 
@@ -26,8 +26,8 @@ def plan(config: str | Path, changes: Changes | None = None, *, script: str | Pa
     one's own. Returns the plan: angles in rad, speeds in rad/s, times in s. Raises Refused by name for an error in the
     file, and for a motion that breaks a limit.
     """
-    from rig.commands.plan import add, planned
-    from rig.report.plan_table import print_plan
+    from rig.commands.measure.plan import add, planned
+    from rig.report.terminal.plan_table import print_plan
 
     found = planned(_options("plan", add, [*_changed(changes), *_script(script)], config))
     print_plan(found, as_json=False)
@@ -40,8 +40,8 @@ def check(config: str | Path, changes: Changes | None = None, *, script: str | P
     Returns whether a run could start. Takes `changes` and `script` as `plan` does; raises Refused for an error in the
     file.
     """
-    from rig.commands.check import add
-    from rig.commands.check import run as looked
+    from rig.commands.measure.check import add
+    from rig.commands.measure.check import run as looked
 
     return looked(_options("check", add, [*_changed(changes), *_script(script)], config)) == 0
 
@@ -64,9 +64,9 @@ def run(
     (`not_confirmed` without agreement), Fault where the arm was stopped, KeyboardInterrupt. In a script the call
     stands below `if __name__ == "__main__":`, for the arm's process reads the script as well.
     """
-    from rig.commands.carry_out import carry_out
     from rig.commands.endings import ending_by_interrupt
-    from rig.commands.run import add, begun
+    from rig.commands.measure.carry_out import carry_out
+    from rig.commands.measure.run import add, begun
 
     if multiprocessing.current_process().name != "MainProcess":
         raise Refused(
@@ -100,7 +100,7 @@ def write_certificate(
     `{"certificate.customer": "Example"}`. `out` is a folder, by default the run's; `history` where the certificate is
     noted, by default the user's own. Returns the files. Raises Refused as `rig report` does.
     """
-    from rig.commands.report import add, documents
+    from rig.commands.documents.report import add, documents
 
     words = [*_changed(changes), *(["--pdf"] if pdf else []), *(["--dcc"] if dcc else [])]
     words += [] if out is None else ["--out", str(out)]
@@ -117,7 +117,7 @@ def export(of: Run | str | Path, format: str, *, out: str | Path | None = None) 
     `format` is one of csv, parquet, mat, ros2, imucal, px4, ardupilot, kalibr; `out` a folder, by default one in the
     run's. Returns the files. Raises Refused `bad_option` for another format, and as `rig export` does.
     """
-    from rig.commands.export import add, files
+    from rig.commands.documents.export import add, files
 
     if format not in FORMATS:
         raise Refused("bad_option", f"there is no format {format!r}", f"Choose one of: {', '.join(FORMATS)}")

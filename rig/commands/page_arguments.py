@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.station.confirm import ask_operator
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.page.about import About
-    from rig.page.serving import Address
+    from rig.page.server.serving import Address
     from rig.station.events import RunEvent
     from rig.station.station import Listener
 
@@ -37,7 +37,7 @@ class PageWish:
 
     def address(self) -> "Address":
         """Raises Refused `page_address`."""
-        from rig.page.serving import ADDRESS, Address
+        from rig.page.server.serving import ADDRESS, Address
 
         host, colon, port = (self.place or ADDRESS).rpartition(":")
         if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone
@@ -114,7 +114,7 @@ def wish(options: argparse.Namespace) -> PageWish | None:
                 "page_address", "this option is for the page, and no page was asked for", "Give --page as well"
             )
         return None
-    from rig.page.serving import check
+    from rig.page.server.serving import check
 
     made = PageWish(options.page_address, token_said(options), options.confirm_on_page)
     check(made.address())  # before there is a run folder
@@ -131,10 +131,10 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
         yield OperatorsPage()
         return
     from rig.page.analysis_process import looking_out
-    from rig.page.control import Control
-    from rig.page.feed import Feed
     from rig.page.page_state import Shown
-    from rig.page.serving import serving
+    from rig.page.server.control import Control
+    from rig.page.server.feed import Feed
+    from rig.page.server.serving import serving
 
     feed, control = Feed(Shown(about())), Control(may_answer=wanted.may_answer)
     with ExitStack() as stack:

@@ -13,15 +13,21 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.as_written import take_text_as_written
-from rig.config.hand_sections import HandSection
-from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
+from rig.config.files.as_written import take_text_as_written
+from rig.config.files.layers import BASE, SET, Layered, Places, put_together, read_layers
+from rig.config.files.yaml_text import Location, Unreadable, dotted
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
-from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
-from rig.config.servo_section import ServoSection
-from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, TargetUncertaintySection, turned_otherwise, written_out
-from rig.config.world_models import WorldSection
-from rig.config.yaml_text import Location, Unreadable, dotted
+from rig.config.procedures.hand_sections import HandSection
+from rig.config.procedures.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.procedures.servo_section import ServoSection
+from rig.config.procedures.shortest_procedure import (
+    CARRIED_OUT,
+    SHORTEST,
+    TargetUncertaintySection,
+    turned_otherwise,
+    written_out,
+)
+from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
 from rig.errors.quoting import printable, quote
 

@@ -9,15 +9,14 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from rig.config.judged_by import ObservationSection, UncertaintySection
-from rig.config.judging_sections import (
+from rig.config.judging.judged_by import ObservationSection, UncertaintySection
+from rig.config.judging.judging_sections import (
     CertificateSection,
     HistorySection,
     SiteSection,
 )
-from rig.config.limits import LimitsSection
-from rig.config.link_budget import Stream, over_budget
-from rig.config.mavlink_section import over_budget_of_autopilots
+from rig.config.judging.limits import LimitsSection
+from rig.config.judging.station_section import StationSection
 from rig.config.ranges import PAYLOAD_RANGE_KG, SPEED_RANGE_DEG_S, ModelName
 from rig.config.section import (
     RATIO,
@@ -30,9 +29,10 @@ from rig.config.section import (
     checked_host,
     checked_port,
 )
-from rig.config.sensor_catalogue import MAGNETOMETERS
-from rig.config.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
-from rig.config.station_section import StationSection
+from rig.config.sensors.link_budget import Stream, over_budget
+from rig.config.sensors.mavlink_section import over_budget_of_autopilots
+from rig.config.sensors.sensor_catalogue import MAGNETOMETERS
+from rig.config.sensors.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 
 HOMES = "`[0, -90, 90, -90, -90, 0]`, of a `ur3e` `[0, -90, 90, -90, -60, 0]`"
 

@@ -4,14 +4,14 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from rig.config import layers, yaml_text
+from rig.config.files import layers, yaml_text
 from rig.config.models import ArmSection, RigConfig
-from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.procedures.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.procedures.servo_section import ServoSection
+from rig.config.procedures.shortest_procedure import CARRIED_OUT, SHORTEST, ShortestSection
 from rig.config.section import Section
-from rig.config.sensor_catalogue import PARTS
-from rig.config.servo_section import ServoSection
-from rig.config.shortest_procedure import CARRIED_OUT, SHORTEST, ShortestSection
-from rig.config.world_models import WorldSection
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.config.world.laboratory import WorldSection
 
 Schema = Mapping[str, Any]
 
@@ -116,8 +116,8 @@ def _turners() -> Iterator[str]:
         "",
         "What turns the sensors, said by its `kind`. `turner: {kind: ur, …}` with the keys of `arm` is the same as",
         "`arm`; a file has one of the two. `turner: {kind: hand}` is an operator's hand, and has no keys",
-        "([by hand](how-to/by-hand.md)). `kind: servo` has the keys below. A package may bring another kind, which",
-        "brings its own keys ([another turner](how-to/other-hardware.md)).",
+        "([by hand](how-to/without-an-arm/by-hand.md)). `kind: servo` has the keys below. A package may bring another",
+        "kind, which brings its own keys ([another turner](how-to/with-code/other-hardware.md)).",
         "",
     )
     servo = ServoSection.model_json_schema()
@@ -130,7 +130,7 @@ def _procedures() -> Iterator[str]:
         "",
         f"`name` says which procedure is run; if it is left out, this is `{DEFAULT_PROCEDURE}`. The keys of this "
         "section depend on it.",
-        "[A procedure of your own](how-to/own-procedure.md) has its own section.",
+        "[A procedure of your own](how-to/with-code/own-procedure.md) has its own section.",
         "",
     )
     sections: dict[str, type[Section]] = {}

@@ -18,7 +18,7 @@ class InstalledKind(Protocol):
     - `quantity` is what it measures: its row of the table.
     - `solve` takes the sensor's name, its placements at rest and the site, and returns what is found
       (`rig.analysis.installed_kinds`).
-    - `result` is the kind of result (`rig.report.kinds.kind.ResultKind`), which shows that everywhere.
+    - `result` is the kind of result (`rig.report.findings.kind.ResultKind`), which shows that everywhere.
     """
 
     @property

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from rig.config.limits import Kind, Parameter
+from rig.config.judging.limits import Kind, Parameter
 
 HELD: tuple[Parameter, Parameter] = ("scale", "bias")
 

@@ -7,7 +7,7 @@ import hashlib
 from contextlib import suppress
 from pathlib import Path
 
-from rig.config.own_folder import own_folder
+from rig.config.files.own_folder import own_folder
 from rig.errors import Refused
 
 

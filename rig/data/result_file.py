@@ -9,21 +9,18 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue, model_validator
 
-from rig.config.limits import Kind, Parameter
+from rig.config.files.written_file import write_new
+from rig.config.judging.limits import Kind, Parameter
 from rig.config.section import SensorName
-from rig.config.written_file import write_new
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.attitude_entries import AnglesEntry, AttitudesEntry
-from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import OfJoints, read_document
-from rig.data.drift_entries import DriftEntry
-from rig.data.earth_rate_entries import EarthRateEntry
-from rig.data.hand_entries import ByHandEntry
-from rig.data.installed_kinds import quantities
-from rig.data.key_meanings import meaning_of
-from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
-from rig.data.result_types import (
+from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.budget import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.entries.by_hand import ByHandEntry
+from rig.data.entries.drift import DriftEntry
+from rig.data.entries.earth_rate import EarthRateEntry
+from rig.data.entries.external import AnglesEntry, AttitudesEntry
+from rig.data.entries.magnetometer import MagnetometerEntry
+from rig.data.entries.result_types import (
     ConditionsEntry,
     DetectionLimitEntry,
     Entry,
@@ -41,8 +38,11 @@ from rig.data.result_types import (
     Vector6,
     covariance,
 )
+from rig.data.entries.temperature import OverTemperatureEntry
+from rig.data.installed_kinds import quantities
+from rig.data.key_meanings import meaning_of
+from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
 from rig.data.run_folder import RESULT
-from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.data.checked import checked
 from rig.errors import Refused
 

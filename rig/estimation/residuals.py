@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.estimation import accelerometer_model, attitude_error, reference_model
-from rig.estimation.accelerometer_model import Dwells, Movement
 from rig.estimation.arrays import Array
-from rig.estimation.imu import ImuSolution
-from rig.estimation.reading_errors import noise
-from rig.estimation.reference_budget import response_in_attitudes
-from rig.estimation.triaxial import TriaxialSolution
-from rig.estimation.vector_fit import Explained
-from rig.estimation.vector_model import design_matrix, of_the_speed, regress
+from rig.estimation.gyroscope.vector_fit import Explained
+from rig.estimation.gyroscope.vector_model import design_matrix, of_the_speed, regress
+from rig.estimation.reference import accelerometer_model, attitude_error, reference_model
+from rig.estimation.reference.accelerometer_model import Dwells, Movement
+from rig.estimation.reference.imu import ImuSolution
+from rig.estimation.reference.reading_errors import noise
+from rig.estimation.reference.reference_budget import response_in_attitudes
+from rig.estimation.reference.triaxial import TriaxialSolution
 
 
 def residual_std_rad_s(explained: Explained) -> Array:

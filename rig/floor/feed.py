@@ -12,10 +12,11 @@ from sqlalchemy.exc import SQLAlchemyError
 from rig.errors import Refused
 from rig.errors.quoting import shorten
 from rig.floor import shown
-from rig.history import schema, stations
-from rig.history.address import Place
+from rig.history import stations
+from rig.history.storage import schema
+from rig.history.storage.address import Place
 from rig.history.store import History, open_history
-from rig.page.sections import Sections
+from rig.page.server.sections import Sections
 
 LOOK_S = 0.5  # a rig that is dead after 3.5 s has to be shown as such within 5 s
 

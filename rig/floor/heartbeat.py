@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rig.batch.status import Now, last
 from rig.history import stations
-from rig.history.address import Place
+from rig.history.storage.address import Place
 from rig.history.store import open_history
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import Literal, get_args
 
 from pydantic import ValidationError
 
-from rig.config.regular_file import UnfitFile
+from rig.config.files.regular_file import UnfitFile
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import RESULT, recordings
-from rig.history.finished import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
-from rig.history.index import run_row, unlike
+from rig.history.entered.finished import CERTIFICATES, DOCUMENTS, content_sha256, document_sha256, recording_of
+from rig.history.entered.index import run_row, unlike
 from rig.history.store import History, Kept, Past
-from rig.report.kinds.followed import Followed
+from rig.report.findings.followed import Followed
 from rig.station.words import calibrations_in_words
 
 State = Literal["ok", "changed", "missing", "elsewhere", "unknown"]

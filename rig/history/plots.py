@@ -9,11 +9,11 @@ import numpy as np
 
 from rig.history.series import Subject, Trend
 from rig.history.statistics.charts import SHEWHART_LIMIT
-from rig.history.tables import title_of
+from rig.history.terminal.tables import title_of
 from rig.report.exports.names import plain_names
-from rig.report.figures import save
-from rig.report.kinds.characteristics import every_characteristic
-from rig.report.kinds.followed import BIASES, SCALES
+from rig.report.figures.verification import save
+from rig.report.findings.characteristics import every_characteristic
+from rig.report.findings.followed import BIASES, SCALES
 from rig.study.style import style
 
 if TYPE_CHECKING:

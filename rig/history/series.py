@@ -11,13 +11,13 @@ import numpy as np
 from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import effective_freedom, joint_factors
+from rig.estimation.statistics.coverage import effective_freedom, joint_factors
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
-from rig.report.kinds.followed import Parameter, is_scale, nominal
+from rig.report.findings.followed import Parameter, is_scale, nominal
 
 YEAR_DAYS = 365.25
 DRIFT_DAYS = 10.0  # from the first result to the last: what less says of a year is its scatter

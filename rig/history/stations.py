@@ -29,7 +29,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 
-from rig.history.engine import WRITES
+from rig.history.storage.engine import WRITES
 
 LONGEST = 20_000  # characters of what a station says
 NAME = 200

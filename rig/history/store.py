@@ -16,14 +16,15 @@ from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
-from rig.history import certificates, journal, numbers, read_back, schema, triggers
-from rig.history.address import Place, place
-from rig.history.engine import WRITES, connection_apart, engine_of
-from rig.history.entering import enter_run, note_place, now_utc
-from rig.history.finished import Finished, Recording
-from rig.history.issued import Issued
-from rig.report.kinds.characteristics import every_characteristic
-from rig.report.kinds.followed import BIASES, SCALES, Parameter
+from rig.history.entered import certificates
+from rig.history.entered.entering import enter_run, note_place, now_utc
+from rig.history.entered.finished import Finished, Recording
+from rig.history.entered.issued import Issued
+from rig.history.storage import journal, numbers, read_back, schema, triggers
+from rig.history.storage.address import Place, place
+from rig.history.storage.engine import WRITES, connection_apart, engine_of
+from rig.report.findings.characteristics import every_characteristic
+from rig.report.findings.followed import BIASES, SCALES, Parameter
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands
 

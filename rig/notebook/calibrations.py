@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.data.budget_entries import expanded_uncertainties
+from rig.data.entries.budget import expanded_uncertainties
 from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.own_readings import own_readings
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Shown
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Shown
 from rig.report.kinds.triad import bias_of
 
 HEADINGS = ("axis", "scale factor", "± U", "bias", "± U", "unit")

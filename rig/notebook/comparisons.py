@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.alignment import RelativeRotation
-from rig.analysis.comparison import Comparison, Reference
-from rig.analysis.comparison import compare as compare_readings
-from rig.analysis.verification import relative_mounting
+from rig.analysis.gyroscope.alignment import RelativeRotation
+from rig.analysis.gyroscope.comparison import Comparison, Reference
+from rig.analysis.gyroscope.comparison import compare as compare_readings
+from rig.analysis.gyroscope.verification import relative_mounting
 from rig.data.quantity import RATE
 from rig.errors import Refused
 from rig.notebook.html import table
@@ -75,7 +75,7 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     """Compare two sensors of a run sample by sample, the one corrected by what is known of it.
 
     The reference's calibration is the turntable's where the run names one, else this run's own. Raises Refused
-    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.comparison.compare` does.
+    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.gyroscope.comparison.compare` does.
     """
     for name in (sensor, reference):
         if RATE.name not in run[name].quantities:

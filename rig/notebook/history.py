@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import Refused
-from rig.history.address import own_place, place
 from rig.history.documents import COLUMNS, change_entry
 from rig.history.series import Change, changes_in, time_of
+from rig.history.storage.address import own_place, place
 from rig.history.store import Past, Selection, open_history
-from rig.history.tables import title_of, value_text
+from rig.history.terminal.tables import title_of, value_text
 from rig.notebook.frames import frame
 from rig.notebook.html import table
 from rig.notebook.results import Result, solve
 from rig.notebook.runs import Run
-from rig.report.kinds.followed import Followed, Parameter
+from rig.report.findings.followed import Followed, Parameter
 from rig.report.kinds.registry import followed
 
 if TYPE_CHECKING:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.comparison import Comparison
+from rig.analysis.gyroscope.comparison import Comparison
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
 from rig.report.certificate.plots import reach_in
-from rig.report.figures import draw_comparison
-from rig.report.kinds.unexplained import Unexplained
+from rig.report.figures.verification import draw_comparison
+from rig.report.findings.unexplained import Unexplained
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity, Scalar
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.notebook.frames import frame
 from rig.notebook.html import table
-from rig.observation.arm_motion import motion_of
 from rig.observation.average import on_the_arms_clock
+from rig.observation.motion.arm_motion import motion_of
 from rig.observation.observed_run import one_clock, times_s
 from rig.observation.windows import Finished, Window, swept
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rig.data.recording.settings import setting
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
-from rig.data.settings import setting
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, CharacteristicValue, rows
 from rig.notebook.html import table
 from rig.notebook.readings import NoSuchSensor
 from rig.notebook.runs import Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
-from rig.report.kinds.finding import Finding
+from rig.report.findings.finding import Finding
 from rig.report.kinds.registry import outlets, shown, terms_of
 
 if TYPE_CHECKING:

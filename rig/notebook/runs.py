@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from rig.analysis.outcome import Outcome
-from rig.data.provenance import Provenance
-from rig.data.settings import RunSettings
+from rig.data.recording.provenance import Provenance
+from rig.data.recording.settings import RunSettings
 from rig.notebook.html import table
 from rig.notebook.readings import HEADINGS, NoSuchSensor, Readings
 from rig.observation.observed_run import ObservedRun, observe_runs

@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, averaged, between
-from rig.observation.beside_lines import mean_of_standing
+from rig.observation.motion.arm_motion import ArmMotion
+from rig.observation.statistics.beside_lines import mean_of_standing
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Window, rested
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE, TEMPERATURE, Quantity
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
-from rig.estimation.over_temperature import OverTemperature
-from rig.estimation.rounding import Steps
-from rig.observation.known_motion import KnownMotion
-from rig.observation.mean import Mean
+from rig.estimation.statistics.rounding import Steps
+from rig.estimation.temperature.over_temperature import OverTemperature
+from rig.observation.motion.known_motion import KnownMotion
+from rig.observation.statistics.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 

@@ -7,15 +7,15 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rig.data.quantity import FIELD
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import DwellReading, check_complete
 from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import steps_of
-from rig.observation.mean import Held, Mean, even_mean
 from rig.observation.observed_run import ObservedRun, one_clock
+from rig.observation.reference.acceleration import DwellReading, check_complete
+from rig.observation.statistics.mean import Held, Mean, even_mean
 from rig.observation.windows import Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint

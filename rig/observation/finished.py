@@ -1,6 +1,6 @@
 """Which sweeps and dwells of its plan a recording holds from start to end, and when they were. Pure."""
 
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.observation.windows import dwelt, swept
 
 

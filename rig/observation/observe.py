@@ -16,22 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
-from rig.observation.acceleration import DwellReading, dwell_readings
-from rig.observation.arm_motion import ArmMotion, is_sparse
 from rig.observation.arm_rests import bias_drift, place, rests_of
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
-from rig.observation.lines import BEATS, turning
 from rig.observation.lost_samples import lost_samples
-from rig.observation.revolution import Revolution, arm_states_lost, describe
+from rig.observation.motion.arm_motion import ArmMotion, is_sparse
+from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
+from rig.observation.reference.acceleration import DwellReading, dwell_readings
+from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
+from rig.observation.statistics.lines import BEATS, turning
 from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
-from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import Finished, Window, swept

@@ -9,13 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from rig.data.quantity import RATE, Quantity
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
-from rig.estimation.over_temperature import OverTemperature
-from rig.observation.arm_motion import ArmMotion, motion_of, turner_of
+from rig.estimation.temperature.over_temperature import OverTemperature
 from rig.observation.average import Stream, on_clock
 from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
 

@@ -5,15 +5,15 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rig.data.events import BoardObserved
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.events import BoardObserved
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.steps import Sweep
-from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
 from rig.observation.finished import finished_sweeps
+from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.windows import Window
 
 

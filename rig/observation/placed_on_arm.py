@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.data.quantity import Quantity
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
-from rig.observation.acceleration import check_complete, without_leaving
 from rig.observation.average import steps_of
-from rig.observation.mean import Mean, even_mean
+from rig.observation.external.placements import Placements, Rested
 from rig.observation.observed_run import ObservedRun
-from rig.observation.placements import Placements, Rested
+from rig.observation.reference.acceleration import check_complete, without_leaving
+from rig.observation.statistics.mean import Mean, even_mean
 from rig.observation.windows import Dwelt, Window, dwelt, inside
 
 NO_REST = Rested({}, {}, {}, (), ())

@@ -3,15 +3,15 @@
 import numpy as np
 
 from rig.data.quantity import RATE
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.observation.acceleration import read_each_dwell
-from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.arm_rests import rests_of
 from rig.observation.average import Stream, between, on_the_arms_clock
 from rig.observation.finished import finished_dwells, finished_sweeps
+from rig.observation.motion.arm_motion import ArmMotion, motion_of
 from rig.observation.observe import check_feeling, observe_each_sweep
+from rig.observation.reference.acceleration import read_each_dwell
 from rig.observation.windows import Window
 
 SPIKE = 8.0  # of the readings' own deviation: one reading in 1e15

@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 
 from rig.data.quantity import Quantity
-from rig.data.settings import Site
+from rig.data.recording.settings import Site
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.motion.steps import Sweep
-from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
+from rig.observation.reference.acceleration import DwellReading
 
 OF_A_SWEEP = 0.5  # of the slowest one's speed: so much no bias changes from rest to rest
 TURNED = 0.5  # of gravity, by which two attitudes in a row must differ to tell

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.coloured_noise import widening
-from rig.observation.known_motion import KnownMotion, check_span, not_finite
+from rig.observation.motion.known_motion import KnownMotion, check_span, not_finite
+from rig.observation.statistics.coloured_noise import widening
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1

@@ -13,12 +13,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.mean_weights import mean_weights
-from rig.estimation.rounding import Steps
-from rig.observation.beside_lines import BRIEF, FEWEST, noise_of
-from rig.observation.coloured_noise import MEMORIES
-from rig.observation.lines import NONE, LineSearch, find_lines, fitted, median_power, turning, unit_columns, waves, wide
-from rig.observation.mean import Mean, weighted_means, whole
+from rig.estimation.statistics.mean_weights import mean_weights
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.statistics.beside_lines import BRIEF, FEWEST, noise_of
+from rig.observation.statistics.coloured_noise import MEMORIES
+from rig.observation.statistics.lines import (
+    NONE,
+    LineSearch,
+    find_lines,
+    fitted,
+    median_power,
+    turning,
+    unit_columns,
+    waves,
+    wide,
+)
+from rig.observation.statistics.mean import Mean, weighted_means, whole
 
 SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
 UNSEEN = LineSearch(slowest=5.0)

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.data.events import (
+from rig.data.recording.events import (
     DwellFinished,
     DwellStarted,
     Event,
@@ -15,7 +15,7 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.motion.steps import Dwell, Sweep
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TextIO
 
 from rig.motion.steps import Dwell, Rest, Sweep
-from rig.page.feed import Feed
 from rig.page.rows import Look
+from rig.page.server.feed import Feed
 from rig.station.events import PhaseStarted, RunEvent, StepFinished
 from rig.station.plain_text import say
 

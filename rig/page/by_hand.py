@@ -3,7 +3,7 @@
 from math import degrees
 from typing import Any
 
-from rig.data.hand_events import (
+from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,

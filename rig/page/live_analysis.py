@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rig.analysis.partial_results import so_far
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.data.run_folder import recordings
 from rig.errors import RigError
 from rig.page.rows import look_of

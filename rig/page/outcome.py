@@ -11,9 +11,9 @@ from rig.data.meaning import HELD, limit_held
 from rig.data.result_file import ResultDocument
 from rig.data.run_folder import CONFIG, resuming
 from rig.page.about import About
-from rig.report.kinds.kind import Three
+from rig.report.findings.kind import Three
 from rig.report.kinds.registry import shown
-from rig.report.rounding import in_print
+from rig.report.words.rounding import in_print
 from rig.station.events import Since
 
 Row = dict[str, Any]

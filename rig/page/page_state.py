@@ -5,8 +5,10 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.data.events import BoardNotObserved, BoardObserved
-from rig.data.hand_events import (
+from rig.data.installed_kinds import measured
+from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, of_news
+from rig.data.recording.events import BoardNotObserved, BoardObserved
+from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,
@@ -14,8 +16,6 @@ from rig.data.hand_events import (
     HandRested,
     HandRestRefused,
 )
-from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE, Quantity, Scalar, Unit, of_news
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
@@ -27,7 +27,7 @@ from rig.page.history import History, rounded
 from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
 from rig.page.rows import Look, along, dwell_row, observation_row, parameter_rows
 from rig.report.certificate.writer import PAGE as CERTIFICATE
-from rig.report.mounts import mount_lines
+from rig.report.words.mounts import mount_lines
 from rig.station.events import (
     Advice,
     Answered,

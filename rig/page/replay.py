@@ -8,9 +8,16 @@ import numpy as np
 
 from rig.analysis.check import Check
 from rig.analysis.partial_results import so_far
-from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.recording.events import (
+    DwellFinished,
+    DwellStarted,
+    RestFinished,
+    RestStarted,
+    SweepFinished,
+    SweepStarted,
+)
+from rig.data.recording.run_file import RunData
 from rig.data.result_file import ResultDocument
-from rig.data.run_file import RunData
 from rig.motion.state import ARM_STATE_DTYPE, ArmState, JointState, State
 from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.page.rows import Look, look_of

@@ -11,11 +11,11 @@ from rig.data.quantity import RATE, Unit
 from rig.data.result_file import ResultDocument
 from rig.errors.attempts import Attempts
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import COVERAGE_FACTOR
-from rig.observation.mean import QuantityInDwell, ReadAtRest
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 from rig.observation.observe import Observation, nearest_axis
+from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest
 from rig.page.history import rounded
-from rig.report.kinds.kind import Shown, Three
+from rig.report.findings.kind import Shown, Three
 from rig.report.kinds.registry import shown
 
 NOISE_ONLY, COMBINED = "noise only", "combined"

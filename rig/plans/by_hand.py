@@ -7,7 +7,7 @@ check that needs no flat table. Any order does: what is asked next follows from 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
-from rig.config.hand_sections import ByHandSection, HandSection
+from rig.config.procedures.hand_sections import ByHandSection, HandSection
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.motion.state import Joints
 from rig.motion.steps import Plan

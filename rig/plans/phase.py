@@ -47,7 +47,7 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
             if not isinstance(made, Plan):
                 raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
         if not done:
-            from rig.analysis.attitude_account import refuse_untelling
+            from rig.analysis.design.attitude_account import refuse_untelling
 
             refuse_untelling(config, made)
         return made

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
-from rig.data.run_file import RunData, read_run
+from rig.data.recording.run_file import RunData, read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, installed

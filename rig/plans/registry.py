@@ -15,8 +15,8 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator
 from rig.analysis.outcome import Outcome
 from rig.config.models import ArmSection, ProcedureSection, TurnerSection
-from rig.config.procedure_sections import STOCK_SECTIONS
-from rig.data.run_file import RunData
+from rig.config.procedures.procedure_sections import STOCK_SECTIONS
+from rig.data.recording.run_file import RunData
 from rig.errors import Refused
 from rig.errors.installed import added
 from rig.motion.state import Joints

@@ -10,7 +10,7 @@ from importlib.util import module_from_spec
 from pathlib import Path
 from types import ModuleType
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.data.own_texts import is_own
 from rig.data.run_folder import SCRIPT, ScriptIdentity
 from rig.errors import Refused

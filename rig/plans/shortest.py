@@ -15,18 +15,18 @@ from typing import Protocol, TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from rig.analysis.predicted import predicted
-from rig.analysis.predicted_accelerations import predicted_accelerations
-from rig.analysis.predicted_by_hand import duration_s, predicted_by_hand
-from rig.analysis.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
-from rig.config.hand_sections import ByHandSection
+from rig.analysis.by_hand.predicted import duration_s, predicted_by_hand
+from rig.analysis.design.predicted import predicted
+from rig.analysis.design.predicted_accelerations import predicted_accelerations
+from rig.analysis.design.shortest import SIZES, Budgets, Candidate, Planned, Searched, Shortest, Wanted, shortest
 from rig.config.models import ProcedureSection, RigConfig
-from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
+from rig.config.procedures.hand_sections import ByHandSection
+from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.config.section import Section
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.budget import FLICKER, NOISE, STATES, WANDERING
 from rig.estimation.by_hand.solution import LINES, REAL_HANDS
+from rig.estimation.gyroscope.budget import FLICKER, NOISE, STATES, WANDERING
 from rig.motion.by_hand import Instruction
 from rig.motion.steps import Plan
 from rig.plans.by_hand import Wanted as Asked

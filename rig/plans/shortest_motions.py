@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from itertools import product
 
-from rig.config.attitude_sets import SETS
 from rig.config.models import RigConfig
-from rig.config.procedure_sections import LONGEST_SWEEP_S, AttitudesSection, SixSweepsSection
-from rig.config.servo_procedure import SPEED_TO_RANGE
+from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.procedure_sections import LONGEST_SWEEP_S, AttitudesSection, SixSweepsSection
+from rig.config.procedures.servo_procedure import SPEED_TO_RANGE
 
 SPEEDS_DEG_S = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0)
 ARCS_DEG = (90.0, 180.0, 270.0)  # where it is known how well the encoders tell them

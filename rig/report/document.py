@@ -3,16 +3,16 @@
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.analysis.mounts import FoundMount
+from rig.analysis.gyroscope.mounts import FoundMount
 from rig.analysis.outcome import Origin, Outcome
 from rig.data.meaning import Meaning
 from rig.data.result_file import SCHEMA, CheckEntry, MountEntry, ProvenanceEntry, ResultDocument
-from rig.report.budget_entry import clock_entry
-from rig.report.elsewhere_entries import unsolved
+from rig.report.entries.budget import clock_entry
+from rig.report.entries.external import unsolved
+from rig.report.entries.omitted import notes, omitted
 from rig.report.entry import entry
-from rig.report.kinds.kind import Without
+from rig.report.findings.kind import Without
 from rig.report.kinds.registry import kinds
-from rig.report.omitted import notes, omitted
 
 ALWAYS = ("gyroscopes", "verification")  # there of every run, if only to say that there are none
 

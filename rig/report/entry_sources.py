@@ -12,53 +12,50 @@ from typing import Final
 from pydantic import BaseModel
 
 from firmware_host.answers import BoardSolution
-from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.alignment import RelativeRotation
-from rig.analysis.attitudes import InAttitudes
-from rig.analysis.calibration import SensorResult
 from rig.analysis.check import Check
 from rig.analysis.clock import ClockCheck, ClockComparison
-from rig.analysis.comparison import Comparison, Deviation, RevolutionError
-from rig.analysis.increments import InIncrements
-from rig.analysis.magnetic_field import MagnetometerResult
-from rig.analysis.onboard_check import Agreement
+from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.external.attitudes import InAttitudes
+from rig.analysis.external.increments import InIncrements
+from rig.analysis.gyroscope.alignment import RelativeRotation
+from rig.analysis.gyroscope.calibration import SensorResult
+from rig.analysis.gyroscope.comparison import Comparison, Deviation, RevolutionError
+from rig.analysis.gyroscope.onboard_check import Agreement
+from rig.analysis.gyroscope.verification import Verification
 from rig.analysis.read_when import When
+from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.analysis.reference.triad import Triad
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
-from rig.analysis.told_from import ToldFrom
-from rig.analysis.triad import Triad
-from rig.analysis.verification import Verification
-from rig.data import accelerometer_entries as accelerometer
-from rig.data import attitude_entries as attitude
-from rig.data import budget_entries as budget
-from rig.data import hand_entries as hand
-from rig.data import magnetometer_entries as magnetometer
 from rig.data import result_file as result
-from rig.data import result_types as shared
-from rig.data import temperature_entries as temperature
-from rig.data.earth_rate_entries import EarthRateEntry
-from rig.data.events import BoardSolved
-from rig.data.motion_file import Item
-from rig.data.recorded_sensor import RecordedSensor
-from rig.estimation.bias_process import BiasProcess
-from rig.estimation.budget import Budget, Contributor
+from rig.data.entries import accelerometer, budget, magnetometer, temperature
+from rig.data.entries import by_hand as hand
+from rig.data.entries import external as attitude
+from rig.data.entries import result_types as shared
+from rig.data.entries.earth_rate import EarthRateEntry
+from rig.data.recording.events import BoardSolved
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.by_hand.solution import MoveFound, RestFound
-from rig.estimation.earth_rate import EarthRate
-from rig.estimation.estimate import Estimate
-from rig.estimation.imu import ImuSolution
-from rig.estimation.known_increments import KnownIncrements
-from rig.estimation.known_turns import TurnedSolution
-from rig.estimation.magnetometer import FieldDrift, Uniformity
-from rig.estimation.nonlinearity import Nonlinearity
-from rig.estimation.over_temperature import Line, OverTemperature
-from rig.estimation.reversal import Reversal
+from rig.estimation.external.known_increments import KnownIncrements
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.gyroscope.earth_rate import EarthRate
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.nonlinearity import Nonlinearity
+from rig.estimation.gyroscope.vector_model import VectorSolution
+from rig.estimation.reference.imu import ImuSolution
+from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
+from rig.estimation.reference.reversal import Reversal
+from rig.estimation.reference.triaxial import TriaxialSolution
+from rig.estimation.statistics.bias_process import BiasProcess
+from rig.estimation.temperature.over_temperature import Line, OverTemperature
 from rig.estimation.triads import Alignment
-from rig.estimation.triaxial import TriaxialSolution
-from rig.estimation.vector_model import VectorSolution
-from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
-from rig.observation.mean import Held, Mean
+from rig.observation.external.omitted import Omitted
 from rig.observation.observe import Observation
-from rig.observation.omitted import Omitted
+from rig.observation.reference.acceleration import DwellReading
+from rig.observation.statistics.mean import Held, Mean
 from rig.observation.timebase import TimeBase
 
 

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from rig.analysis.calibration import SensorResult
+from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.outcome import Outcome
-from rig.config.written_file import write_new
+from rig.config.files.written_file import write_new
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
-from rig.estimation.vector_model import VectorSolution
-from rig.report.kinds.kind import said
+from rig.estimation.gyroscope.vector_model import VectorSolution
+from rig.report.findings.kind import said
 from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 

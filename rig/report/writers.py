@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
-from rig.config.written_file import placed_together
+from rig.config.files.written_file import placed_together
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
-from rig.report.kinds.kind import Without
+from rig.report.findings.kind import Without
 from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
@@ -22,7 +22,7 @@ WRITERS: Sequence[str] = (
 
 
 class Writer(Protocol):
-    """Writes files of its own into the run folder, by `rig.config.written_file`; returns what to tell of it.
+    """Writes files of its own into the run folder, by `rig.config.files.written_file`; returns what to tell of it.
 
     `outcome` has everything the analysis found, curves too; `document` is what `result.json` will say of it.
     """

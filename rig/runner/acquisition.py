@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import RATE, Scalar
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunRecorder
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunRecorder
 from rig.motion.state import State
 from rig.runner.settling import Settling
 from rig.station.events import SensorSamples

@@ -7,36 +7,36 @@ from functools import partial
 from pathlib import Path
 
 from firmware_host.client import Calibration
-from rig.analysis.shortest import wanted_by
+from rig.analysis.design.shortest import wanted_by
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
-from rig.config.procedure_sections import SixObservationSection, ThermalSection
-from rig.data.provenance import Provenance, calls_itself_simulated, provenance_of
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.recorded_turner import RecordedTurner
-from rig.data.run_file import RunRecorder
+from rig.config.procedures.procedure_sections import SixObservationSection, ThermalSection
+from rig.data.recording.provenance import Provenance, calls_itself_simulated, provenance_of
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_turner import RecordedTurner
+from rig.data.recording.run_file import RunRecorder
+from rig.data.recording.settings import RunSettings
+from rig.data.recording.thermal_events import SetMeasured
 from rig.data.run_folder import ARM_LOG, refuse_links
-from rig.data.settings import RunSettings
-from rig.data.thermal_events import SetMeasured
 from rig.errors import Refused
 from rig.motion.state import Made, Report
 from rig.motion.steps import Plan
-from rig.observation.hand_runs import told_of
+from rig.observation.by_hand.runs import told_of
+from rig.plans.motions.temperature_course import Course
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
-from rig.plans.temperature_course import Course
 from rig.runner.acquisition import Acquisition
 from rig.runner.ahead import Connecting
-from rig.runner.by_hand import HandSession
+from rig.runner.board.host_correction import HostCorrected, correcting
+from rig.runner.board.onboard import BoardCalibration
+from rig.runner.board.sensors import BoardSource, board_source
+from rig.runner.by_hand.session import HandSession
 from rig.runner.ending_early import EndingEarly
-from rig.runner.host_correction import HostCorrected, correcting
 from rig.runner.mounted import Memory, mounted
-from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
-from rig.runner.sensors import BoardSource, board_source
 from rig.runner.warming import Warming
 from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource

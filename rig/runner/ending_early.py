@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.analysis.reached import reached_so_far
-from rig.analysis.shortest import Reached, Wanted
-from rig.data.run_file import RunData, read_run
+from rig.analysis.design.reached import reached_so_far
+from rig.analysis.design.shortest import Reached, Wanted
+from rig.data.recording.run_file import RunData, read_run
 from rig.errors import RigError
 from rig.motion.state import Joints
 from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, Sweep, Transfer

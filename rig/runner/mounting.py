@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import nearest_face

@@ -10,19 +10,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rig.analysis.calibration import SensorResult
-from rig.analysis.onboard_check import check_observed
+from rig.analysis.gyroscope.calibration import SensorResult
+from rig.analysis.gyroscope.onboard_check import check_observed
 from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
-from rig.data.run_file import RunData, make_plain, read_run
+from rig.data.recording.run_file import RunData, make_plain, read_run
+from rig.data.recording.settings import RunSettings, settings_of
 from rig.data.run_folder import next_recording, recordings, resuming
-from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, ProblemError, Refused
 from rig.motion.steps import Plan
-from rig.observation.acceleration import DwellReading
-from rig.observation.mean import Held, QuantityInDwell, ReadAtRest
+from rig.observation.reference.acceleration import DwellReading
+from rig.observation.statistics.mean import Held, QuantityInDwell, ReadAtRest
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script

@@ -14,7 +14,8 @@ import numpy as np
 
 from rig.config.models import TurnerSection
 from rig.config.section import Vector3
-from rig.data.events import (
+from rig.data.quantity import RATE
+from rig.data.recording.events import (
     DwellFinished,
     DwellStarted,
     Event,
@@ -23,9 +24,8 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.quantity import RATE
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunRecorder
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunRecorder
 from rig.errors import Fault, Refused, refuse
 from rig.estimation.arrays import Array
 from rig.motion.geometry import DenavitHartenberg, flange_attitude, flange_axes
@@ -35,7 +35,8 @@ from rig.motion.steps import Dwell, Motion, Plan, Rest, Stage, Step, Sweep, Tran
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
-from rig.runner.by_hand import HandSession
+from rig.runner.board.onboard import BoardCalibration
+from rig.runner.by_hand.session import HandSession
 from rig.runner.ending_early import EndingEarly
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.mounting import (
@@ -45,7 +46,6 @@ from rig.runner.mounting import (
     refuse_turning_otherwise,
     refuse_unsteady,
 )
-from rig.runner.onboard import BoardCalibration
 from rig.runner.warming import Warming, range_not_reached
 from rig.sensors.source import SampleSource
 from rig.station.confirm import NOT_AGREED

@@ -16,11 +16,11 @@ from rig.board.crystal import follows_crystal
 from rig.board.identify import refusing
 from rig.config.models import SensorsConfig
 from rig.data.quantity import of_news
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import SensorCount
-from rig.runner.sensors import BoardSource, board_source
+from rig.runner.board.sensors import BoardSource, board_source
 from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples

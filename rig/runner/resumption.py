@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rig.analysis.contradictions import disturbed_sweeps
-from rig.data.provenance import Provenance
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData
-from rig.data.settings import RunSettings
+from rig.analysis.consistency.contradictions import disturbed_sweeps
+from rig.data.recording.provenance import Provenance
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
 from rig.observation.onboard_window import observed_sweeps
 from rig.observation.steps_that_count import sound_dwells, sound_sweeps

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 
 SPAN_S = 0.5  # of readings that are looked at, all of them after the motion

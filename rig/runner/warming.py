@@ -13,12 +13,12 @@ import numpy as np
 from firmware_host.client import Board
 from firmware_host.protocol import HEATER_LIMIT_C
 from rig.board.identify import refusing
-from rig.config.procedure_sections import ThermalSection
-from rig.data.events import Event
+from rig.config.procedures.procedure_sections import ThermalSection
 from rig.data.quantity import TEMPERATURE
-from rig.data.thermal_events import SetMeasured, TemperatureWanted
+from rig.data.recording.events import Event
+from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.errors import Fault, ProblemError, Refused
-from rig.plans.temperature_course import Course, Ramp
+from rig.plans.motions.temperature_course import Course, Ramp
 from rig.runner.acquisition import Acquisition
 
 LOOK_S = 0.25  # between two looks, and two words to the heater

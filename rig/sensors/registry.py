@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol
 
-from rig.config.sensor_sections import SensorSection
-from rig.data.recorded_sensor import RecordedSensor
+from rig.config.sensors.sensor_sections import SensorSection
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775 import source as kvh1775
 from rig.sensors.lines import source as lines

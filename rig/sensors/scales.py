@@ -1,8 +1,8 @@
 """Scales of readings that come as fractions: a sample holds whole numbers, far finer than what was sent. Pure."""
 
-from rig.config.stated_temperature import StatedTemperatureSection
-from rig.data.channel import Channel, of_stated_temperature, of_three_axes
+from rig.config.sensors.stated_temperature import StatedTemperatureSection
 from rig.data.quantity import Quantity
+from rig.data.recording.channel import Channel, of_stated_temperature, of_three_axes
 
 FULL_SCALE_COUNTS = 1 << 30  # half of what 32 bits hold, and finer than a float of single precision near the end
 DEGREES_PER_COUNT = 0.01

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 
 # A sensor's name, and samples (n,) of the type its description says; called on the source's thread.
 OnSamples = Callable[[str, NDArray[Any]], None]

@@ -2,7 +2,7 @@
 
 from math import degrees
 
-from rig.data.hand_events import (
+from rig.data.recording.hand_events import (
     HandAsked,
     HandBegunAnew,
     HandMoveRefused,

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from firmware_host.client import BoardIdentity
 from rig.analysis.check import Check
-from rig.data.events import Event
+from rig.data.recording.events import Event
 from rig.errors import RigError
 from rig.motion.state import Report, State
 from rig.motion.steps import Plan, Step
-from rig.observation.mean import ReadAtRest
 from rig.observation.observe import Observation
+from rig.observation.statistics.mean import ReadAtRest
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,9 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from rig.data.hand_events import HandAsked
 from rig.data.installed_kinds import measured
 from rig.data.quantity import of_news
+from rig.data.recording.hand_events import HandAsked
 from rig.errors.quoting import printable_lines
 from rig.station.by_hand_words import live_rows
 from rig.station.events import HandSeen, Progress, RunEvent, SamplesTaken, SensorSamples

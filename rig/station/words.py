@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from traceback import format_exception
 
 from firmware_host.installation import install_command
-from rig.data.thermal_events import SetMeasured, TemperatureWanted
+from rig.data.recording.thermal_events import SetMeasured, TemperatureWanted
 from rig.motion.doubts import doubts
 from rig.station.by_hand_words import by_hand_line
 from rig.station.events import (

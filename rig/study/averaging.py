@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.six_observation import design
+from rig.estimation.gyroscope.six_observation import design
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.batch import algorithm_1_batch
-from rig.estimation.levenberg_marquardt import solve_levenberg_marquardt
-from rig.estimation.six_observation import PARAMETERS
+from rig.estimation.gyroscope.batch import algorithm_1_batch
+from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt
+from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

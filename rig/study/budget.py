@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import flicker_covariance
-from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED
-from rig.estimation.own_errors import KnownSensor
-from rig.estimation.six_observation import PARAMETERS
-from rig.estimation.vector_fit import Seen, centripetal_m_s2, explain
-from rig.estimation.vector_model import solve_vector_model
+from rig.estimation.gyroscope.budget import Unknown, budget
+from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED, SQUARE_MISSED
+from rig.estimation.gyroscope.own_errors import KnownSensor
+from rig.estimation.gyroscope.six_observation import PARAMETERS
+from rig.estimation.gyroscope.vector_fit import Seen, centripetal_m_s2, explain
+from rig.estimation.gyroscope.vector_model import solve_vector_model
+from rig.estimation.statistics.bias_process import flicker_covariance
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
 

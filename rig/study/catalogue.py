@@ -12,7 +12,8 @@ from rig.study.report import Report, Settings
 class Entry:
     """A study: what it shows, the function `module:name` that makes it, and the processor time that takes, s.
 
-    That is what `python benchmarks/studies.py` said last, of one core and of one machine; None where nobody has asked.
+    That is what `python benchmarks/solving/studies.py` said last, of one core and of one machine; None where nobody has
+    asked.
     """
 
     summary: str

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import KnownNorm
-from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
+from rig.estimation.reference.reference_model import KnownNorm
+from rig.estimation.reference.triaxial import TriaxialSolution, solve_triaxial
 from rig.study import rate_table as rt
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import KnownVector
-from rig.estimation.triaxial import solve_triaxial
+from rig.estimation.reference.reference_model import KnownVector
+from rig.estimation.reference.triaxial import solve_triaxial
 from rig.study import rate_table as rt
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

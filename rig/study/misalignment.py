@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.batch import BatchSolution, newton_batch
-from rig.estimation.vector_model import VectorBatch, solve_vector_batch
+from rig.estimation.gyroscope.batch import BatchSolution, newton_batch
+from rig.estimation.gyroscope.vector_model import VectorBatch, solve_vector_batch
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import KnownNorm
-from rig.estimation.triaxial import solve_triaxial
+from rig.estimation.reference.reference_model import KnownNorm
+from rig.estimation.reference.triaxial import solve_triaxial
 from rig.study.report import table
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.batch import newton_batch
-from rig.estimation.six_observation import PARAMETERS
+from rig.estimation.gyroscope.batch import newton_batch
+from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.study import simulation as sim
 from rig.study.report import Columns, Finding, Report, Settings
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.batch import newton_batch
+from rig.estimation.gyroscope.batch import newton_batch
 from rig.study import simulation as sim
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from rig.world.laboratory import Laboratory
-from rig.world.ur10e import dashboard_server, script_socket
+from rig.world.ur10e.interfaces import dashboard_server, script_socket
 from rig.world.ur10e.modes import RobotMode
 from rig.world.ur10e.robot import Robot
 

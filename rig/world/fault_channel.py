@@ -48,11 +48,11 @@ from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.instruments import Place
 from rig.world.laboratory import Laboratory
+from rig.world.on_arm import OnArm
 from rig.world.servo.bench import ServoBench
 from rig.world.servo.drive import Faults
 from rig.world.servo.wire_format import WRITE, Packet
 from rig.world.ur10e.faults import AtProgramStart
-from rig.world.ur10e.on_arm import OnArm
 
 Reply = dict[str, Any]
 SHOWN = (

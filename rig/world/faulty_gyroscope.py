@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from firmware_host.emulator.gyroscope import Gyroscope
-from rig.config.world_faulty import SimulatedFaultySection
+from firmware_host.emulator.parts.gyroscope import Gyroscope
+from rig.config.world.faulty import SimulatedFaultySection
 
 
 class FrozenGyroscope:

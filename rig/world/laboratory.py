@@ -6,12 +6,12 @@ from weakref import WeakSet
 
 import numpy as np
 
+from firmware_host.emulator.chip.spi_device import Fault, SpiDevice
 from firmware_host.emulator.machine import EmulatedBoard
-from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import ArmSection, RigConfig
-from rig.config.servo_section import ServoSection
-from rig.config.stage_section import mount_matrix
-from rig.config.world_models import SimulatedPartSection, WorldSection
+from rig.config.procedures.servo_section import ServoSection
+from rig.config.procedures.stage_section import mount_matrix
+from rig.config.world.laboratory import SimulatedPartSection, WorldSection
 from rig.world.autopilot.mounting import autopilot_mounts
 from rig.world.board.flash_file import flash_of
 from rig.world.board.heat import HeatedBody
@@ -23,11 +23,11 @@ from rig.world.instruments import Place
 from rig.world.kvh1775.mounting import mounts
 from rig.world.lines.mounting import printer_mounts
 from rig.world.magnetic_field import magnetic_field_of
+from rig.world.on_arm import OnArm
 from rig.world.operator import Operator
 from rig.world.servo.bench import ServoBench
 from rig.world.turning import Turning
-from rig.world.ur10e.flange_motion import Felt
-from rig.world.ur10e.on_arm import OnArm
+from rig.world.ur10e.motion.flange_motion import Felt
 from rig.world.ur10e.robot import Robot
 
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, radians, sin, sqrt
 
-from rig.config.world_magnetism import IronSection
-from rig.config.world_models import SiteSection
+from rig.config.world.laboratory import SiteSection
+from rig.config.world.magnetism import IronSection
 from rig.world.site import Vector, in_base
-from rig.world.ur10e.forward_kinematics import Rotation, turned
-from rig.world.ur10e.links import LINKS
+from rig.world.ur10e.motion.forward_kinematics import Rotation, turned
+from rig.world.ur10e.motion.links import LINKS
 
 MU_0_OVER_4_PI = 1e-7  # T m/A
 MICROTESLA_T = 1e-6

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from rig.config.world_models import WorldSection
+from rig.config.world.laboratory import WorldSection
 from rig.world.clock import TICK_S
 from rig.world.hand.habits import FACES, Action, Face, Flip, Habits, Mistake, Turn
 from rig.world.hand.hand import Hand
 from rig.world.magnetic_field import Frames
 from rig.world.site import site_of
-from rig.world.ur10e.flange_motion import Components, Felt
-from rig.world.ur10e.forward_kinematics import Vector
+from rig.world.ur10e.motion.flange_motion import Components, Felt
+from rig.world.ur10e.motion.forward_kinematics import Vector
 
 BESIDE_S = 5e-4  # on either side of a moment, for how its rate changes
 OF_ONE = {"short": "turn", "two_turns": "turn", "other_way": "turn", "wrong_face": "lay"}  # of others both

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
 from rig.config.models import ArmSection, RigConfig, TurnerSection
-from rig.config.world_models import SimulatedArmSection, WorldSection
+from rig.config.world.laboratory import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import PATIENCE_S, Clock
@@ -28,7 +28,7 @@ from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
 from rig.world.servo.bench import BEHIND_S, ServoBench
-from rig.world.ur10e import dashboard_server, primary, robot_api, rtde, script_socket
+from rig.world.ur10e.interfaces import dashboard_server, primary, robot_api, rtde, script_socket
 from rig.world.ur10e.robot import Robot
 
 if TYPE_CHECKING:

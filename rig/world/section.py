@@ -3,7 +3,7 @@
 import yaml
 
 from rig.config.load import Loaded
-from rig.config.world_models import WorldSection
+from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
 
 

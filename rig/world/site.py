@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import cos, radians, sin
 
-from rig.config.world_models import SiteSection
+from rig.config.world.laboratory import SiteSection
 
 EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84: against the stars, not the sun
 

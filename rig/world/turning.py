@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from rig.world.magnetic_field import Frames
-from rig.world.ur10e.flange_motion import Components, Felt
+from rig.world.ur10e.motion.flange_motion import Components, Felt
 
 
 class Turning(Protocol):

@@ -7,10 +7,10 @@ import pytest
 
 from rig.analysis.at_rest import AtRest, at_rest
 from rig.data.quantity import RATE
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.errors import Fault
-from rig.estimation.allan import Read
-from support.synthetic_run import SENSITIVITY, Setup, synthetic_run
+from rig.estimation.statistics.allan import Read
+from support.recordings.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 NOISE_RAD_S = 0.01
 SETUP = Setup(rest_s=20.0, speed_deg_s=150, noise_rad_s=NOISE_RAD_S)

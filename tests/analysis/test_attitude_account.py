@@ -4,7 +4,7 @@ from math import sqrt
 
 import pytest
 
-from rig.analysis.attitude_account import AttitudeAccount, attitude_account
+from rig.analysis.design.attitude_account import AttitudeAccount, attitude_account
 from rig.config.load import load
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed

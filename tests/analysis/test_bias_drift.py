@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rig.analysis.bias_drift import SLOPE, BiasDrift, Stand, acceleration_drift, rate_drift
-from rig.data.settings import Site
+from rig.analysis.temperature.bias_drift import SLOPE, BiasDrift, Stand, acceleration_drift, rate_drift
+from rig.data.recording.settings import Site
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import BIAS, covariance_bound, whitening
+from rig.estimation.reference.reference_model import BIAS, covariance_bound, whitening
 from rig.study import rate_table as rt
 
 SEEDS = 30

@@ -10,11 +10,11 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.clock import check_clock
 from rig.analysis.verdict import clock_checks
-from rig.data.run_file import RunData
-from rig.observation.arm_clock import state_jitter
+from rig.data.recording.run_file import RunData
+from rig.observation.consistency.arm_clock import state_jitter
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import NOMINAL_DRIFT
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 PPM = 1e-6
 KNOWN = synthetic_run(Setup()).settings.stated_uncertainty  # 50, 1 and 20 ppm

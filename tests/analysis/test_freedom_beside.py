@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.freedom_beside import of_acceleration_angles, of_angles
-from rig.estimation.budget import NOISE, WANDERING, Budget
-from rig.estimation.reference_budget import ATTITUDES
+from rig.estimation.gyroscope.budget import NOISE, WANDERING, Budget
+from rig.estimation.reference.reference_budget import ATTITUDES
 from rig.plans.recorded import judged, open_run
 from support.paths import RECORDINGS
 

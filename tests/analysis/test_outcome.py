@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from rig.analysis.analyses import calibrate, verify_calibration, verify_stored_calibrations
-from rig.data.run_file import RunData, read_run
+from rig.data.recording.run_file import RunData, read_run
 from rig.errors import Fault, Refused
-from rig.estimation.vector_fit import explain
-from rig.observation.arm_motion import ArmMotion
+from rig.estimation.gyroscope.vector_fit import explain
+from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
 from rig.observation.timebase import estimate_time_base
 from support.paths import RECORDINGS

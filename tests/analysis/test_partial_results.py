@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from rig.analysis.partial_results import so_far
-from rig.data.events import SweepFinished
-from rig.data.run_file import RunData
+from rig.data.recording.events import SweepFinished
+from rig.data.recording.run_file import RunData
 from rig.errors.attempts import Attempts
-from rig.estimation.vector_model import VectorSolution
-from rig.observation.arm_motion import motion_of
+from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.average import on_the_arms_clock
+from rig.observation.motion.arm_motion import motion_of
 from rig.observation.windows import swept
-from support.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
+from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")

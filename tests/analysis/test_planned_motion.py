@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from rig.analysis.planned_motion import planned_attitude, planned_motion, planned_run, planned_turn, timed, timed_of
+from rig.analysis.design.planned_motion import (
+    planned_attitude,
+    planned_motion,
+    planned_run,
+    planned_turn,
+    timed,
+    timed_of,
+)
 from rig.config.load import load
 from rig.motion.geometry import NOMINAL
 from rig.motion.steps import Rest, Sweep

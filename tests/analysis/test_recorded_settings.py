@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 
 from rig.analysis.analyses import calibrate
-from rig.data.run_file import RunData, read_run
+from rig.data.recording.run_file import RunData, read_run
 from support.paths import RECORDINGS
 
 RECORDING = RECORDINGS / "six_observation" / "run.h5"

@@ -7,16 +7,25 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
-from rig.analysis.over_temperature import taken_to_reference
+from rig.analysis.temperature.over_temperature import taken_to_reference
 from rig.data.quantity import ACCELERATION, RATE
-from rig.data.run_file import RunData
-from rig.data.settings import settings_from_json
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import settings_from_json
 from rig.observation.observed_run import observe_runs
 from rig.observation.windows import Window
 from rig.plans.recorded import open_run
 from rig.report.document import document_of
 from support.paths import RECORDINGS
-from support.synthetic_run import BIAS_RAD_S, SENSITIVITY, Motion, Setup, readings, run_data, sample_times, true_rate
+from support.recordings.synthetic_run import (
+    BIAS_RAD_S,
+    SENSITIVITY,
+    Motion,
+    Setup,
+    readings,
+    run_data,
+    sample_times,
+    true_rate,
+)
 
 REFERENCE_C = 25.0
 SETUP = Setup(repeats=6, noise_rad_s=0.002, mounting_error_rad=(0.0, 0.0, 0.0))

@@ -7,9 +7,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.check import Check
+from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.analysis.temperature.bias_drift import BiasDrift
 from rig.analysis.verdict import (
     acceleration_checks,
     drift_checks,
@@ -17,13 +17,13 @@ from rig.analysis.verdict import (
     verdict,
     verification_checks,
 )
-from rig.config.judged_by import DecisionRule
-from rig.config.limits import Limits
+from rig.config.judging.judged_by import DecisionRule
+from rig.config.judging.limits import Limits
 from rig.data.meaning import Meaning
 from rig.data.quantity import RATE
-from rig.estimation.accumulator import Solution
-from rig.estimation.bias_by_repeat import BiasByRepeat
-from rig.estimation.budget import Budget, Contributor
+from rig.estimation.gyroscope.accumulator import Solution
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.temperature.bias_by_repeat import BiasByRepeat
 
 LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
 BIAS = Meaning("conformity", "gyro", "rate", "bias")

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate
-from rig.analysis.calibration import observe_recordings
+from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.analysis.read_when import of_gyroscope
-from rig.data.channel import of_stated_temperature
 from rig.data.quantity import TEMPERATURE
-from rig.data.recorded_sensor import RecordedSensor, sensor_of
-from rig.data.run_file import RunData
+from rig.data.recording.channel import of_stated_temperature
+from rig.data.recording.recorded_sensor import RecordedSensor, sensor_of
+from rig.data.recording.run_file import RunData
 from rig.motion.geometry import NOMINAL
 from rig.plans.recorded import open_run
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import Stated
 from rig.report.document import document_of
-from rig.report.validity_words import load_words, when_words
-from support.certified import LABORATORY, read
+from rig.report.words.validity_words import load_words, when_words
+from support.documents.certified import LABORATORY, read
 from support.paths import RECORDINGS
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 COUNTS_PER_K = 16
 PER_MINUTE_K = 3.0

@@ -11,10 +11,10 @@ import pytest
 
 from rig.batch.on_page import OnPage
 from rig.batch.operators import Question
-from rig.page.control import Control
-from rig.page.sections import Sections
-from rig.page.serving import Address, Page, serving
-from support.waiting import PATIENCE_S, wait_for
+from rig.page.server.control import Control
+from rig.page.server.sections import Sections
+from rig.page.server.serving import Address, Page, serving
+from support.processes.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"
 Asking = Callable[..., int]

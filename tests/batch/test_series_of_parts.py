@@ -24,15 +24,15 @@ from rig.batch.operators import Asked, Question, Terminal
 from rig.batch.parts_in_turn import Bench, Desk, Work
 from rig.batch.series import following, numbers_in
 from rig.batch.table import csv_of, page_of, summary
-from rig.commands import station
+from rig.commands.station import station
+from rig.config.judging.station_section import StationSection
 from rig.config.load import Loaded
-from rig.config.station_section import StationSection
 from rig.errors import Refused
 from rig.plans.script_file import ScriptFile
 from rig.runner.phases import Run
 from rig.station.events import Prompt
 from rig.station.station import Stations, always_yes
-from support.full_disk import full_disk
+from support.processes.full_disk import full_disk
 
 AT = "2026-11-25T08:00:00+00:00"
 BEGUN = Begun("A. Person", "W-17", AT)

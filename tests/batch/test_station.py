@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from support.commands import configuration, rig, wait_for_log
+from support.laboratories.commands import configuration, rig, wait_for_log
 
 TRAY = {"G-003": {"plugged_in": False}, "G-004": {"unique_id": "0123456789abcdef01234567"}}
 SAME = {"G-005": TRAY["G-004"]}

@@ -15,11 +15,11 @@ from rig.batch.batch import Part
 from rig.batch.on_page import on_page
 from rig.batch.operators import Asked
 from rig.batch.status import Now, Present
-from rig.page.control import STOPPED
-from rig.page.serving import Address
+from rig.page.server.control import STOPPED
+from rig.page.server.serving import Address
 from rig.station.events import Interrupted
-from support.browser import legible, needs_browser, picture, screen, text, typed
-from support.waiting import PATIENCE_S, wait_for
+from support.page.browser import legible, needs_browser, picture, screen, text, typed
+from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 

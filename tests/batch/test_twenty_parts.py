@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from support.commands import configuration
-from support.processes import descendant, grown, resident_kb
-from support.scanner import Scanner, station
-from support.station_laboratory import Laboratory
-from support.stopwatch import timed, told
-from support.waiting import PATIENCE_S, alive, wait_for
-from support.warm import of_system
+from support.laboratories.commands import configuration
+from support.laboratories.scanner import Scanner, station
+from support.laboratories.station_laboratory import Laboratory
+from support.processes.stopwatch import timed, told
+from support.processes.system import descendant, grown, resident_kb
+from support.processes.waiting import PATIENCE_S, alive, wait_for
+from support.processes.warm import of_system
 
 PARTS = 20
 GROWTH = 0.02

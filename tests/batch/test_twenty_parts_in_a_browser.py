@@ -7,13 +7,13 @@ import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
-from support.browser import needs_browser, picture, text, typed
-from support.command_with_a_page import with_a_page
-from support.commands import configuration, wait_for_log
-from support.processes import grown, resident_kb
-from support.station_laboratory import Laboratory
-from support.stopwatch import timed, told
-from support.waiting import PATIENCE_S, wait_for
+from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.commands import configuration, wait_for_log
+from support.laboratories.station_laboratory import Laboratory
+from support.page.browser import needs_browser, picture, text, typed
+from support.processes.stopwatch import timed, told
+from support.processes.system import grown, resident_kb
+from support.processes.waiting import PATIENCE_S, wait_for
 
 PARTS = 20
 GROWTH = 0.02

@@ -14,21 +14,21 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.commands.claims import claimed_arm, claimed_board, claimed_sensor
-from rig.commands.own_address import own_address
+from rig.commands.laboratory.claims import claimed_arm, claimed_board, claimed_sensor
+from rig.commands.laboratory.own_address import own_address
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
-from support.commands import rig
+from support.laboratories.commands import rig
+from support.laboratories.worlds import World, fresh_host, hardware
 from support.paths import DEMO, ROOT
-from support.warm import started
-from support.worlds import World, fresh_host, hardware
+from support.processes.warm import started
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are names of Linux' kernel")
 
 HOLD = """
 import sys
-from rig.commands.claims import claimed_arm
+from rig.commands.laboratory.claims import claimed_arm
 with claimed_arm(sys.argv[1]):
     print(flush=True)
     sys.stdin.read()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from support.paths import DOCS, ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 CONFIG = ROOT / "configs" / "ci.yaml"
 PLAN = f"{sys.executable} -m rig plan {CONFIG}"
@@ -179,7 +179,15 @@ class First:
 sys.stdout = sys.stderr = First()
 main(sys.argv[1:])
 """
-LATER = {"h5py", "jinja2", "scipy", "serial", "rig.analysis.judging", "rig.analysis.planned", "rig.runner.phases"}
+LATER = {
+    "h5py",
+    "jinja2",
+    "scipy",
+    "serial",
+    "rig.analysis.judging",
+    "rig.analysis.design.planned",
+    "rig.runner.phases",
+}
 LATER |= {"rig.report.certificate.page", "rig.report.kinds.registry"}
 
 

@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from rig.config.load import load
-from support.commands import CI, rig_here
-from support.worlds import fresh_host
+from support.laboratories.commands import CI, rig_here
+from support.laboratories.worlds import fresh_host
 
 
 def interrupted_run(tmp_path: Path, servers: list[socket.socket]) -> tuple[Path, list[str]]:

@@ -13,9 +13,9 @@ import rig
 from rig.cli import main
 from rig.errors import Refused
 from rig.motion.steps import Rest
+from support.laboratories.worlds import World, hardware
 from support.paths import CONFIGS, DEMO, RECORDINGS
-from support.waiting import PATIENCE_S
-from support.worlds import World, hardware
+from support.processes.waiting import PATIENCE_S
 
 
 @pytest.mark.slow

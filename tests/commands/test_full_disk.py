@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.data import run_file
-from rig.data.layout import lay_out
-from rig.data.run_file import read_run
+from rig.data.recording import run_file
+from rig.data.recording.layout import lay_out
+from rig.data.recording.run_file import read_run
 from rig.errors import Refused
-from rig.history import engine
+from rig.history.storage import engine
 from rig.history.store import open_history
 from rig.report.exports.formats import OF_READINGS, writer_of_readings
 from rig.report.exports.recorded import exported
 from rig.runner.readings import ReadingsFile
-from support.commands import rig_here
-from support.full_disk import full_disk
+from support.laboratories.commands import rig_here
 from support.paths import RECORDINGS, ROOT
+from support.processes.full_disk import full_disk
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 WHILE_LOADING = """
 import os, signal, sys
@@ -23,7 +23,7 @@ sys.exit(rig.__main__.main())
 """
 
 
-@pytest.mark.parametrize("module", ["rig.cli", "argparse", "rig.station.plain_text", "rig.commands.show"])
+@pytest.mark.parametrize("module", ["rig.cli", "argparse", "rig.station.plain_text", "rig.commands.documents.show"])
 def test_a_command_that_still_loads_ends_with_one_line(module: str) -> None:
     command = [sys.executable, "-c", WHILE_LOADING.format(module=module)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=os.environ, check=False)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from rig.commands.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory import simulated_laboratory
 from rig.errors import Refused
-from support.commands import rig
+from support.laboratories.commands import rig
+from support.laboratories.worlds import World
 from support.paths import DEMO
-from support.worlds import World
 
 
 @pytest.mark.thorough

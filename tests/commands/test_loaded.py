@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rig.history.store import open_history
-from support.past_runs import finished
+from support.history.past_runs import finished
 from support.paths import DEMO, RECORDINGS
 
 # What takes long to load: the recordings' library, the solver's, the arm's client, plots, the page's server.
@@ -76,6 +76,7 @@ def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None
 
 
 def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_configurations() -> None:
-    command = "import rig.turners.ur.child, sys; print([n for n in ('pydantic', 'yaml', 'scipy') if n in sys.modules])"
+    libraries = ("pydantic", "yaml", "scipy")
+    command = f"import rig.turners.ur.child.process, sys; print([n for n in {libraries} if n in sys.modules])"
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.emulator.flash_memory import FlashMemory
+from firmware_host.emulator.chip.flash_memory import FlashMemory
 from rig.world.board.flash_file import flash_of
-from support.commands import configuration, rig_here
+from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS
-from support.waiting import PATIENCE_S, alive, wait_for
-from support.warm import started
+from support.processes.waiting import PATIENCE_S, alive, wait_for
+from support.processes.warm import started
 
 WRITTEN = ("certificate.html", "calibration.h", "result.json")
 

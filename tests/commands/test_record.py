@@ -10,20 +10,20 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.cli import main
-from rig.commands.laboratory import simulated_laboratory
+from rig.commands.laboratory.laboratory import simulated_laboratory
 from rig.motion.carried import Carried
 from rig.motion.geometry import flange_attitude, flange_rate
 from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration, travel
 from rig.turners.ur.driver import Arm
-from support.commands import rig_here
-from support.ideal import ideal_document
+from support.laboratories.commands import rig_here
+from support.laboratories.ideal import ideal_document
+from support.laboratories.worlds import fresh_host, hardware, merge
 from support.paths import CONFIGS
-from support.waiting import PATIENCE_S
-from support.warm import started
-from support.worlds import fresh_host, hardware, merge
+from support.processes.waiting import PATIENCE_S
+from support.processes.warm import started
 
-KVH = CONFIGS / "kvh1775.yaml"
+KVH = CONFIGS / "own_port" / "kvh1775.yaml"
 DURATION_S = 28.0
 WAYS = ((0, 0, 2), (0, -2, 0), (2, 0, 0), (0, 1.5, -2), (-2, 0.5, 0))  # of the wrists, rad
 COLUMNS = "start_s,end_s,qw,qx,qy,qz,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rig.config.layers import FILES_MAX, merge
+from rig.config.files.layers import FILES_MAX, merge
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.world.section import world_section

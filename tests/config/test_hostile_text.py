@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from rig.config.files.yaml_text import DEPTH_MAX, SIZE_MAX_BYTES
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.config.yaml_text import DEPTH_MAX, SIZE_MAX_BYTES
-from support.commands import rig
+from support.laboratories.commands import rig
 from support.paths import DEMO
 
 DEMO_TEXT = DEMO.read_text(encoding="utf-8")

@@ -2,9 +2,9 @@
 
 import json
 
-from rig.config.judged_by import OF_SENSORS, ObservationKeys, UncertaintyKeys
+from rig.config.judging.judged_by import OF_SENSORS, ObservationKeys, UncertaintyKeys
 from rig.config.load import load
-from rig.data.settings import settings_from_json, settings_of
+from rig.data.recording.settings import settings_from_json, settings_of
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed
 from support.paths import CONFIGS

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from rig.config.limits import LIMITS, Limits, Need
+from rig.config.judging.limits import LIMITS, Limits, Need
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.data.settings import setting, settings_from_json, settings_of
+from rig.data.recording.settings import setting, settings_from_json, settings_of
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed
 from support.paths import CONFIGS

@@ -7,8 +7,8 @@ import yaml
 
 from rig.config import ranges
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.config.procedure_sections import SixObservationSection
-from rig.config.sensor_sections import SensorSection
+from rig.config.procedures.procedure_sections import SixObservationSection
+from rig.config.sensors.sensor_sections import SensorSection
 from rig.turners.registry import sections
 from rig.world.section import world_section
 from support.paths import CONFIGS
@@ -26,7 +26,7 @@ def demo_text(**changes: object) -> str:
     return yaml.safe_dump(document | changes, sort_keys=False)
 
 
-@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.name)
 def test_every_shipped_configuration_is_valid(path: Path) -> None:
     load(path)
 

@@ -48,7 +48,7 @@ def test_a_name_is_one_sensors() -> None:
 
 
 def test_the_magnetometer_of_a_kvh_has_a_name_too() -> None:
-    kvh = (CONFIGS / "kvh1775.yaml").read_text(encoding="utf-8")
+    kvh = (CONFIGS / "own_port" / "kvh1775.yaml").read_text(encoding="utf-8")
     taken = "sensors.kvh_field={part: adis16465, serial_number: A1}"
     told = "world.sensors.kvh_field={scale: [1, 1, 1], bias_rad_s: [0, 0, 0]}"
     board = "board.port=socket://127.0.0.8:7321"

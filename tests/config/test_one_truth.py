@@ -27,7 +27,7 @@ def truth_of(section: dict[str, Any], rate_hz: float) -> dict[str, Any]:
 def simulated() -> list[tuple[str, str, dict[str, Any]]]:
     """Of every part in every configuration that has a world: the file, part and serial number, its truth."""
     found = []
-    for path in sorted(CONFIGS.glob("*.yaml")):
+    for path in sorted(CONFIGS.rglob("*.yaml")):
         loaded = load(path)
         if not loaded.simulated:
             continue

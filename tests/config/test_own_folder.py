@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from rig.config.own_folder import own_folder
+from rig.config.files.own_folder import own_folder
 from rig.data.own_texts import is_own, note_own
 from rig.errors import Refused
-from rig.history.address import place
+from rig.history.storage.address import place
 
 NOBODY = 987_654
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.models import RigConfig
-from rig.config.procedure_sections import (
+from rig.config.procedures.procedure_sections import (
     STOCK_SECTIONS,
     ProcedureSection,
     SixObservationSection,

@@ -9,9 +9,9 @@ import pytest
 from pydantic import BaseModel
 
 from rig.config.models import ArmSection, RigConfig
-from rig.config.procedure_sections import STOCK_SECTIONS
+from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.config.reference_page import REPEAT, reference, unit_of
-from rig.config.world_models import WorldSection
+from rig.config.world.laboratory import WorldSection
 from support.paths import CONFIGS, DOCS
 
 MODELS: tuple[type[BaseModel], ...] = (RigConfig, ArmSection, WorldSection, *STOCK_SECTIONS.values())

@@ -1,7 +1,9 @@
 """Numbers that a configuration is refused by are those that its recording is judged by, where each room has its own."""
 
-from rig.config import judging_sections, procedure_sections
-from rig.estimation import earth_rate, over_temperature
+from rig.config.judging import judging_sections
+from rig.config.procedures import procedure_sections
+from rig.estimation.gyroscope import earth_rate
+from rig.estimation.temperature import over_temperature
 
 
 def test_a_configuration_is_refused_by_the_numbers_that_its_recording_would_be() -> None:

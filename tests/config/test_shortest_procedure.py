@@ -4,13 +4,13 @@ import pytest
 
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.models import ProcedureSection
-from rig.config.procedure_sections import SixObservationSection
-from rig.data.settings import settings_of
+from rig.config.procedures.procedure_sections import SixObservationSection
+from rig.data.recording.settings import settings_of
+from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.registry import installed, sections
-from rig.plans.six_sweeps import plan_six_observation
 from rig.turners import registry as turners
 from support.paths import CONFIGS
-from support.synthetic_run import CONFIG
+from support.recordings.synthetic_run import CONFIG
 
 TEXT = CONFIG.format(speed_deg_s=60, rest_s=3, repeats=8, part="lsm9ds1", procedure="", uncertainty="")
 

@@ -11,14 +11,14 @@ import pytest
 from rich.console import Console
 from rich.live import Live
 
-from rig.data.channel import Channel, of_three_axes, stamped
 from rig.data.quantity import FIELD, PRESSURE, RATE
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData, RunRecorder, read_run
+from rig.data.recording.channel import Channel, of_three_axes, stamped
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData, RunRecorder, read_run
 from rig.errors import Refused
 from rig.motion.steps import Rest
-from rig.observation.mean import even_mean
 from rig.observation.observed_run import observe_run
+from rig.observation.statistics.mean import even_mean
 from rig.page.about import About
 from rig.page.page_state import Shown
 from rig.report.exports.formats import writer_of_readings
@@ -26,7 +26,7 @@ from rig.report.exports.recorded import WithMotion
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken
 from rig.station.view import LiveView
-from support.synthetic_run import UR, Setup, synthetic_run
+from support.recordings.synthetic_run import UR, Setup, synthetic_run
 
 PRESSURE_PA = 96_480.0
 BAROMETER = RecordedSensor(

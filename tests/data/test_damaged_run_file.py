@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate
-from rig.data.layout import Contents, lay_out
-from rig.data.run_file import read_run
-from rig.data.silence import crowding
+from rig.data.processes.silence import crowding
+from rig.data.recording.layout import Contents, lay_out
+from rig.data.recording.run_file import read_run
 from rig.errors import Fault, Refused
-from support.as_nobody import as_nobody
-from support.full_disk import full_disk
 from support.paths import RECORDINGS
-from support.waiting import PATIENCE_S, alive, wait_for
+from support.processes.as_nobody import as_nobody
+from support.processes.full_disk import full_disk
+from support.processes.waiting import PATIENCE_S, alive, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("read_by_system")]
 

@@ -7,7 +7,7 @@ from types import FrameType
 
 import pytest
 
-from rig.data.ending_signals import Interrupts
+from rig.data.processes.ending_signals import Interrupts
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGUSR1"), reason="a signal of POSIX")
 

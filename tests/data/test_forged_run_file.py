@@ -15,12 +15,12 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.data.events import from_lines
-from rig.data.extract import extract, reason
-from rig.data.motion_file import MOTIONS
-from rig.data.recorded_turner import turner_of
-from rig.data.run_file import read_run
-from rig.data.settings import settings_from_json
+from rig.data.recording.events import from_lines
+from rig.data.recording.extract import extract, reason
+from rig.data.recording.motion_file import MOTIONS
+from rig.data.recording.recorded_turner import turner_of
+from rig.data.recording.run_file import read_run
+from rig.data.recording.settings import settings_from_json
 from rig.errors import Refused
 from support.paths import RECORDINGS
 
@@ -35,7 +35,7 @@ READ_AND_TELL = """
 import resource, sys
 from contextlib import suppress
 from pathlib import Path
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.errors import Refused
 with suppress(Refused):
     read_run(Path(sys.argv[1]))

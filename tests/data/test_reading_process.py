@@ -8,9 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.config.regular_file import UnfitFile
-from rig.data.reading_process import CostlyFile, ReadingLimits, UnreadableFile, limits_for, read_apart, stored_bytes
-from support.waiting import wait_for
+from rig.config.files.regular_file import UnfitFile
+from rig.data.processes.reading_process import (
+    CostlyFile,
+    ReadingLimits,
+    UnreadableFile,
+    limits_for,
+    read_apart,
+    stored_bytes,
+)
+from support.processes.waiting import wait_for
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of these limits")
 
@@ -19,8 +26,8 @@ ASLEEP = ReadingLimits(memory_bytes=400 << 20, processor_s=60.0, idle_s=1.0, wri
 READS_WITHOUT_END = """
 import sys
 from pathlib import Path
-from rig.data.reading_process import limits_for, read_apart
-read_apart("support.greedy:patience", Path(sys.argv[1]), {}, limits_for(1 << 40))
+from rig.data.processes.reading_process import limits_for, read_apart
+read_apart("support.external.greedy:patience", Path(sys.argv[1]), {}, limits_for(1 << 40))
 """
 
 
@@ -38,15 +45,15 @@ read_apart("support.greedy:patience", Path(sys.argv[1]), {}, limits_for(1 << 40)
 )
 def test_a_file_that_takes_too_much_is_given_up(tmp_path: Path, takes: str, limits: ReadingLimits, why: str) -> None:
     with pytest.raises(CostlyFile, match=why):
-        read_apart(f"support.greedy:{takes}", tmp_path, {}, limits)
+        read_apart(f"support.external.greedy:{takes}", tmp_path, {}, limits)
 
 
 @pytest.mark.usefixtures("read_by_system")
 def test_what_breaks_down_or_prints_harms_nobody(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(UnreadableFile, match="reading it ended the process"):
-        read_apart("support.greedy:crash", tmp_path, {}, LIMITS)
+        read_apart("support.external.greedy:crash", tmp_path, {}, LIMITS)
     with pytest.raises(UnreadableFile) as unreadable:
-        read_apart("support.greedy:words", tmp_path, {}, LIMITS)
+        read_apart("support.external.greedy:words", tmp_path, {}, LIMITS)
     assert len(str(unreadable.value)) < 400 and str(unreadable.value).isprintable()
     assert capfd.readouterr() == ("", "")
 

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.errors import Refused
 from support.paths import RECORDINGS
 

@@ -9,8 +9,8 @@ import pytest
 
 from rig.data.result_file import SIZE_MAX_BYTES, read_result, schema_text
 from rig.errors import Refused
+from support.documents.results import VERIFIED
 from support.paths import DOCS, RECORDINGS
-from support.results import VERIFIED
 
 RUNS = ("six_observation", "verified")
 

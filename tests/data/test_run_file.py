@@ -17,10 +17,11 @@ import pytest
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
-from rig.config.limits import Limits
+from rig.config.judging.limits import Limits
 from rig.config.load import load
-from rig.data.channel import of_thermometer, of_three_axes
-from rig.data.events import (
+from rig.data.quantity import FIELD, RATE
+from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.events import (
     BoardNotObserved,
     BoardObserved,
     BoardRecalled,
@@ -31,19 +32,18 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.quantity import FIELD, RATE
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunRecorder, make_plain, read_run
-from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings, Site, uncertainty_of
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunRecorder, make_plain, read_run
+from rig.data.recording.settings import ObservationThresholds, PlannedSweep, RunSettings, Site, uncertainty_of
 from rig.errors import Fault, Refused
 from rig.motion.state import ARM_STATE_DTYPE, ArmState
 from rig.motion.steps import Sweep
-from support.forked import forked
+from support.documents.results import VERIFIED
 from support.paths import CONFIGS, ROOT
-from support.results import VERIFIED
-from support.synthetic_run import PROVENANCE as SYNTHETIC
-from support.synthetic_run import UR
-from support.waiting import PATIENCE_S, wait_for
+from support.processes.forked import forked
+from support.processes.waiting import PATIENCE_S, wait_for
+from support.recordings.synthetic_run import PROVENANCE as SYNTHETIC
+from support.recordings.synthetic_run import UR
 
 SENSOR = RecordedSensor(
     part="lsm9ds1",

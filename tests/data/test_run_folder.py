@@ -8,8 +8,8 @@ import pytest
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
-from support.full_disk import full_disk
 from support.paths import DEMO
+from support.processes.full_disk import full_disk
 
 IDENTITY = ScriptIdentity("six_observation.py", "")
 

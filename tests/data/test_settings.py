@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from rig.config.judged_by import OF_SENSORS
+from rig.config.judging.judged_by import OF_SENSORS
 from rig.config.load import load, parse
-from rig.config.procedure_sections import SixSweepsSection
-from rig.config.sensor_catalogue import PARTS
-from rig.data.settings import RunSettings, settings_from_json, settings_of
+from rig.config.procedures.procedure_sections import SixSweepsSection
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.data.recording.settings import RunSettings, settings_from_json, settings_of
 from rig.errors import Refused
 from rig.motion.steps import Plan
-from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.motions.six_sweeps import plan_six_observation
 from support.paths import CONFIGS
 
 VERIFIED = load(CONFIGS / "lsm9ds1_adis16465.yaml").text

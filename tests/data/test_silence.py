@@ -10,8 +10,8 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from rig.data.silence import CROWDED, Silence, crowding
-from support.waiting import wait_for
+from rig.data.processes.silence import CROWDED, Silence, crowding
+from support.processes.waiting import wait_for
 
 TICK_S = 0.05
 SPARED = 10

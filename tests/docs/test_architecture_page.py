@@ -2,8 +2,11 @@
 
 import pytest
 
-from rig.data import run_file
-from rig.turners.ur import child, child_link, driver, stopping
+from rig.data.recording import run_file
+from rig.turners.ur import driver
+from rig.turners.ur.child import link as child_link
+from rig.turners.ur.child import process as child
+from rig.turners.ur.stopping import stop as stopping
 from support.house_picture import PAGE, drawn
 
 SAID = [

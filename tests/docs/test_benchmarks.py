@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
-WITH_HELP = sorted(path for path in (ROOT / "benchmarks").glob("*.py") if "argparse" in path.read_text("utf-8"))
+WITH_HELP = sorted(path for path in (ROOT / "benchmarks").glob("*/*.py") if "argparse" in path.read_text("utf-8"))
 
 HOURS = {
     "faults",
@@ -55,7 +55,7 @@ def run(benchmark: Path, folder: Path, *arguments: str) -> subprocess.CompletedP
 
 
 def test_every_benchmark_has_a_short_form_or_takes_hours() -> None:
-    assert {path.stem for path in (ROOT / "benchmarks").glob("*.py")} == {*HOURS, *SHORT, *LONGER}
+    assert {path.stem for path in (ROOT / "benchmarks").glob("*/*.py")} == {*HOURS, *SHORT, *LONGER}
 
 
 @pytest.mark.slow

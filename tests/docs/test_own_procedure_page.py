@@ -1,4 +1,4 @@
-"""The procedure that docs/how-to/own-procedure.md shows is one, and its configuration is one of it."""
+"""The procedure that docs/how-to/with-code/own-procedure.md shows is one, and its configuration is one of it."""
 
 import json
 import re
@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from support.commands import rig_here
+from support.laboratories.commands import rig_here
 from support.paths import CONFIGS, DOCS
 
 pytestmark = pytest.mark.slow
 
-PAGE = DOCS / "how-to" / "own-procedure.md"
+PAGE = DOCS / "how-to" / "with-code" / "own-procedure.md"
 
 
 def shown(language: str) -> str:

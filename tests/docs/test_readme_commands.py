@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rig
-from support.commands import rig_here
+from support.laboratories.commands import rig_here
 from support.paths import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -22,7 +22,7 @@ ELSEWHERE = {
     "make docs": "tests/docs/test_site.py",
     ". .venv/bin/activate": "the shell's own",
     "rig run configs/lsm9ds1_adis16465.yaml": "tests/runner/test_experiment.py",
-    "rig run configs/imu.yaml": "tests/runner/test_accelerometer_truth.py",
+    "rig run configs/imu.yaml": "tests/runner/reference/test_accelerometer_truth.py",
     "rig check configs/ur10e_lsm9ds1.yaml": "hardware",
     "rig run configs/ur10e_lsm9ds1.yaml": "hardware",
 }

@@ -11,8 +11,8 @@ import pytest
 
 import rig
 import rig.procedure
-from rig.config.limits import LIMITS
-from rig.report.check_words import check_words
+from rig.config.judging.limits import LIMITS
+from rig.report.words.check_words import check_words
 from support.paths import DOCS, ROOT
 
 

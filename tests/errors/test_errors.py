@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.chip.bus import Violation
 from firmware_host.errors import BoardError
 from rig.errors import Fault, Problem, ProblemError, Refused, RigError, raised_as
 

@@ -5,14 +5,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rig.config.attitude_sets import EIGHTEEN, FACES, WristAngles
+from rig.config.procedures.attitude_sets import EIGHTEEN, FACES, WristAngles
 from rig.estimation.arrays import Array
-from rig.estimation.attitude_design import Expected, Order, expected, g_efficiency, telling
-from rig.estimation.attitude_error import effects, whitening_with
-from rig.estimation.reference_model import KnownNorm, weighted_jacobian
-from rig.estimation.triaxial import solve_triaxial
-from support.arm_attitudes import attitudes_of, joints_rad
-from support.exchange_search import exchange_search, information, log_determinant
+from rig.estimation.design.attitude_design import Expected, Order, expected, g_efficiency, telling
+from rig.estimation.reference.attitude_error import effects, whitening_with
+from rig.estimation.reference.reference_model import KnownNorm, weighted_jacobian
+from rig.estimation.reference.triaxial import solve_triaxial
+from support.motions.arm_attitudes import attitudes_of, joints_rad
+from support.motions.exchange_search import exchange_search, information, log_determinant
 
 G = 9.80665
 UP = np.array([0.0, 0.0, 1.0])

@@ -5,9 +5,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
-from rig.estimation.batch import algorithm_1_batch, newton_batch
-from rig.estimation.bounds import efficiency, six_observation_bound, triaxial_bound, vector_bound, vector_matrix_bound
-from rig.estimation.optimality import (
+from rig.estimation.design.bounds import (
+    efficiency,
+    six_observation_bound,
+    triaxial_bound,
+    vector_bound,
+    vector_matrix_bound,
+)
+from rig.estimation.design.optimality import (
     PARAMETER_COUNT,
     Model,
     g_efficiency,
@@ -15,11 +20,12 @@ from rig.estimation.optimality import (
     named_designs,
     prediction_variance,
 )
-from rig.estimation.reference_model import KnownNorm, predicted
-from rig.estimation.triaxial import solve_triaxial_batch
-from rig.estimation.vector_model import solve_vector_batch, solve_vector_model
+from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
+from rig.estimation.gyroscope.vector_model import solve_vector_batch, solve_vector_model
+from rig.estimation.reference.reference_model import KnownNorm, predicted
+from rig.estimation.reference.triaxial import solve_triaxial_batch
 from rig.study.rate_table import ACCELEROMETER_MATRIX, ACCELEROMETER_REFERENCE_M_S2, ACCELEROMETER_SECOND_ORDER
-from support.rate_table import attitudes, noisy
+from support.motions.rate_table import attitudes, noisy
 
 SCALE = np.array([1.1771, 1.1554, 1.1440])
 BIAS = np.array([0.0077, -0.0100, -0.0051])

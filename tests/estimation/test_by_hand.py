@@ -10,10 +10,10 @@ from rig.errors import RigError
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand import HandSolution, Told, progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
-from rig.observation.hand_runs import NotCounted
-from rig.observation.handled import Segmenter, handled
+from rig.observation.by_hand.handled import Segmenter, handled
+from rig.observation.by_hand.runs import NotCounted
 from rig.world.hand.habits import Action, Face, Flip, Kind, Mistake, Turn
-from support.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
+from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 
 TOLD = Told(20.0, first_face="+z")
 SESSION = (*TWELVE, Turn(1), Flip("+x"), Turn(1), Flip("+y"), Turn(1))

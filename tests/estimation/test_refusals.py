@@ -8,10 +8,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rig.errors import Fault
-from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
-from rig.estimation.levenberg_marquardt import solve_levenberg_marquardt
-from rig.estimation.reference_model import KnownNorm
+from rig.estimation.gyroscope.accumulator import Accumulator
+from rig.estimation.gyroscope.levenberg_marquardt import solve_levenberg_marquardt
+from rig.estimation.gyroscope.six_observation import closed_form
+from rig.estimation.gyroscope.vector_model import solve_vector_model
+from rig.estimation.reference.reference_model import KnownNorm
+from rig.estimation.reference.triaxial import solve_triaxial
 from rig.estimation.refusals import (
     check_axes,
     check_conditioning,
@@ -21,10 +24,7 @@ from rig.estimation.refusals import (
     converging,
     inconsistency,
 )
-from rig.estimation.six_observation import closed_form
-from rig.estimation.triaxial import solve_triaxial
-from rig.estimation.vector_model import solve_vector_model
-from support.rate_table import attitudes
+from support.motions.rate_table import attitudes
 
 SPEED = np.pi / 3
 SCALE, BIAS = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])

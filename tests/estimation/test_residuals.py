@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rig.estimation.gyroscope.vector_fit import Explained, Seen, explain
 from rig.estimation.residuals import dwell_residual_std_m_s2, residual_std_rad_s
-from rig.estimation.vector_fit import Explained, Seen, explain
-from support import drawn_accelerations
+from support.recordings import drawn_accelerations
 
 SPEED_RAD_S, NOISE_RAD_S, SPEED_STD_RAD_S = 1.0, 2e-4, 1.5e-4
 MATRIX = np.array([[1.1, 0.02, 0.0], [0.0, 0.9, 0.01], [0.01, 0.0, 1.05]])

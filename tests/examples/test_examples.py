@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from support.commands import configuration, python
+from support.laboratories.commands import configuration, python
 from support.paths import CONFIGS, RECORDINGS, ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 EXAMPLES = ROOT / "examples"
 pytestmark = pytest.mark.slow

@@ -23,15 +23,15 @@ from firmware_host.frames import FrameReader, decode, encode
 from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from firmware_host.serial_port import SerialPort
-from rig.config.link_budget import Stream
-from rig.config.procedure_sections import ThermalSection
+from rig.config.procedures.procedure_sections import ThermalSection
+from rig.config.sensors.link_budget import Stream
 from rig.errors import Refused
-from rig.plans.temperature_course import Course
+from rig.plans.motions.temperature_course import Course
 from rig.runner.acquisition import Acquisition
 from rig.runner.warming import Warming
-from support.host_board import HostBoard, configured, convert, settle
-from support.waiting import PATIENCE_S, wait_for, wait_for_error
-from support.worlds import fresh_host
+from support.board.host_board import HostBoard, configured, convert, settle
+from support.laboratories.worlds import fresh_host
+from support.processes.waiting import PATIENCE_S, wait_for, wait_for_error
 
 PERIOD_US = 4202  # 238 Hz
 HOST = fresh_host()

@@ -1,10 +1,10 @@
-"""Damaged frames to both ends of the serial line; ten million to each: benchmarks/damaged_frames.py."""
+"""Damaged frames to both ends of the serial line; ten million to each: benchmarks/wire/damaged_frames.py."""
 
 from pathlib import Path
 
 import pytest
 
-from support.damaged_frames import build, to_firmware, to_host, write_sound
+from support.board.damaged_frames import build, to_firmware, to_host, write_sound
 
 pytestmark = [pytest.mark.slow, pytest.mark.thorough, pytest.mark.proof]
 FRAMES = 500_000

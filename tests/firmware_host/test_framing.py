@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from firmware_host import protocol, stuffing
 from firmware_host.frames import FrameReader, decode, encode
 from firmware_host.protocol import MESSAGES, Message
-from support.damaged_stream import carry, transmission
-from support.host_frames import CReceiver, decode_in_c, encode_in_c
+from support.board.damaged_stream import carry, transmission
+from support.board.host_frames import CReceiver, decode_in_c, encode_in_c
 from support.paths import FIRMWARE
 
 LIMITS = {
@@ -164,7 +164,7 @@ def test_the_c_structures_lie_as_the_table_says(tmp_path: Path) -> None:
             offset += size
     source = ['#include "protocol.h"', "#include <stddef.h>", "#include <stdio.h>", "int main(void) {", *prints, "}"]
     (tmp_path / "layout.c").write_text("\n".join(source))
-    subprocess.run(["gcc", "-I", FIRMWARE / "core", "-o", "layout", "layout.c"], cwd=tmp_path, check=True)
+    subprocess.run(["gcc", "-I", FIRMWARE / "core" / "link", "-o", "layout", "layout.c"], cwd=tmp_path, check=True)
     printed = subprocess.run([tmp_path / "layout"], capture_output=True, text=True, check=True).stdout
     assert printed.splitlines() == expected
 

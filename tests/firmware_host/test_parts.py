@@ -1,9 +1,9 @@
 """The table of the board's parts: what is made of it, and what it says elsewhere too."""
 
+from firmware_host.generated.parts_header import parts_header
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES, MAGNETOMETERS
-from firmware_host.parts_header import parts_header
-from rig.config import sensor_catalogue
-from support.data_sheet import DataSheet
+from rig.config.sensors import sensor_catalogue
+from support.board.data_sheet import DataSheet
 from support.parts import SHEETS
 from support.paths import CONFIGS, FIRMWARE
 
@@ -11,7 +11,7 @@ TAKEN = {"PA2", "PA13", "PA14", "PA15", "PB3", "PB4", "PB5", "PC14", "PC15"}  # 
 
 
 def test_the_committed_header_is_what_the_table_generates() -> None:
-    header = FIRMWARE / "core" / "board_parts.h"
+    header = FIRMWARE / "core" / "drivers" / "board_parts.h"
     assert header.read_text(encoding="utf-8") == parts_header(), "again: make -C firmware_host/firmware header"
 
 
@@ -29,7 +29,7 @@ def test_the_catalogue_has_the_boards_parts_and_those_with_a_port_of_their_own()
 
 
 def test_every_part_is_in_an_example() -> None:
-    examples = "".join(path.read_text(encoding="utf-8") for path in CONFIGS.glob("*.yaml"))
+    examples = "".join(path.read_text(encoding="utf-8") for path in CONFIGS.rglob("*.yaml"))
     assert [name for name in BOARD_PARTS if f"part: {name}" not in examples] == []
 
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from firmware_host import protocol
-from firmware_host.c_header import c_header
+from firmware_host.generated.c_header import c_header
 from firmware_host.protocol import MESSAGES
 
-HEADER = Path(protocol.__file__).parent / "firmware" / "core" / "protocol.h"
+HEADER = Path(protocol.__file__).parent / "firmware" / "core" / "link" / "protocol.h"
 
 
 def test_the_committed_c_header_is_the_one_the_table_generates() -> None:
@@ -17,7 +17,7 @@ def test_what_both_ends_must_agree_on_is_written_in_the_table_alone() -> None:
     """The firmware's other sources use the header's names; none of them defines one of its own."""
     defined = {line.split()[1] for line in HEADER.read_text().splitlines() if line.startswith("#define ")}
     assert {"FRAME_OVERHEAD", "COBS_BYTES", "BATCH_AGE_US", "CALIBRATED_PER_RAD_S", "MAX_SCALE"} <= defined
-    sources = [source for source in HEADER.parent.glob("*.[ch]") if source != HEADER]
+    sources = [source for source in HEADER.parents[1].rglob("*.[ch]") if source != HEADER]
     again = [
         f"{source.name}: {name}" for source in sources for name in defined if f"#define {name} " in source.read_text()
     ]

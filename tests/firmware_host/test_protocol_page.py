@@ -4,8 +4,8 @@ import pytest
 
 from firmware_host import protocol
 from firmware_host.frames import encode
+from firmware_host.generated.protocol_page import reference
 from firmware_host.parts import GYROSCOPES, BoardPart
-from firmware_host.protocol_page import reference
 from firmware_host.stuffing import unstuff
 from support.paths import DOCS
 

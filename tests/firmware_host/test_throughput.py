@@ -1,9 +1,9 @@
-"""Full rates over the serial link: every conversion of every part arrives. For longer: benchmarks/throughput.py."""
+"""Full rates over the serial link: every conversion arrives. For longer: benchmarks/wire/throughput.py."""
 
 import pytest
 
-from support.emulated_session import RANGE_G
-from support.full_rate import CASES, stream
+from support.board.emulated_session import RANGE_G
+from support.board.full_rate import CASES, stream
 
 pytestmark = pytest.mark.slow
 

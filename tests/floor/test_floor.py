@@ -19,17 +19,17 @@ from rig.floor import shown
 from rig.floor.feed import looking
 from rig.floor.heartbeat import heartbeat
 from rig.history import stations
-from rig.history.address import place
 from rig.history.stations import Told
+from rig.history.storage.address import place
 from rig.history.store import open_history
 from rig.motion.state import Report
-from rig.page.control import Control
-from rig.page.feed import frame_of
-from rig.page.sections import Sections
-from rig.page.serving import Address, Page, serving
+from rig.page.server.control import Control
+from rig.page.server.feed import frame_of
+from rig.page.server.sections import Sections
+from rig.page.server.serving import Address, Page, serving
 from rig.station.events import ArmConnected, Failed, Prompt, SamplingStarted
-from support.past_runs import FIRST, finished
-from support.waiting import PATIENCE_S, wait_for
+from support.history.past_runs import FIRST, finished
+from support.processes.waiting import PATIENCE_S, wait_for
 
 AT = "2026-11-25T08:00:00+00:00"
 

@@ -10,14 +10,14 @@ from selenium.webdriver import Chrome
 from rig.batch.status import Now
 from rig.floor.feed import looking
 from rig.history import stations
-from rig.history.address import place
+from rig.history.storage.address import place
 from rig.history.store import open_history
-from rig.page.control import Control
-from rig.page.sections import Sections
-from rig.page.serving import Address, Page, serving
-from support.browser import legible, needs_browser, picture, screen, text
-from support.past_runs import FIRST, finished
-from support.waiting import wait_for
+from rig.page.server.control import Control
+from rig.page.server.sections import Sections
+from rig.page.server.serving import Address, Page, serving
+from support.history.past_runs import FIRST, finished
+from support.page.browser import legible, needs_browser, picture, screen, text
+from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 

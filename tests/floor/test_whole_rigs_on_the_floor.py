@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from selenium.webdriver import Chrome
 
-from support.browser import needs_browser, picture, text
-from support.command_with_a_page import with_a_page
-from support.commands import configuration
-from support.postgres import postgresql
-from support.scanner import Scanner, station
-from support.station_laboratory import Laboratory
-from support.stopwatch import timed, told
-from support.waiting import wait_for
+from support.history.postgres import postgresql
+from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.commands import configuration
+from support.laboratories.scanner import Scanner, station
+from support.laboratories.station_laboratory import Laboratory
+from support.page.browser import needs_browser, picture, text
+from support.processes.stopwatch import timed, told
+from support.processes.waiting import wait_for
 
 UNPLUGGED, KILLED, WAITS, MOUNTS, AGREES = RIGS = ("unplugged", "killed", "waits", "mounts", "agrees")
 AT_WORK = {UNPLUGGED: "running", KILLED: "running", WAITS: "waiting", MOUNTS: "asking", AGREES: "asking"}

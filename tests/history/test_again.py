@@ -10,15 +10,15 @@ import pytest
 from sqlalchemy import text
 
 from rig.errors import Refused
-from rig.history.again import Answer, Compared, Given, Unsolved, compared, to_solve
-from rig.history.again_journal import JOURNAL, Journal, Question
-from rig.history.again_plan import stated_results
-from rig.history.again_report import again_csv, again_page, counts
-from rig.history.finished import Finished
+from rig.history.again.answer import Answer, Compared, Given, Unsolved, compared, to_solve
+from rig.history.again.done import JOURNAL, Journal, Question
+from rig.history.again.plan import stated_results
+from rig.history.again.report import again_csv, again_page, counts
+from rig.history.entered.finished import Finished
 from rig.history.store import History, Selection, open_history
 from rig.report.kinds.registry import followed
-from support.kept_recordings import certified
-from support.past_runs import BIAS_RAD_S, SCALE, STD, finished
+from support.history.kept_recordings import certified
+from support.history.past_runs import BIAS_RAD_S, SCALE, STD, finished
 
 QUESTION = Question("1", ("reckoning=2",), None)
 U = 2 * STD[0]  # of a scale factor

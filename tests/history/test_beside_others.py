@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from support.history_rounds import Rounds, rounds
-from support.postgres import postgresql
+from support.history.history_rounds import Rounds, rounds
+from support.history.postgres import postgresql
 
 ROUNDS = {"sqlite": 200, "postgresql": 40}
 FEW = {"sqlite": 8, "postgresql": 2}

@@ -2,9 +2,9 @@
 
 import pytest
 
-from rig.history.change_words import change_in_short, changed_values, name_in_words
 from rig.history.series import Change
-from rig.report.kinds.followed import Parameter
+from rig.history.terminal.change_words import change_in_short, changed_values, name_in_words
+from rig.report.findings.followed import Parameter
 
 
 def change(name: str, before: float, now: float, u: float, unit: str = "1") -> Change:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rig.estimation.coverage import PROBABILITY, coverage_factors
+from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors
 from rig.history.series import changes_in
-from rig.report.kinds.followed import Parameter
+from rig.report.findings.followed import Parameter
 
 ALARMS = 1 - PROBABILITY
 PAIRS = 1500

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import rig
-from support.commands import rig as command
+from support.laboratories.commands import rig as command
+from support.laboratories.worlds import fresh_host
 from support.paths import CONFIGS
-from support.worlds import fresh_host
 
 RUNS = 15
 pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough, pytest.mark.timeout(3600)]

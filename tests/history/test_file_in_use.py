@@ -12,21 +12,21 @@ from pathlib import Path
 import pytest
 from sqlalchemy import event, text
 
-from rig.commands.recall import remembered
-from rig.commands.remember import remember
+from rig.commands.history.recall import remembered
+from rig.commands.history.remember import remember
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.load import load
-from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.floor.feed import looking
 from rig.history.store import open_history
 from rig.notebook.history import calibrations
 from rig.station.events import NotRemembered, Remembered
-from support.commands import rig, rig_here
-from support.kept_rows import as_of_another_process, forge
-from support.past_runs import finished
+from support.history.kept_rows import as_of_another_process, forge
+from support.history.past_runs import finished
+from support.history.postgres import postgresql
+from support.laboratories.commands import rig, rig_here
 from support.paths import CONFIGS, RECORDINGS, ROOT
-from support.postgres import postgresql
-from support.waiting import wait_for
+from support.processes.waiting import wait_for
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ FORKS = """
 import os, sys
 sys.path.insert(0, sys.argv[2])
 from rig.history.store import open_history
-from support.past_runs import finished
+from support.history.past_runs import finished
 
 with open_history(sys.argv[1]) as history:
     history.enter(finished(0))
@@ -169,7 +169,7 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     config = load(CONFIGS / "ci.yaml").config
     assert remembered(config, frozenset()).silent is None  # the run begins
     with monkeypatch.context() as forging:
-        forging.setattr("support.kept_rows.as_of_another_process", lambda: None)
+        forging.setattr("support.history.kept_rows.as_of_another_process", lambda: None)
         exchange(file)
     before = {each.name: each.read_bytes() for each in file.parent.iterdir()}
     event, _ = remember(RECORDINGS / "verified", config.history)  # and ends
@@ -238,7 +238,7 @@ IMPORTS = """
 import sys
 from pathlib import Path
 from rig.commands import history_answer, recall, remember
-from rig.config.judging_sections import HistorySection
+from rig.config.judging.judging_sections import HistorySection
 from rig.config.load import load
 
 answer, late = history_answer.answer_of, []

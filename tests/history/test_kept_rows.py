@@ -12,21 +12,21 @@ from sqlalchemy import select, text
 from sqlalchemy.exc import DBAPIError
 
 from rig.cli import main
-from rig.history import journal, schema
-from rig.history.engine import WRITES
-from rig.history.finished import content_sha256, finished_run
+from rig.history.entered.finished import content_sha256, finished_run
+from rig.history.entered.issued import Issued
 from rig.history.integrity import WRONG, examined
-from rig.history.issued import Issued
-from rig.history.journal import Head
+from rig.history.storage import journal, schema
+from rig.history.storage.engine import WRITES
+from rig.history.storage.journal import Head
+from rig.history.storage.triggers import create_triggers
 from rig.history.store import History, open_history
-from rig.history.triggers import create_triggers
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.statements import stated_in
-from support.kept_rows import drop_triggers, forge
-from support.past_runs import finished
+from support.history.kept_rows import drop_triggers, forge
+from support.history.past_runs import finished
+from support.history.postgres import postgresql
 from support.paths import CONFIGS, RECORDINGS
-from support.postgres import postgresql
 
 ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
 GAPS = ("run", "location", "calibration")

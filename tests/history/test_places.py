@@ -14,8 +14,8 @@ from sqlalchemy import URL
 
 from rig.config.load import ConfigurationRefused, load
 from rig.errors import Refused
-from rig.history.address import place
-from rig.history.libpq import connect_arguments
+from rig.history.storage.address import place
+from rig.history.storage.libpq import connect_arguments
 from rig.history.store import open_history
 from support.paths import DEMO
 

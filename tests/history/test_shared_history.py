@@ -7,13 +7,13 @@ import pytest
 from sqlalchemy import Connection, text
 
 from rig.errors import Refused
-from rig.history import migrations, schema
-from rig.history.engine import WRITES
+from rig.history.storage import migrations, schema
+from rig.history.storage.engine import WRITES
 from rig.history.store import open_history
-from support.forked import forked
-from support.kept_rows import as_of_another_process, drop_triggers
-from support.past_runs import enter_many, finished
-from support.postgres import postgresql
+from support.history.kept_rows import as_of_another_process, drop_triggers
+from support.history.past_runs import enter_many, finished
+from support.history.postgres import postgresql
+from support.processes.forked import forked
 
 PROCESSES, ENTRIES, FEW = 8, 250, 20
 pytestmark = pytest.mark.slow

@@ -13,21 +13,21 @@ import numpy as np
 import pytest
 from sqlalchemy import URL, event, text
 
-from rig.config.judging_sections import HistorySection
+from rig.config.judging.judging_sections import HistorySection
 from rig.config.load import ConfigurationRefused, load
 from rig.data.result_file import read_result
 from rig.errors import Refused
-from rig.estimation.budget import Budget, Contributor
-from rig.history import schema
-from rig.history.address import chosen_place, place
-from rig.history.engine import engine_of
-from rig.history.finished import Finished, compact, content_sha256, finished_run
-from rig.history.issued import Issued
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.history.entered.finished import Finished, compact, content_sha256, finished_run
+from rig.history.entered.issued import Issued
 from rig.history.series import Trend, changes_between, effects, rig_states, subjects, trends
+from rig.history.storage import schema
+from rig.history.storage.address import chosen_place, place
+from rig.history.storage.engine import engine_of
 from rig.history.store import History, Selection, open_history
-from rig.report.budget_entry import budget_entry
+from rig.report.entries.budget import budget_entry
 from rig.report.kinds.registry import followed
-from support.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finished
 from support.paths import DEMO, RECORDINGS
 
 ISSUED = Issued(
@@ -189,7 +189,7 @@ def test_a_certificate_is_entered_once_by_its_number_and_with_every_file_it_was_
 
 
 def test_rows_are_only_added(history: History) -> None:
-    """What a role may do that can neither change nor remove anything (docs/how-to/shared-history.md)."""
+    """What a role may do that can neither change nor remove anything (docs/how-to/finished-runs/shared-history.md)."""
     said: list[str] = []
     event.listen(history.engine, "before_cursor_execute", lambda *each: said.append(each[2].split()[0].upper()))
     run = replace(finished(0), certificate=ISSUED, operator="A. Person")

@@ -12,7 +12,7 @@ import pytest
 
 from rig.cli import main
 from support.paths import ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 SHOWN = "from firmware_host.installation import install_command; print(install_command('study'))"
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from support.demo_runs import normalised_errors
+from support.laboratories.demo_runs import normalised_errors
 from support.paths import ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 NO_SOURCES = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info", "__pycache__", "tests")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rig.config import ranges
-from rig.config.attitude_sets import EIGHTEEN, SETS
 from rig.config.models import HOMES, ArmSection
-from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
+from rig.config.procedures.attitude_sets import EIGHTEEN, SETS
+from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.config.ranges import ModelName
 from rig.motion.carried import carried_by
 from rig.motion.geometry import NOMINAL, flange_axes, lengths_m
@@ -17,10 +17,10 @@ from rig.motion.keep_out import clearance_problems
 from rig.motion.model import CLIENT_SPEED_RAD_S, home_of, model_of, turner_model
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan, Transfer
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.static_attitudes import plan_static_attitudes
+from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.turners.ur.plan_problems import plan_problems
-from rig.world.ur10e.models import MODELS
+from rig.world.ur10e.motion.models import MODELS
 
 NAMES: tuple[ModelName, ...] = get_args(ModelName)
 TWO_HOMES: tuple[ModelName, ...] = ("ur3e", "ur10e")

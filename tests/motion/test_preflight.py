@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
+from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
+from rig.config.procedures.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.errors import Problem, Refused, refuse
 from rig.motion.carried import Carried
 from rig.motion.geometry import NOMINAL, distance_to_forearm
 from rig.motion.preflight import way_to_home
 from rig.motion.state import ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.motion.steps import Dwell, Motion, Plan, Rest, Transfer
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.static_attitudes import plan_static_attitudes
+from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.turners.ur.condition import program_interruption, readiness
 from rig.turners.ur.preflight import arm_problems, kinematics_problems, made, preflight_problems
 from rig.turners.ur.report import ArmReport
-from support.ur10e import plan_problems
+from support.wires.ur10e import plan_problems
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)

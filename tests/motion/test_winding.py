@@ -3,14 +3,14 @@
 from math import degrees, radians
 
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
+from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import Plan
 from rig.motion.winding import cable_words, windings_rad
-from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.announcement import announcement
 from rig.turners.ur.kind import UR
-from support.told_runs import report
+from support.page.told_runs import report
 
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 TURN = radians(360)

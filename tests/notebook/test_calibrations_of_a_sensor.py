@@ -10,7 +10,7 @@ import rig
 from rig.cli import main
 from rig.errors import Refused
 from rig.history.store import open_history
-from support.past_runs import FIRST, finished
+from support.history.past_runs import FIRST, finished
 from support.paths import RECORDINGS, ROOT
 
 MOVED = (1.0103, 0.99, 1.0)

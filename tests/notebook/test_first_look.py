@@ -5,7 +5,7 @@ import pytest
 from nbclient import NotebookClient
 
 from support.paths import DOCS
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
 

@@ -12,8 +12,8 @@ from rig.data.result_file import ResultDocument, read_result
 from rig.errors import Refused
 from rig.observation.windows import swept
 from support.paths import DOCS, RECORDINGS
-from support.stated import SHARE, differences
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
+from support.recordings.stated import SHARE, differences
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 import rig
 from rig.errors import Refused
 from support.paths import RECORDINGS
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")

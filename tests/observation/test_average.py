@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rig.estimation.rounding import Steps, found_steps, rounding_left
-from rig.observation.beside_lines import rest_beside_lines
-from rig.observation.mean import even_mean
+from rig.estimation.statistics.rounding import Steps, found_steps, rounding_left
+from rig.observation.statistics.beside_lines import rest_beside_lines
+from rig.observation.statistics.mean import even_mean
 from rig.observation.windows import Window
 
 

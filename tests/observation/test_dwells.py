@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.estimation.rounding import Steps
-from rig.observation.beside_lines import mean_of_standing
-from rig.observation.mean import Mean
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.statistics.beside_lines import mean_of_standing
+from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window
 
 NOISE_M_S2, SHAKEN_M_S2, LASTING_S = 0.004, 0.02, 3.0

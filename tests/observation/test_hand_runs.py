@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate_by_hand
-from rig.data.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
-from rig.data.run_file import read_run
+from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
+from rig.data.recording.run_file import read_run
 from rig.errors import Fault
 from rig.estimation.by_hand.session import Handled, Move, Rest, Told
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
-from rig.observation.hand_runs import NotCounted, turned_face
+from rig.observation.by_hand.runs import NotCounted, turned_face
 from support.paths import RECORDINGS
 
 SECOND_US = 1_000_000

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.quantity import RATE
-from rig.data.run_file import RunData
-from rig.data.settings import ObservationThresholds
+from rig.data.recording.events import Event, SweepFinished, SweepStarted
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.motion.state import ARM_STATE_DTYPE
-from rig.observation.arm_motion import ArmMotion
-from rig.observation.coloured_noise import noise_left, widening
+from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
+from rig.observation.statistics.coloured_noise import noise_left, widening
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
-from rig.report.sensor_entry import sensor_entry
-from support.recorded import with_channel
-from support.solving import solve_runs
-from support.synthetic_run import (
+from rig.report.entries.gyroscope import sensor_entry
+from support.recordings.recorded import with_channel
+from support.recordings.solving import solve_runs
+from support.recordings.synthetic_run import (
     BIAS_RAD_S,
     SENSITIVITY,
     Motion,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.observation.onboard_window import revolution_on_the_board
 from rig.observation.windows import swept
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 
 def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rig.data.quantity import RATE
-from rig.observation.csv_samples import read_samples
-from rig.observation.rests import find_rests
+from rig.observation.by_hand.rests import find_rests
+from rig.observation.external.csv_samples import read_samples
+from support.external.real import unpacked
+from support.external.turned_body import Hand, turn
 from support.paths import DOCS
-from support.real import unpacked
-from support.turned_body import Hand, turn
 
 
 def test_a_hands_rests_are_found_as_they_are_known_of_a_real_recording(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.observation.sampling import even_times, find_sampling
-from support.loggers import Stamps
+from support.external.loggers import Stamps
 
 COUNT = 6000
 ROUNDED = [(rate, Stamps(rounded_s=1e-3)) for rate in (50, 104, 119, 238, 416, 476, 952)]

@@ -11,10 +11,10 @@ import pytest
 from rig.data.quantity import RATE
 from rig.motion.geometry import DenavitHartenberg
 from rig.motion.state import ARM_STATE_DTYPE
-from rig.observation.arm_motion import ArmMotion
+from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.timebase import estimate_time_base
 from support.paths import ROOT
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 
 def test_a_clock_whose_fit_takes_ever_smaller_steps_is_found() -> None:

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.errors import Fault
-from rig.observation.acceleration import DwellReading
-from rig.observation.mean import Mean
 from rig.observation.observed_run import observe_run
+from rig.observation.reference.acceleration import DwellReading
+from rig.observation.statistics.mean import Mean
 from rig.observation.steps_that_count import sound_sweeps
 from rig.observation.stuck_check import check_dwells
 from rig.observation.windows import Window, swept
-from support.damaged_readings import readings_of
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.damaged_readings import readings_of
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 USUAL = synthetic_run(Setup())
 SETTINGS = USUAL.settings.observation

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.calibration import observe_recordings
-from rig.data.run_file import RunData
+from rig.analysis.gyroscope.calibration import observe_recordings
+from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD, without_swing
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 TIME_S = 0.008 * np.arange(370)
 MOVED_RAD = 3.5e-3

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.estimation.rounding import Steps
-from rig.observation.lines import BEATS, turning
-from rig.observation.mean import Mean
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.statistics.lines import BEATS, turning
+from rig.observation.statistics.mean import Mean
 from rig.observation.turn_mean import SampledTurn, turn_mean
-from support.drawn_ripple import Ripple, drawn_ripple
+from support.recordings.drawn_ripple import Ripple, drawn_ripple
 
 AXIS = np.array([0.6, 0.0, 0.8])
 SPEED_RAD_S, RATE_HZ = 1.05, 200.0

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from support.commands import rig
+from support.laboratories.commands import rig
 from support.paths import CONFIGS
 
 

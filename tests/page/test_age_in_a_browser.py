@@ -17,15 +17,15 @@ from rig.page.about import About
 from rig.page.arm import built
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, PhaseStarted, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.registry import installed, kind_of, sections
-from support.browser import needs_browser, picture
-from support.command_with_a_page import with_a_page
-from support.commands import configuration
+from support.laboratories.command_with_a_page import with_a_page
+from support.laboratories.commands import configuration
+from support.laboratories.servo_runs import configured
+from support.laboratories.worlds import fresh_host, merge
+from support.page.browser import needs_browser, picture
+from support.page.told_page import showing
+from support.page.told_runs import report, servo_report, servo_state, state
 from support.paths import CONFIGS
-from support.servo_runs import configured
-from support.told_page import showing
-from support.told_runs import report, servo_report, servo_state, state
-from support.waiting import alive, wait_for
-from support.worlds import fresh_host, merge
+from support.processes.waiting import alive, wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -94,15 +94,15 @@ def by_hand(folder: Path) -> Path:
 
 
 def of_lines(folder: Path) -> Path:
-    """configs/lines.yaml so."""
+    """configs/own_port/lines.yaml so."""
     host = fresh_host()
     port = {"serial": {"port": f"socket://{host}:7341"}}
-    return written(folder, "lines.yaml", {"arm": {"host": host}, "sensors": {"imu": port}}, 2)
+    return written(folder, "own_port/lines.yaml", {"arm": {"host": host}, "sensors": {"imu": port}}, 2)
 
 
 def written(folder: Path, name: str, changes: dict[str, Any], time_scale: float) -> Path:
     document = yaml.safe_load(load(CONFIGS / name, turners=sections()).text)
-    path = folder / name
+    path = folder / Path(name).name
     path.write_text(yaml.safe_dump(merge(merge(document, changes), {"world": {"time_scale": time_scale}})))
     return path
 

@@ -15,10 +15,10 @@ from urllib.parse import urlsplit
 import pytest
 
 from rig.motion.state import REST_SPEED_RAD_S
-from support.commands import configuration, wait_for_log
-from support.flood import flooded
-from support.waiting import PATIENCE_S, wait_for
-from support.worlds import World, WorldHandle, hardware
+from support.laboratories.commands import configuration, wait_for_log
+from support.laboratories.worlds import World, WorldHandle, hardware
+from support.page.flood import flooded
+from support.processes.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.slow
 

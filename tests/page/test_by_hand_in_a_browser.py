@@ -7,7 +7,7 @@ import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
-from rig.data.hand_events import HandAsked, HandMoveRefused, HandRested
+from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandRested
 from rig.motion.by_hand import Face, HandMove, Instruction
 from rig.motion.steps import Plan
 from rig.page.about import About
@@ -15,9 +15,9 @@ from rig.page.arm import built
 from rig.plans.by_hand import Wanted, still_open
 from rig.station.events import ArmConnected, HandSeen, PhaseStarted
 from rig.turners.registry import installed
-from support.browser import legible, needs_browser, picture, screen, text
-from support.told_page import showing
-from support.waiting import wait_for
+from support.page.browser import legible, needs_browser, picture, screen, text
+from support.page.told_page import showing
+from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 KIND = installed()["hand"]

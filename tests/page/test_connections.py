@@ -11,13 +11,13 @@ from urllib.parse import urlsplit
 import pytest
 
 from rig.page.about import About
-from rig.page.connections import KNOWN, STRANGERS, Connections
-from rig.page.control import Control
-from rig.page.feed import Feed
 from rig.page.page_state import Shown
-from rig.page.serving import Address, serving
-from support.flood import alive, half_a_request, opened
-from support.waiting import PATIENCE_S, wait_for
+from rig.page.server.connections import KNOWN, STRANGERS, Connections
+from rig.page.server.control import Control
+from rig.page.server.feed import Feed
+from rig.page.server.serving import Address, serving
+from support.page.flood import alive, half_a_request, opened
+from support.processes.waiting import PATIENCE_S, wait_for
 
 
 @contextmanager

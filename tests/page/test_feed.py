@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from rig.motion.state import Report
-from rig.page.feed import Broadcast, Feed, Mailbox
 from rig.page.history import POINTS, STEP_S
 from rig.page.page_state import Shown
+from rig.page.server.feed import Broadcast, Feed, Mailbox
 from rig.station.events import ArmConnected, ArmSeen, HandSeen, RunEvent, SamplesTaken, SensorSamples
 from rig.turners.registry import installed
-from support.told_runs import (
+from support.page.told_runs import (
     ABOUT,
     before_it_moves,
     judged,

@@ -11,11 +11,11 @@ from selenium.webdriver.common.keys import Keys
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
-from support.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
-from support.told_page import Telling, showing
-from support.told_runs import before_it_moves, judged, look, moving, planned
-from support.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
-from support.waiting import wait_for
+from support.page.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text
+from support.page.told_page import Telling, showing
+from support.page.told_runs import before_it_moves, judged, look, moving, planned
+from support.page.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
+from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 

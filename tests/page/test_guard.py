@@ -14,16 +14,16 @@ from urllib.parse import urlsplit
 import pytest
 
 from rig.commands.page_arguments import PageWish, add_page, wish
-from rig.commands.watch import last_words
+from rig.commands.station.watch import last_words
 from rig.errors import Refused
 from rig.page.about import About
-from rig.page.control import STOPPED, Control
-from rig.page.feed import Feed
-from rig.page.guard import Door
 from rig.page.page_state import Shown
-from rig.page.serving import Address, serving
+from rig.page.server.control import STOPPED, Control
+from rig.page.server.feed import Feed
+from rig.page.server.guard import Door
+from rig.page.server.serving import Address, serving
 from rig.station.events import Prompt
-from support.waiting import PATIENCE_S, wait_for
+from support.processes.waiting import PATIENCE_S, wait_for
 
 TOKEN = "a-token-of-two-and-twenty"
 

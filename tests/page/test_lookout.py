@@ -9,11 +9,11 @@ import pytest
 from rig.motion.steps import Sweep
 from rig.page.about import About
 from rig.page.analysis_process import looking_out
-from rig.page.feed import Feed
 from rig.page.page_state import Shown
+from rig.page.server.feed import Feed
 from rig.station.events import StepFinished
-from support.told_runs import moving, planned
-from support.waiting import wait_for
+from support.page.told_runs import moving, planned
+from support.processes.waiting import wait_for
 
 
 def helper() -> int:

@@ -15,11 +15,11 @@ from selenium.webdriver import Chrome
 from rig.errors import Fault
 from rig.motion.state import ArmState, RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
-from support.browser import kind, legible, needs_browser, picture, severe, text
+from support.page.browser import kind, legible, needs_browser, picture, severe, text
+from support.page.told_page import showing
+from support.page.told_runs import before_it_moves, judged, moving, planned
 from support.paths import ROOT
-from support.told_page import showing
-from support.told_runs import before_it_moves, judged, moving, planned
-from support.waiting import wait_for
+from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -163,7 +163,7 @@ def page_of_its_own() -> Iterator[tuple["subprocess.Popen[str]", str]]:
     """A process that moves on a page, and the page's address."""
     paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
     process = subprocess.Popen(
-        [sys.executable, "-m", "support.told_page"],
+        [sys.executable, "-m", "support.page.told_page"],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": paths},

@@ -15,13 +15,13 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.motion.state import REST_SPEED_RAD_S
-from support.browser import kind, needs_browser, picture, text
-from support.commands import configuration, rig
-from support.waiting import PATIENCE_S, wait_for
-from support.warm import started
-from support.worlds import World, hardware
+from support.laboratories.commands import configuration, rig
+from support.laboratories.worlds import World, hardware
+from support.page.browser import kind, needs_browser, picture, text
+from support.processes.waiting import PATIENCE_S, wait_for
+from support.processes.warm import started
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 

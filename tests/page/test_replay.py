@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from rig.analysis.partial_results import so_far
-from rig.data.run_file import RunData
-from rig.estimation.vector_model import VectorSolution
+from rig.data.recording.run_file import RunData
+from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.page.about import About
 from rig.page.page_state import Shown
 from rig.page.replay import Moment, moments
 from rig.page.rows import Look, look_of
 from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")

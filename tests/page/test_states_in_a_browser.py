@@ -12,16 +12,16 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 
 from rig.errors import Fault, Refused
-from rig.page.control import Control
-from rig.page.feed import Feed
 from rig.page.page_state import Shown
-from rig.page.serving import Address, serving
+from rig.page.server.control import Control
+from rig.page.server.feed import Feed
+from rig.page.server.serving import Address, serving
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
-from support import told_runs
-from support.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text
-from support.told_page import showing
-from support.told_runs import ABOUT, before_it_moves, judged, moving, planned
-from support.waiting import wait_for
+from support.page import told_runs
+from support.page.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text
+from support.page.told_page import showing
+from support.page.told_runs import ABOUT, before_it_moves, judged, moving, planned
+from support.processes.waiting import wait_for
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 

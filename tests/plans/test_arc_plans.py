@@ -7,15 +7,15 @@ import pytest
 
 from rig.config.load import ConfigurationRefused, parse
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
-from rig.data.settings import settings_of
+from rig.config.procedures.procedure_sections import SixObservationSection
+from rig.data.recording.settings import settings_of
 from rig.errors import Refused
 from rig.motion.carried import Carried
 from rig.motion.steps import Plan, closes
-from rig.plans.six_sweeps import plan_six_observation
-from support.commands import rig_here
+from rig.plans.motions.six_sweeps import plan_six_observation
+from support.laboratories.commands import rig_here
 from support.paths import CONFIGS
-from support.ur10e import plan_problems
+from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
 DEMO = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")

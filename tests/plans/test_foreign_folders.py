@@ -13,10 +13,10 @@ import pytest
 import rig as public
 from rig.errors import Refused
 from rig.world.board.flash_file import flash_of
-from support.commands import configuration, rig_here
+from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS, ROOT
 
-OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
+OWN = ROOT / "tests" / "support" / "motions" / "unequal_sweeps.py"
 
 
 @pytest.fixture

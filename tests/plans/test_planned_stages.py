@@ -8,13 +8,13 @@ import pytest
 from pydantic import ValidationError
 
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
-from rig.config.stage_section import StageMountSection, mount_matrix
+from rig.config.procedures.procedure_sections import SixObservationSection
+from rig.config.procedures.stage_section import StageMountSection, mount_matrix
 from rig.errors import Refused
 from rig.motion.carried import Carried
 from rig.motion.steps import Plan, Sweep, Transfer
-from rig.plans.six_sweeps import plan_six_observation
-from support.ur10e import plan_problems
+from rig.plans.motions.six_sweeps import plan_six_observation
+from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
 ONE_AXIS_EACH: list[dict[str, object]] = [

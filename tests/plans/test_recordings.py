@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from rig.config.sensor_catalogue import has_own_port
+from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
 from rig.plans.recorded import RecordedRun, judged, open_run
 from rig.plans.registry import installed
 from rig.report.document import document_of
-from support.frozen import frozen
 from support.paths import RECORDINGS
-from support.stated import SHARE, differences
+from support.recordings.frozen import frozen
+from support.recordings.stated import SHARE, differences
 
 FREEZE = "freeze one, as CONTRIBUTING.md says"
 

@@ -12,14 +12,14 @@ import yaml
 
 from procedures import six_observation, verify
 from rig.config.load import load
-from rig.config.procedure_sections import STOCK_SECTIONS
+from rig.config.procedures.procedure_sections import STOCK_SECTIONS
 from rig.errors import Refused
 from rig.motion.steps import Plan
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed, sections
 from rig.plans.script_file import installed_script, load_script
 from support.paths import CONFIGS, ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 OWN = """
 from dataclasses import replace

@@ -13,11 +13,11 @@ from rig.data.own_texts import note_own
 from rig.data.run_folder import ScriptIdentity, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import SIZE_MAX_BYTES, installed_script, kept_script, load_script
-from support.commands import configuration
+from support.laboratories.commands import configuration
+from support.laboratories.worlds import hardware
 from support.paths import CONFIGS, ROOT
-from support.worlds import hardware
 
-OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
+OWN = ROOT / "tests" / "support" / "motions" / "unequal_sweeps.py"
 
 
 def script(folder: Path, text: str) -> Path:

@@ -5,12 +5,12 @@ from math import degrees, pi
 import pytest
 
 from rig.config.load import ConfigurationRefused
-from rig.config.servo_procedure import ServoSixObservationSection
-from rig.config.servo_section import ServoSection
+from rig.config.procedures.servo_procedure import ServoSixObservationSection
+from rig.config.procedures.servo_section import ServoSection
 from rig.motion.steps import Plan, Rest, Transfer
-from rig.plans.servo_sweeps import plan_servo_six_observation
+from rig.plans.motions.servo_sweeps import plan_servo_six_observation
 from rig.turners.servo.kind import SERVO
-from support.drawn_servo import loaded
+from support.motions.drawn_servo import loaded
 
 
 def planned(*overrides: str, start_rad: float | None = None, done: tuple[int, ...] = ()) -> Plan:

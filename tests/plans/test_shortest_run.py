@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.predicted_accelerations import predicted_accelerations
-from rig.analysis.shortest import Budgets, Candidate, Reached, Wanted, shortest
+from rig.analysis.design.predicted_accelerations import predicted_accelerations
+from rig.analysis.design.shortest import Budgets, Candidate, Reached, Wanted, shortest
+from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of
 from rig.cli import main
 from rig.config.load import load, parse
 from rig.config.models import RigConfig
-from rig.config.sensor_catalogue import PARTS as DATA_SHEETS
+from rig.config.sensors.sensor_catalogue import PARTS as DATA_SHEETS
 from rig.errors import Refused
-from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand import Told, solve_by_hand
-from rig.observation.handled import handled
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.observation.by_hand.handled import handled
 from rig.plans.by_hand import Wanted as Asked
 from rig.plans.by_hand import listed
 from rig.plans.registry import installed, sections
@@ -29,13 +29,13 @@ from rig.plans.shortest import plan_of, shortest_run, tried
 from rig.plans.shortest_motions import ARCS_DEG
 from rig.turners import registry as turners
 from rig.world.hand.habits import Action, Flip, Turn
-from support.drawn_accelerations import drawn, solved
-from support.drawn_servo import KNOWN as OF_DRAWN
-from support.drawn_servo import drawn_servo
-from support.drawn_servo import loaded as servo_loaded
-from support.handled_body import Part, handle
+from support.external.handled_body import Part, handle
+from support.motions.drawn_servo import KNOWN as OF_DRAWN
+from support.motions.drawn_servo import drawn_servo
+from support.motions.drawn_servo import loaded as servo_loaded
 from support.paths import CONFIGS
-from support.synthetic_run import CONFIG, Setup, synthetic_run
+from support.recordings.drawn_accelerations import drawn, solved
+from support.recordings.synthetic_run import CONFIG, Setup, synthetic_run
 
 SET_TO = {"lsm9ds1": (238, 500), "adis16465": (200, 500), "icm42688p": (200, 500)}  # Hz, °/s
 PARTS = tuple(SET_TO)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
+from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Refused
 from rig.motion.carried import Carried
 from rig.motion.geometry import flange_axes, flange_pose, flange_rate
 from rig.motion.model import home_of
 from rig.motion.steps import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
-from rig.plans.drift import drift_effect
-from rig.plans.six_sweeps import plan_six_observation
-from support.ur10e import plan_problems
+from rig.plans.motions.drift import drift_effect
+from rig.plans.motions.six_sweeps import plan_six_observation
+from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
 HOME = home_of(ARM)

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.config.load import load
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import ImuSection, StaticAttitudesSection
+from rig.config.procedures.attitude_sets import EIGHTEEN, FACES
+from rig.config.procedures.procedure_sections import ImuSection, StaticAttitudesSection
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.motion.carried import Carried
 from rig.motion.model import home_of
 from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
-from rig.plans.imu import plan_imu
+from rig.plans.motions.imu import plan_imu
+from rig.plans.motions.shortest_way import shortest_way
+from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed
-from rig.plans.shortest_way import shortest_way
-from rig.plans.static_attitudes import plan_static_attitudes
 from support.paths import CONFIGS
-from support.ur10e import plan_problems
+from support.wires.ur10e import plan_problems
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
 HOME = home_of(ARM)

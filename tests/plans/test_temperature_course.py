@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from rig.config.world_thermal import SimulatedThermalSection
-from rig.data.thermal_events import SetMeasured
-from rig.plans.temperature_course import Course, Ramp
+from rig.config.world.thermal import SimulatedThermalSection
+from rig.data.recording.thermal_events import SetMeasured
+from rig.plans.motions.temperature_course import Course, Ramp
 from rig.world.board.heat import HeatedBody
 
 LOOK_S = 0.25

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.data.drift_entries import DriftEntry, SlopeEntry
+from rig.data.entries.drift import DriftEntry, SlopeEntry
+from rig.data.entries.result_types import ErrorEntry
 from rig.data.result_file import ResultDocument, write_result
-from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.exports.calibrations import calibrations
 from rig.report.exports.temperature import at_temperature
-from support.certified import accelerometer, result
+from support.documents.certified import accelerometer, result
 
 SLOPE = (2e-4, -1e-4, 5e-5)  # per °C, of the readings
 

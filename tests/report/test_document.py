@@ -12,14 +12,14 @@ from rig.analysis.analyses import calibrate
 from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome
 from rig.data.meaning import Meaning
+from rig.data.recording.run_file import read_run
 from rig.data.result_file import CheckEntry
-from rig.data.run_file import read_run
 from rig.motion.geometry import NOMINAL
 from rig.report.document import document_of
 from rig.report.entry import entry
-from rig.report.table import print_result
+from rig.report.terminal.table import print_result
 from support.paths import RECORDINGS
-from support.synthetic_run import Setup, synthetic_run
+from support.recordings.synthetic_run import Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")

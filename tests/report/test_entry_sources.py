@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 import pytest
 
-from rig.data.budget_entries import ClockComparisonEntry
+from rig.data.entries.budget import ClockComparisonEntry
 from rig.report import entry as entry_module
 from rig.report.entry import entry
 from rig.report.entry_sources import SOURCES, Row

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rig.config.judging_sections import SiteSection
+from rig.config.judging.judging_sections import SiteSection
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry
-from rig.estimation.coverage import PROBABILITY, coverage_factors, covered
+from rig.estimation.statistics.coverage import PROBABILITY, coverage_factors, covered
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import Stated
-from rig.report.certificate.tables import DEG, pair
-from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.bias_drift import drift_table
 from rig.report.kinds.registry import followed
-from rig.report.table import print_result
-from support.certified import certificate, everything, read, result
+from rig.report.tables.certificate import DEG, pair
+from rig.report.terminal.table import print_result
+from rig.report.words.expanded import expanded, factor_words
+from support.documents.certified import certificate, everything, read, result
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 GERMAN = Stated(SiteSection(country="DE"))

@@ -12,12 +12,12 @@ import yaml
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE
 from rig.cli import main
-from rig.data.channel import of_three_axes
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.entries.magnetometer import MagnetometerEntry
+from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import ACCELERATION
+from rig.data.recording.channel import of_three_axes
+from rig.data.recording.run_file import read_run
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
-from rig.data.result_types import ErrorEntry
-from rig.data.run_file import read_run
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
@@ -29,7 +29,7 @@ from rig.report.exports.imucal import imucal_files
 from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
 from rig.report.exports.recorded import WithMotion, exported
-from support.certified import accelerometer, everything, result
+from support.documents.certified import accelerometer, everything, result
 from support.paths import RECORDINGS
 
 GRAVITY_M_S2 = 9.81

@@ -9,7 +9,7 @@ import pytest
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.report.header import calibration_header
-from support.results import SENSOR, result_document
+from support.documents.results import SENSOR, result_document
 
 SCALE = [1.1771, 1.1554, 0.5]
 BIAS_RAD_S = [0.0077, -0.0100, -2.5]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.config.judging_sections import SiteSection
+from rig.config.judging.judging_sections import SiteSection
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.result_file import ResultDocument, read_result
-from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.statements import Stated
@@ -18,9 +18,9 @@ from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.calibrations import calibrations
 from rig.report.header import calibration_header
 from rig.report.kinds.registry import followed
-from support.certified import certificate
-from support.dcc_rules import rule_faults, schema_faults
-from support.warmed_sweeps import FROM_C, REFERENCE_C, TO_C, Drawn, drawn, session, write_files
+from support.documents.certified import certificate
+from support.documents.dcc_rules import rule_faults, schema_faults
+from support.motions.warmed_sweeps import FROM_C, REFERENCE_C, TO_C, Drawn, drawn, session, write_files
 
 READING = np.array([0.3, -0.9, 1.2])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.estimators import DEFAULT_ESTIMATOR
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.plans.recorded import judged, open_run
@@ -17,10 +17,10 @@ from rig.report.certificate.plots import (
     residuals,
 )
 from rig.report.document import document_of
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_ATTITUDES, OF_SAMPLES
-from rig.report.printed_budget import printed_budget
-from support.certified import accelerometer, certificate, everything, magnetometer, read, result
+from rig.report.findings.finding import Finding
+from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_ATTITUDES, OF_SAMPLES
+from rig.report.words.printed_budget import printed_budget
+from support.documents.certified import accelerometer, certificate, everything, magnetometer, read, result
 from support.paths import RECORDINGS
 
 

@@ -10,13 +10,13 @@ import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.analysis.outcome import Outcome
+from rig.data.recording.run_file import read_run
 from rig.data.result_file import ResultDocument, read_result
-from rig.data.run_file import read_run
 from rig.report import writers
 from rig.station.events import DocumentWritten, RunEvent
-from support.full_disk import full_disk
 from support.paths import RECORDINGS, ROOT
-from support.waiting import PATIENCE_S
+from support.processes.full_disk import full_disk
+from support.processes.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ RUN = """
 import sys
 from pathlib import Path
 from rig.analysis.analyses import calibrate
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.report.writers import write_outcome
 print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrate([read_run(Path(sys.argv[1]))]))))
 """

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from rig.data.run_file import read_run
-from support.commands import configuration, rig
+from rig.data.recording.run_file import read_run
+from support.laboratories.commands import configuration, rig
 
 pytestmark = pytest.mark.slow
 

@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.analysis.reached import reached_so_far
-from rig.analysis.shortest import Reached, Wanted
+from rig.analysis.design.reached import reached_so_far
+from rig.analysis.design.shortest import Reached, Wanted
 from rig.config.load import parse
-from rig.data.run_file import RunData
+from rig.data.recording.run_file import RunData
 from rig.motion.state import Joints
 from rig.motion.steps import Motion, Plan, Sweep
-from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.runner.ending_early import EndingEarly
 from rig.station.events import UncertaintySoFar
-from support.commands import configuration, rig, wait_for_log
-from support.synthetic_run import CONFIG, Setup, synthetic_run
+from support.laboratories.commands import configuration, rig, wait_for_log
+from support.recordings.synthetic_run import CONFIG, Setup, synthetic_run
 
 REPEATS = 4
 

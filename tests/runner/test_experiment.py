@@ -13,14 +13,14 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from rig.data.run_file import read_run
-from support.commands import configuration, rig, rig_here, wait_for_log
-from support.drawn_laboratory import truth
-from support.ideal import ideal_document
+from rig.data.recording.run_file import read_run
+from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
+from support.laboratories.drawn_laboratory import truth
+from support.laboratories.ideal import ideal_document
+from support.laboratories.worlds import QUICK_EXPERIMENT, fresh_host, merge
 from support.paths import CONFIGS
-from support.stated import solved_otherwise
-from support.waiting import PATIENCE_S, alive, wait_for
-from support.worlds import QUICK_EXPERIMENT, fresh_host, merge
+from support.processes.waiting import PATIENCE_S, alive, wait_for
+from support.recordings.stated import solved_otherwise
 
 EXPERIMENTS = [
     "lsm9ds1_adis16465",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from support.commands import configuration, rig
+from support.laboratories.commands import configuration, rig
 
 pytestmark = [pytest.mark.slow, pytest.mark.proof]
 

@@ -1,6 +1,7 @@
 """The rig measures what it says, in laboratories that nobody has seen: the whole chain against the truth drawn for it.
 
-`make test` runs one of them. `benchmarks/hidden_worlds.py` keeps their recordings, and prints what every line holds.
+`make test` runs one of them. `benchmarks/laboratory/hidden_worlds.py` keeps their recordings, and prints what every
+line holds.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -8,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from support.hidden_bounds import asked_of
-from support.hidden_results import SCALE, held, solved
-from support.hidden_worlds import OTHER_ARMS, WORLDS, first_seed, recorded
+from support.laboratories.hidden_bounds import asked_of
+from support.laboratories.hidden_results import SCALE, held, solved
+from support.laboratories.hidden_worlds import OTHER_ARMS, WORLDS, first_seed, recorded
 
 BEYOND = 2.2  # U: farther off is none of 720 values that are normal
 RIPPLED = "rippled pair", "rippled imu"  # of lines near each other or near the turn's own a mean keeps more or less

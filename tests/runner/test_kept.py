@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.motion.state import ArmState
 from rig.runner.acquisition import REACHES_BACK_S, Acquisition
-from support.synthetic_run import SENSOR
+from support.recordings.synthetic_run import SENSOR
 
 STILL = (0.0,) * 6
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from support.commands import configuration, python, rig, rig_here, wait_for_log
+from support.laboratories.commands import configuration, python, rig, rig_here, wait_for_log
+from support.laboratories.worlds import merge
 from support.paths import ROOT
-from support.stated import solved_otherwise
-from support.waiting import PATIENCE_S
-from support.worlds import merge
+from support.processes.waiting import PATIENCE_S
+from support.recordings.stated import solved_otherwise
 
-OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
+OWN = ROOT / "tests" / "support" / "motions" / "unequal_sweeps.py"
 SECTION = {"procedure": {"name": "unequal_sweeps", "wrist_2_deg_s": 100}}
 
 pytestmark = pytest.mark.slow

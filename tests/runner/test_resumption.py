@@ -10,16 +10,16 @@ import pytest
 
 from firmware_host.answers import BoardObservation
 from rig.analysis.analyses import calibrate
-from rig.analysis.calibration import observe_recordings
-from rig.data.events import BoardObserved, Recorded
-from rig.data.run_file import RunData, read_run
+from rig.analysis.gyroscope.calibration import observe_recordings
+from rig.data.recording.events import BoardObserved, Recorded
+from rig.data.recording.run_file import RunData, read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.runner.resumption import resumption
-from support import damaged_accelerations
-from support.commands import configuration, rig
-from support.damaged_readings import offset, readings_of, replaced
-from support.synthetic_run import Setup
+from support.laboratories.commands import configuration, rig
+from support.recordings import damaged_accelerations
+from support.recordings.damaged_readings import offset, readings_of, replaced
+from support.recordings.synthetic_run import Setup
 
 SCRIPT = installed_script("six_observation")
 SETUP = Setup(noise_rad_s=0.005)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import yaml
 
-from support.commands import configuration, rig, rig_here, wait_for_log
-from support.stated import solved_otherwise
-from support.waiting import PATIENCE_S
-from support.warm import started
-from support.worlds import merge
+from support.laboratories.commands import configuration, rig, rig_here, wait_for_log
+from support.laboratories.worlds import merge
+from support.processes.waiting import PATIENCE_S
+from support.processes.warm import started
+from support.recordings.stated import solved_otherwise
 
 pytestmark = pytest.mark.slow
 

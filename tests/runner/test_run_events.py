@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.commands.configured import configured
-from rig.data.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.recording.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Sweep
 from rig.runner.phases import Run
@@ -37,8 +37,8 @@ from rig.station.events import (
     VerdictReached,
 )
 from rig.station.station import Stations, always_yes
-from support.waiting import PATIENCE_S
-from support.worlds import QUICK_EXPERIMENT, worlds
+from support.laboratories.worlds import QUICK_EXPERIMENT, worlds
+from support.processes.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow  # a whole experiment
 

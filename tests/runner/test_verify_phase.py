@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from support.waiting import PATIENCE_S
-from support.worlds import QUICK_EXPERIMENT, World, hardware
+from support.laboratories.worlds import QUICK_EXPERIMENT, World, hardware
+from support.processes.waiting import PATIENCE_S
 
 pytestmark = pytest.mark.slow
 NUDGE = b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=20, v=3)\nend\n"

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.analysis.calibration import solve_vector
-from support.drawn_laboratory import SPEED_RAD_S, drawn
-from support.single_effects import Effect, bound, with_effect
-from support.whole_runs import WholeRun, whole_run
+from rig.analysis.gyroscope.calibration import solve_vector
+from support.laboratories.drawn_laboratory import SPEED_RAD_S, drawn
+from support.laboratories.single_effects import Effect, bound, with_effect
+from support.laboratories.whole_runs import WholeRun, whole_run
 
 SEEDS = range(1, 61)  # a third of them put the share beyond U off by two in a hundred, which is what is asked
 SENSORS = ("gyro", "reference")

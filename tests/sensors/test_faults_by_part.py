@@ -16,10 +16,10 @@ from rig.sensors.mavlink.source import mavlink
 from rig.sensors.silence import USUAL, Patience
 from rig.sensors.source import OnSamples
 from rig.world.board.serial_line import misread
-from support import autopilot_on_a_wire as autopilots
-from support import kvh_on_a_wire as kvhs
-from support.printed_lines import pty_printing, sensor_section
-from support.waiting import wait_for
+from support.processes.waiting import wait_for
+from support.wires import autopilot_on_a_wire as autopilots
+from support.wires import kvh_on_a_wire as kvhs
+from support.wires.printed_lines import pty_printing, sensor_section
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 

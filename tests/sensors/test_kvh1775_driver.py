@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
 from rig.sensors.silence import USUAL, Patience
-from support.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
-from support.waiting import wait_for, wait_for_error
+from support.processes.waiting import wait_for, wait_for_error
+from support.wires.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.config.lines_section import LinesSection
+from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.decoding import Decoded, LineReader
-from support.printed_lines import lines_section, summed
+from support.wires.printed_lines import lines_section, summed
 
 THREE: dict[str, Any] = {"columns": ("gx", "gy", "gz"), "time": None, "acceleration": None, "clock": "arrival"}
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from rig.config.lines_section import (
+from rig.config.sensors.lines_section import (
     GAP,
     LineAccelerationSection,
     LineFieldSection,
@@ -23,8 +23,8 @@ from rig.sensors.errors import SensorError
 from rig.sensors.lines.source import describe, lines, look
 from rig.sensors.silence import Patience
 from rig.sensors.source import SampleSource
-from support.printed_lines import SEVEN, lines_section, pty_printing, sensor_section
-from support.waiting import wait_for
+from support.processes.waiting import wait_for
+from support.wires.printed_lines import SEVEN, lines_section, pty_printing, sensor_section
 
 BOOT = b"ets Jul 29 2019\r\nrst:0x1\r\n"
 

@@ -7,7 +7,7 @@ import pytest
 
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.stamping import Stamper
-from support.printed_lines import lines_section
+from support.wires.printed_lines import lines_section
 
 FOUR = ("time", "gx", "gy", "gz")
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
-from rig.config.lines_section import LinesSection
+from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.guessing import Guess, guess
 from rig.sensors.lines.shape import Line, NoShape, Shape, shape_of
 from rig.sensors.lines.written import section
-from support.printed_lines import summed
+from support.wires.printed_lines import summed
 
 G = 9.80665
 STILL_S, LASTS_S = 4.0, 10.0

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rig.config.sensor_sections import SensorSection
+from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE
-from rig.data.recorded_sensor import UNKNOWN_CHANGE_K
+from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.source import MavlinkSource, look, mavlink
-from support.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
-from support.waiting import wait_for, wait_for_error
+from support.processes.waiting import wait_for, wait_for_error
+from support.wires.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
 
 UNCORRECTED = {
     "ardupilot": {"INS_GYROFFS_X": 0.01, "INS_ACCOFFS_Z": 0.3, "INS_ACCSCAL_Z": 1.05, "AHRS_ORIENTATION": 6},

@@ -34,7 +34,7 @@ from rig.station.log import log
 from rig.station.station import Stations, always_yes
 from rig.station.view import LiveView
 from rig.station.words import line, reason
-from support.full_disk import full_disk
+from support.processes.full_disk import full_disk
 
 SAMPLES = (SensorSamples("gyro", 100, 2, {"rate": (0.0, 0.0, 1.0)}), SensorSamples("reference", 50, 1, {}))
 

@@ -1,8 +1,8 @@
-"""The house in one picture: the layers contract of pyproject.toml, each room with the first line of its docstring.
+"""The house in two pictures, of the layers contracts in pyproject.toml: its rooms, and the order inside each of them.
 
     PYTHONPATH=tests python -m support.house_picture
 
-draws it anew in docs/architecture.md, between the two markers.
+draws both anew in docs/architecture.md, between their markers.
 """
 
 import ast
@@ -14,35 +14,50 @@ from support.paths import DOCS, ROOT
 
 PAGE = DOCS / "architecture.md"
 BEGIN = "<!-- drawn from pyproject.toml by tests/support/house_picture.py -->\n```text\n"
+BEGIN_INSIDE = "<!-- the order inside, drawn from pyproject.toml by tests/support/house_picture.py -->\n```text\n"
 END = "```\n<!-- end of the drawing -->\n"
 NAMES = 15  # columns of a room's name
 WORDS = 92  # columns of what is in it
 
 
 def picture() -> str:
-    """The page's drawing: scripts above the rooms in the contract's order, the board's half below."""
-    layers = [[("procedures", "procedures")], *_layers(), [("firmware_host", "firmware_host")]]
+    """Return the drawing of the rooms: scripts above them in the contract's order, the board's half below."""
+    rooms = [[(name, f"rig/{name}") for name in layer] for layer in _contracts()["rig"]]
+    layers = [[("procedures", "procedures")], *rooms, [("firmware_host", "firmware_host")]]
     rows = ["".join(_row(name, _said(path)) for name, path in layer) for layer in layers]
     return _rule("┌", "┬", "┐") + _rule("├", "┼", "┤").join(rows) + _rule("└", "┴", "┘")
+
+
+def inside() -> str:
+    """Return the drawing of each room's inside: layers from the top to the bottom, folders with a slash."""
+    rooms = {name: layers for name, layers in _contracts().items() if name != "rig"}
+    rows = ["".join(_inside(name.replace(".", "/"), layers)) for name, layers in rooms.items()]
+    return _rule("┌", "┬", "┐") + _rule("├", "┼", "┤").join(rows) + _rule("└", "┴", "┘")
+
+
+def _inside(path: str, layers: list[list[str]]) -> list[str]:
+    lines = ["  ".join(f"{name}/" if (ROOT / path / name).is_dir() else name for name in layer) for layer in layers]
+    short = path.removeprefix("rig/")
+    return [_row(short if index == 0 else "", line) for index, line in enumerate(lines)]
 
 
 def _rule(left: str, middle: str, right: str) -> str:
     return f"{left}{'─' * (NAMES + 2)}{middle}{'─' * (WORDS + 2)}{right}\n"
 
 
-def _layers() -> list[list[tuple[str, str]]]:
-    """Name and path of every room, layer by layer from the top."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
-        "contracts"
-    ]
-    (contract,) = (each for each in contracts if each["type"] == "layers")
-    return [
-        [(name.strip(), f"rig/{name.strip()}") for name in re.split(r"[|:]", layer)] for layer in contract["layers"]
-    ]
+def _contracts() -> dict[str, list[list[str]]]:
+    """Return each package that has a layers contract, with the names on its layers from the top."""
+    written = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    return {
+        container: [[name.strip() for name in re.split(r"[|:]", layer)] for layer in contract["layers"]]
+        for contract in written
+        if contract["type"] == "layers"
+        for container in contract["containers"]
+    }
 
 
 def _said(path: str) -> str:
-    """The first line of a room's docstring."""
+    """Return the first line of a room's docstring."""
     package = ROOT / path / "__init__.py"
     source = package if package.exists() else ROOT / f"{path}.py"
     docstring = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8")))
@@ -51,16 +66,20 @@ def _said(path: str) -> str:
 
 
 def _row(name: str, said: str) -> str:
-    words = textwrap.wrap(said, WORDS)
+    words = textwrap.wrap(said, WORDS, break_on_hyphens=False)
     names = [name, *[""] * (len(words) - 1)]
     return "".join(f"│ {left:{NAMES}} │ {right:{WORDS}} │\n" for left, right in zip(names, words, strict=True))
 
 
 def drawn(page: str) -> str:
-    """The page with its drawing made anew."""
-    before, rest = page.split(BEGIN)
-    _, after = rest.split(END)
-    return before + BEGIN + picture() + END + after
+    """Return the page with both drawings made anew."""
+    return _between(_between(page, BEGIN, picture()), BEGIN_INSIDE, inside())
+
+
+def _between(page: str, begin: str, drawing: str) -> str:
+    before, rest = page.split(begin)
+    _, after = rest.split(END, maxsplit=1)
+    return before + begin + drawing + END + after
 
 
 if __name__ == "__main__":

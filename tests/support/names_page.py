@@ -14,8 +14,8 @@ from pydantic import BaseModel
 import rig
 import rig.procedure
 from rig import cli
+from rig.data.entries.magnetometer import ReversalDocument
 from rig.data.key_meanings import meaning_of
-from rig.data.magnetometer_entries import ReversalDocument
 from rig.data.result_file import ResultDocument
 from support.paths import DOCS
 
@@ -33,7 +33,7 @@ def page_text() -> str:
         "Names that your programs and files may use. No name is reused for something else once it is released.",
         "The keys of a configuration are in [configuration.md](configuration.md), the names of errors in",
         "[errors.md](errors.md), of checks in [checks.md](checks.md), the formats of exports in",
-        "[how-to/export.md](how-to/export.md). The types of the keys of `result.json` are in",
+        "[export](how-to/finished-runs/export.md). The types of the keys of `result.json` are in",
         "[result.schema.json](result.schema.json).",
         *_keys(),
         *_commands(),

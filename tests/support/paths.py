@@ -8,4 +8,4 @@ DEMO = CONFIGS / "demo.yaml"
 DOCS = ROOT / "docs"
 FIRMWARE = ROOT / "firmware_host" / "firmware"
 IMAGE = FIRMWARE / "image"
-RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"  # frozen: see support.frozen
+RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"  # frozen: see support.recordings.frozen

@@ -9,18 +9,18 @@ from pathlib import Path
 import pytest
 
 from support.paths import ROOT
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 ENTRIES = """
 [rig.turners]
-turntable = support.turntable:KIND
+turntable = support.extensions.turntable:KIND
 [rig.procedures]
-one_axis = support.turntable:PROCEDURE
+one_axis = support.extensions.turntable:PROCEDURE
 """
 READ = """
 import sys
 from pathlib import Path
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.page.arm import stance
 from rig.page.replay import moments
 from rig.station.events import ArmSeen
@@ -47,7 +47,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 def recorded(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of it, with its result."""
     folder = tmp_path_factory.mktemp("run")
-    ran(installed, "-m", "support.turned_run", str(folder))
+    ran(installed, "-m", "support.extensions.turned_run", str(folder))
     result = ran(installed, "-m", "rig", "solve", str(folder), "--json")
     (folder / "result.json").write_text(result, encoding="utf-8")
     return folder

@@ -7,8 +7,8 @@ from rig.world.board.sensing_element import ElementFault, SensingElement
 from rig.world.clock import TICK_S, Clock
 from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
+from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.modes import RuntimeState, SafetyMode
-from rig.world.ur10e.primary import PrimarySession
 from support.paths import DEMO
 
 LOADED = load(DEMO)

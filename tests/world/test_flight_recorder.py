@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rig.world.flight_recorder import LATE_S, RECORDS, FlightRecorder
-from support.waiting import wait_for
-from support.worlds import World, late_path
+from support.laboratories.worlds import World, late_path
+from support.processes.waiting import wait_for
 
 
 def test_a_step_that_is_held_is_recorded_with_its_stack_and_whom_it_waited_for(tmp_path: Path) -> None:

@@ -11,18 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from firmware_host.frames import FrameReader
 from rig.config.load import load
-from rig.config.sensor_sections import SensorSection
-from rig.config.world_models import SimulatedSensorSection, WorldSection
+from rig.config.sensors.sensor_sections import SensorSection
+from rig.config.world.laboratory import SimulatedSensorSection, WorldSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.clock import TICK_S, TICKS_PER_SECOND, Clock
 from rig.world.section import world_section
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.flange_motion import Felt
-from rig.world.ur10e.forward_kinematics import flange_rate
-from rig.world.ur10e.primary import PrimarySession
-from rig.world.ur10e.rtde import Output
-from support.ideal import ideal_document
-from support.laboratory_host import Host, host
+from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.rtde import Output
+from rig.world.ur10e.motion.flange_motion import Felt
+from rig.world.ur10e.motion.forward_kinematics import flange_rate
+from support.laboratories.ideal import ideal_document
+from support.laboratories.laboratory_host import Host, host
 from support.paths import DEMO
 
 pytestmark = pytest.mark.slow

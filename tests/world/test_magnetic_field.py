@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rig.config.sensor_sections import MagnetometerSection
-from rig.config.world_magnetism import IronSection, SimulatedMagnetometerSection
-from rig.config.world_models import SiteSection
+from rig.config.sensors.sensor_sections import MagnetometerSection
+from rig.config.world.laboratory import SiteSection
+from rig.config.world.magnetism import IronSection, SimulatedMagnetometerSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.magnetic_field import MagneticField, Room, magnetic_field_of
-from rig.world.ur10e.forward_kinematics import frames
+from rig.world.ur10e.motion.forward_kinematics import frames
 
 POSE = list(frames((0.1, -1.2, 1.9, -0.7, -1.4, 0.6)))
 PLACES = ((0.0, 0.0, 0.0), (0.7, -0.2, 0.4))

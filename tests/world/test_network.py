@@ -3,7 +3,7 @@
 import socket
 
 from rig.world.network import Network
-from support.worlds import fresh_host
+from support.laboratories.worlds import fresh_host
 
 PROGRAM = b"def nudge():\nend\n"
 

@@ -18,10 +18,10 @@ from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, Clock
 from rig.world.process import ARM_LAG_S
 from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
-from support.arm_relay import relay
-from support.rtde_reader import RtdeReader
-from support.waiting import wait_for
-from support.worlds import World, fresh_host
+from support.laboratories.worlds import World, fresh_host
+from support.processes.waiting import wait_for
+from support.wires.arm_relay import relay
+from support.wires.rtde_reader import RtdeReader
 
 PERIOD_S = 0.008  # between packets at 125 Hz
 LAG_S = 5.5 * PERIOD_S

@@ -8,7 +8,7 @@ import pytest
 
 from rig.config.load import load
 from rig.world.process import World
-from support.commands import configuration
+from support.laboratories.commands import configuration
 
 
 @pytest.mark.slow

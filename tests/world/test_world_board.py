@@ -11,11 +11,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from firmware_host.client import Board, SampleBatch
-from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
+from firmware_host.emulator.chip.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
 from firmware_host.errors import BoardError
 from firmware_host.frames import FrameReader, encode
 from rig.config.load import Loaded
-from rig.config.sensor_sections import mounting_matrix
+from rig.config.sensors.sensor_sections import mounting_matrix
 from rig.errors import Refused
 from rig.motion.geometry import flange_rate
 from rig.world.board.flash_file import flash_of
@@ -23,11 +23,11 @@ from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.section import world_section
-from support.ideal import ideal
-from support.laboratory_host import Host, booted, host
+from support.laboratories.ideal import ideal
+from support.laboratories.laboratory_host import Host, booted, host
+from support.laboratories.worlds import World, WorldHandle
 from support.paths import DEMO
-from support.waiting import wait_for, wait_for_error
-from support.worlds import World, WorldHandle
+from support.processes.waiting import wait_for, wait_for_error
 
 pytestmark = pytest.mark.slow
 

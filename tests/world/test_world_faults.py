@@ -12,9 +12,9 @@ import sys
 
 import pytest
 
-from support.arm_client import client
-from support.waiting import PATIENCE_S, wait_for
-from support.worlds import World, WorldHandle, fresh_host
+from support.laboratories.worlds import World, WorldHandle, fresh_host
+from support.processes.waiting import PATIENCE_S, wait_for
+from support.wires.arm_client import client
 
 pytestmark = pytest.mark.slow
 

@@ -5,12 +5,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from rig.config.world_models import SimulatedSensorSection
+from rig.config.world.laboratory import SimulatedSensorSection
 from rig.sensors.kvh1775.messages import MessageReader
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.instrument import Kvh1775
 from rig.world.kvh1775.memory import Memory
-from support.kvh_on_a_wire import STILL, section
+from support.wires.kvh_on_a_wire import STILL, section
 
 PERFECT = SimulatedSensorSection(
     scale=(1, 1, 1), bias_rad_s=(0, 0, 0), noise_rad_s=0.0, accelerometer={"noise_m_s2": 0.0}, temperature_c=20

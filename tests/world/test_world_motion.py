@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rig.motion import geometry as rig_kinematics
 from rig.world.clock import TICK_S, Clock
-from rig.world.ur10e import forward_kinematics
-from rig.world.ur10e.joint_motion import Motion
-from rig.world.ur10e.ripple import Ripple, ripple
-from rig.world.ur10e.trajectory import Joints
+from rig.world.ur10e.motion import forward_kinematics
+from rig.world.ur10e.motion.joint_motion import Motion
+from rig.world.ur10e.motion.ripple import Ripple, ripple
+from rig.world.ur10e.motion.trajectory import Joints
 
 HOME: Joints = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
 CYCLES = (18, 31, 50)

@@ -14,13 +14,13 @@ from rig.world.laboratory import Laboratory
 from rig.world.network import Session
 from rig.world.process import World
 from rig.world.section import world_section
-from rig.world.ur10e.dashboard_server import DashboardSession
-from rig.world.ur10e.primary import PrimarySession
+from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
+from rig.world.ur10e.interfaces.primary import PrimarySession
+from rig.world.ur10e.interfaces.rtde import RtdeSession
+from rig.world.ur10e.interfaces.variables import INPUTS, OUTPUTS
 from rig.world.ur10e.robot import Robot
-from rig.world.ur10e.rtde import RtdeSession
-from rig.world.ur10e.variables import INPUTS, OUTPUTS
-from support.damaged_messages import carry_to_world
 from support.paths import DEMO
+from support.wires.damaged_messages import carry_to_world
 
 LOADED = load(DEMO)
 LABORATORY = Laboratory(LOADED.config, world_section(LOADED))
@@ -105,7 +105,7 @@ def test_any_recipe_at_any_rate(outputs: list[str], inputs: list[str], rate_hz: 
 
 @pytest.mark.parametrize("name", ["RTDE", "dashboard", "primary"])
 def test_damaged_messages(name: str) -> None:
-    """A hundred thousand of them: benchmarks/damaged_frames.py."""
+    """A hundred thousand of them: benchmarks/wire/damaged_frames.py."""
     ends = carry_to_world(name, 300, seed=1)
     refused = sum(count for end, count in ends.items() if end.startswith("refused"))
     assert refused > 20, ends

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.session import Handled
-from rig.estimation.increments import track
+from rig.estimation.gyroscope.increments import track
 
 
 @dataclass(frozen=True, slots=True)

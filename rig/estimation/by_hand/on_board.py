@@ -1,7 +1,7 @@
 """A calibration by hand as the board makes it, a move at a time and each once, in double precision.
 
-The equations are those of `firmware_host/firmware/core/hand_solver.c`; what differs is the arithmetic alone. Which
-rests and moves there are, on which faces, is the board's to say.
+The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; what differs is the arithmetic alone.
+Which rests and moves there are, on which faces, is the board's to say.
 
     m = F ω + b + G u,   C = F⁻¹
 

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.budget import Budget, Contributor
 from rig.estimation.by_hand.axes import check_axes
 from rig.estimation.by_hand.creep import crept
 from rig.estimation.by_hand.doubts import doubted, hidden
 from rig.estimation.by_hand.fit import SEEN, Fit, fit, white
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
 from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told, without_crept
-from rig.estimation.known_turns import TurnedSolution
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.gyroscope.known_turns import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 LOOSE = 3.0  # times what is stated of hands: faces that repeat no better may be other faces

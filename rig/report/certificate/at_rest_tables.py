@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.budget_entries import expanded_uncertainties
-from rig.data.drift_entries import DriftEntry
-from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.result_types import ErrorEntry
-from rig.estimation.bias_by_repeat import largest_change_std
-from rig.report.certificate.tables import AXES, AxisRow, Pair, pair, rows_of
-from rig.report.expanded import expanded
+from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.drift import DriftEntry
+from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
+from rig.data.entries.result_types import ErrorEntry
+from rig.estimation.temperature.bias_by_repeat import largest_change_std
+from rig.report.tables.certificate import AXES, AxisRow, Pair, pair, rows_of
+from rig.report.words.expanded import expanded
 
 MICRO = 1e6
 

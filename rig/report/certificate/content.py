@@ -8,10 +8,11 @@ from types import MappingProxyType
 from typing import Any
 
 from rig.analysis.clock import BY_COMPUTER
-from rig.data.budget_entries import BudgetEntry
-from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.provenance import calls_itself_simulated
+from rig.data.entries.budget import BudgetEntry
+from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
+from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import FIELD
+from rig.data.recording.provenance import calls_itself_simulated
 from rig.data.result_file import (
     CheckEntry,
     FileEntry,
@@ -20,16 +21,15 @@ from rig.data.result_file import (
     ResultDocument,
     VerificationEntry,
 )
-from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.motion.steps import closes, turn_words
 from rig.report.certificate.statements import Stated
-from rig.report.kinds.characteristic import Term, terms
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Standard, Without
+from rig.report.entries.omitted import omitted_lines
+from rig.report.findings.characteristic import Term, terms
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Standard, Without
 from rig.report.kinds.registry import kinds, outlets, shown
-from rig.report.mounts import mount_lines
-from rig.report.omitted import omitted_lines
+from rig.report.words.mounts import mount_lines
 from rig.turners.kind import Words
 from rig.turners.registry import words_of
 

@@ -9,19 +9,19 @@ from dataclasses import replace
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
-from rig.config.sensor_catalogue import has_own_port
+from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.result_file import CheckEntry, ProvenanceEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
-from rig.report.certificate.dcc_results import beside
 from rig.report.certificate.method_words import method_in_short
-from rig.report.certificate.tables import kind as kind_of_part
-from rig.report.certificate.xml_parts import DCC as NAMESPACE
-from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
-from rig.report.kinds.characteristic import terms
-from rig.report.kinds.kind import Measured
+from rig.report.findings.characteristic import terms
+from rig.report.findings.kind import Measured
 from rig.report.kinds.registry import outlets
-from rig.report.validity_words import told_by
+from rig.report.tables.certificate import kind as kind_of_part
+from rig.report.tables.dcc_results import beside
+from rig.report.tables.xml_parts import DCC as NAMESPACE
+from rig.report.tables.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
+from rig.report.words.validity_words import told_by
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"

@@ -3,24 +3,18 @@
 from functools import cache
 from typing import TYPE_CHECKING
 
-from rig.config.sensor_catalogue import has_own_port
+from rig.config.sensors.sensor_catalogue import has_own_port
 from rig.data.absent import NO_BOARD
 from rig.data.installed_kinds import quantities
-from rig.report import expanded, printed_budget, rounding, temperature_words, told_words, validity_words
-from rig.report.certificate import (
-    at_rest_tables,
-    coverage_words,
-    method_words,
-    plots,
-    tables,
-    temperature_curves,
-    validity,
-)
+from rig.report.certificate import at_rest_tables, method_words, plots, temperature_curves, validity
 from rig.report.certificate.content import Certificate
-from rig.report.certificate.tables import DEG, JOINT_FACTOR
-from rig.report.kinds import characteristics
-from rig.report.kinds.kind import OWN_TEMPLATES
+from rig.report.findings import characteristics
+from rig.report.findings.kind import OWN_TEMPLATES
 from rig.report.kinds.registry import kinds
+from rig.report.tables import certificate as tables
+from rig.report.tables import coverage as coverage_words
+from rig.report.tables.certificate import DEG, JOINT_FACTOR
+from rig.report.words import expanded, printed_budget, rounding, temperature_words, told_words, validity_words
 
 if TYPE_CHECKING:
     from jinja2 import Template

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from rig.data.budget_entries import BudgetEntry
-from rig.data.drift_entries import DriftEntry
+from rig.data.entries.budget import BudgetEntry
+from rig.data.entries.drift import DriftEntry
 from rig.data.quantity import Unit
 from rig.data.result_file import GyroscopeEntry
-from rig.report.certificate.tables import AXES
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.unexplained import Unexplained, of_attitudes, of_repeats, of_sweeps_and_rests
-from rig.report.printed_budget import shown_places
+from rig.report.findings.finding import Finding
+from rig.report.findings.unexplained import Unexplained, of_attitudes, of_repeats, of_sweeps_and_rests
+from rig.report.tables.certificate import AXES
+from rig.report.words.printed_budget import shown_places
 
 WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.config.judging_sections import CertificateSection, SiteSection
+from rig.config.judging.judging_sections import CertificateSection, SiteSection
 from rig.config.load import Loaded, load, load_statement
 from rig.data.run_folder import CONFIG
 from rig.errors import Refused

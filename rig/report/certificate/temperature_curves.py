@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.quantity import Quantity, Unit
-from rig.data.temperature_entries import OverTemperatureEntry
 from rig.estimation.arrays import Array
 from rig.report.certificate.plots import HEIGHT, LEFT, RIGHT, TOP, WIDTH, reach_in
-from rig.report.certificate.tables import Pair, pair
-from rig.report.temperature_words import shown_rows
+from rig.report.tables.certificate import Pair, pair
+from rig.report.words.temperature_words import shown_rows
 
 SHARES = (Unit("%", 1e-2), Unit("ppm", 1e-6))
 

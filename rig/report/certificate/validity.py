@@ -1,7 +1,7 @@
 """What a certificate's uncertainties leave out, quantity by quantity: nobody should take it for included."""
 
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.budget_entries import BudgetEntry
+from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.budget import BudgetEntry
 from rig.data.result_file import GyroscopeEntry
 
 # What a budget has of it, it has of the run: a value is that of one temperature, one power-up and one mounting.

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
-from rig.config.written_file import write_new
+from rig.config.files.written_file import write_new
 from rig.data.result_file import ResultDocument
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page

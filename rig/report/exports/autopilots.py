@@ -16,7 +16,7 @@ from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.exports.calibrations import Calibrations
 from rig.report.exports.over_temperature import ardupilot_parameters, px4_parameters
-from rig.report.kinds.corrected import Corrected
+from rig.report.findings.corrected import Corrected
 from rig.report.kinds.registry import kinds
 
 GAUSS_T, MILLIGAUSS_T = 1e-4, 1e-7

@@ -6,13 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
-from rig.data.temperature_entries import OverTemperatureEntry
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
-from rig.report.kinds.corrected import Corrected
+from rig.report.findings.corrected import Corrected
 from rig.report.kinds.registry import outlets, terms_of
 
 

@@ -12,8 +12,8 @@ A gyroscope's bias b is added, g = K (m + b), so an offset is −b. Neither has 
 from collections.abc import Iterator, Mapping
 from math import comb
 
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
-from rig.data.temperature_entries import OverTemperatureEntry
 
 ARDUPILOT_REFERENCE_C, ARDUPILOT_SIZE = 35.0, 1e6
 AXES = "XYZ"

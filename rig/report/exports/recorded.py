@@ -10,13 +10,13 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from rig.data.motion_file import Told
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.run_file import RunData
+from rig.data.recording.motion_file import Told
+from rig.data.recording.run_file import RunData
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
-from rig.observation.hand_runs import microsecond_of
+from rig.observation.by_hand.runs import microsecond_of
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.report.exports.columns import Table, readings_table, split
 

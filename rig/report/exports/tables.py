@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.config.written_file import new_file, write_new
+from rig.config.files.written_file import new_file, write_new
 from rig.estimation.arrays import Array
 from rig.report.exports.columns import Table
 from rig.report.exports.names import plain_names

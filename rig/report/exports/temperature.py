@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.data.drift_entries import SlopeEntry
+from rig.data.entries.drift import SlopeEntry
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.result_file import ResultDocument
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.report.exports.calibrations import Calibrations
-from rig.report.kinds.corrected import Corrected
+from rig.report.findings.corrected import Corrected
 
 WATCHED = (RATE, ACCELERATION)  # whose biases a run of `bias_drift` follows
 

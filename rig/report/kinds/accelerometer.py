@@ -4,31 +4,31 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rig.analysis.acceleration import AccelerometerResult, HeldOut
 from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.analysis.outcome import Outcome
 from rig.analysis.read_when import of_accelerometer
-from rig.data.accelerometer_entries import AccelerometerEntry, AlignmentEntry, ValidationEntry
+from rig.analysis.reference.acceleration import AccelerometerResult, HeldOut
+from rig.data.entries.accelerometer import AccelerometerEntry, AlignmentEntry, ValidationEntry
 from rig.data.quantity import ACCELERATION
-from rig.estimation.accelerometer_model import DELAY, SECOND
-from rig.estimation.imu import MODEL
-from rig.estimation.own_errors import NONLINEARITY
+from rig.estimation.gyroscope.own_errors import NONLINEARITY
+from rig.estimation.reference.accelerometer_model import DELAY, SECOND
+from rig.estimation.reference.imu import MODEL
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.triads import Alignment
-from rig.report.axes import line_of, triple
-from rig.report.budget_table import assumed_lines
-from rig.report.c_functions import accelerometer_lines
-from rig.report.certificate import dcc_results
-from rig.report.elsewhere_entries import accelerometers_elsewhere
+from rig.report.c_code.c_functions import accelerometer_lines
+from rig.report.entries.external import accelerometers_elsewhere
+from rig.report.entries.triad import OF_ACCELEROMETERS, triad_entry
+from rig.report.entries.when import when_entry
 from rig.report.entry import counted, entry
-from rig.report.kinds.characteristics import ACCELEROMETERS, SECOND_ORDER
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Standard
+from rig.report.findings.characteristics import ACCELEROMETERS, SECOND_ORDER
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
-from rig.report.told_words import told_from, told_lines
-from rig.report.triad_entry import OF_ACCELEROMETERS, triad_entry
-from rig.report.validity_words import warmth, when_words
-from rig.report.when_entry import when_entry
+from rig.report.tables import dcc_results
+from rig.report.tables.axes import line_of, triple
+from rig.report.tables.budget import assumed_lines
+from rig.report.words.told_words import told_from, told_lines
+from rig.report.words.validity_words import warmth, when_words
 
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:

@@ -5,26 +5,26 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.bias_drift import SLOPE, Anew, BiasDrift
 from rig.analysis.outcome import Outcome
-from rig.data.drift_entries import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
+from rig.analysis.temperature.bias_drift import SLOPE, Anew, BiasDrift
+from rig.data.entries.drift import BiasEntry, BiasStepEntry, DriftEntry, RepeatEntry, SlopeEntry
+from rig.data.entries.result_types import ErrorEntry, Vector3
 from rig.data.installed_kinds import quantities
 from rig.data.quantity import RATE, Quantity
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import ErrorEntry, Vector3
 from rig.estimation.arrays import Array
-from rig.estimation.bias_by_repeat import FALSE_ALARM
-from rig.report.budget_table import heading_of
-from rig.report.certificate import dcc_results
+from rig.estimation.temperature.bias_by_repeat import FALSE_ALARM
+from rig.report.entries.error import error_entry
 from rig.report.entry import counted
-from rig.report.error_entry import error_entry
-from rig.report.expanded import expanded, factor_words
-from rig.report.kinds.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
-from rig.report.kinds.unexplained import of_repeats
+from rig.report.findings.characteristics import DRIFT_SLOPE, DRIFTS, LARGEST_CHANGE
+from rig.report.findings.finding import Finding
+from rig.report.findings.followed import Followed
+from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
+from rig.report.findings.unexplained import of_repeats
+from rig.report.tables import dcc_results
+from rig.report.tables.budget import heading_of
+from rig.report.words.expanded import expanded, factor_words
 from rig.station.plain_text import plain
 
 
@@ -199,7 +199,7 @@ BIAS_DRIFT = ResultKind(
     shown=_shown,
     followed=_followed,
     header=Without("firmware corrects by one bias; `rig export` makes that of a temperature"),
-    figures="rig.report.drift_figures:write_drift_figures",
+    figures="rig.report.figures.drift:write_drift_figures",
     block="at_rest.html.j2:drift",
     measured=_measured,
     standard=Without("it hangs on that of the sensor whose bias it is"),

@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 
-from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.quantity import RATE
 from rig.data.result_file import GyroscopeEntry, ResultDocument
-from rig.report.certificate import dcc_results
-from rig.report.kinds.characteristics import EARTH_RATE, EARTHS_RATES
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed
+from rig.report.findings.characteristics import EARTH_RATE, EARTHS_RATES
+from rig.report.findings.finding import Finding
+from rig.report.findings.followed import Followed
+from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
 from rig.report.kinds.gyroscope import temperatures_c
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
+from rig.report.tables import dcc_results
 
 
 def _found(document: ResultDocument) -> Iterator[Finding[GyroscopeEntry]]:
@@ -65,7 +65,7 @@ EARTHS_RATE = ResultKind(
     shown=_shown,
     followed=_followed,
     header=Without("it is the place's, not the sensor's"),
-    figures="rig.report.earth_rate_figures:write_earth_rate_figures",
+    figures="rig.report.figures.earth_rate:write_earth_rate_figures",
     block=Without("it stands in the block of its gyroscope"),
     measured=_measured,
     standard=Without("it hangs on that of its gyroscope"),

@@ -8,29 +8,29 @@ from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.analysis.read_when import of_gyroscope
-from rig.data.attitude_entries import AttitudesEntry
-from rig.data.budget_entries import expanded_uncertainties
+from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.external import AttitudesEntry
+from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
 from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, ResultDocument, TimeBaseEntry, VectorEntry
-from rig.data.result_types import ErrorEntry, Role
 from rig.estimation.arrays import in_units_of
-from rig.estimation.six_observation import PARAMETERS
-from rig.report.axes import decimals, line_of, matrix_lines, triple
-from rig.report.c_functions import gyroscope_lines
-from rig.report.certificate import dcc_results
-from rig.report.earth_rate import earth_rate_lines
-from rig.report.elsewhere_entries import rates_in_attitudes, turned
-from rig.report.hand_entry import by_hand_lines
-from rig.report.kinds.characteristics import GYROSCOPES, NON_ORTHOGONALITY
-from rig.report.kinds.corrected import Corrected, noise_of
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Without
+from rig.estimation.gyroscope.six_observation import PARAMETERS
+from rig.report.c_code.c_functions import gyroscope_lines
+from rig.report.entries.by_hand import by_hand_lines
+from rig.report.entries.earth_rate import earth_rate_lines
+from rig.report.entries.external import rates_in_attitudes, turned
+from rig.report.entries.gyroscope import sensor_entry
+from rig.report.entries.when import when_entry
+from rig.report.findings.characteristics import GYROSCOPES, NON_ORTHOGONALITY
+from rig.report.findings.corrected import Corrected, noise_of
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Measured, ResultKind, Shown, Without
+from rig.report.findings.unexplained import of_sweeps_and_rests
 from rig.report.kinds.triad import followed_of, item_words, shown_of, tables, unsolved_lines
-from rig.report.kinds.unexplained import of_sweeps_and_rests
-from rig.report.sensor_entry import sensor_entry
-from rig.report.told_words import told_from, told_lines
-from rig.report.validity_words import load_words, speed_words, warmth, when_words
-from rig.report.when_entry import when_entry
+from rig.report.tables import dcc_results
+from rig.report.tables.axes import decimals, line_of, matrix_lines, triple
+from rig.report.words.told_words import told_from, told_lines
+from rig.report.words.validity_words import load_words, speed_words, warmth, when_words
 
 
 def _entries(outcome: Outcome) -> dict[str, GyroscopeEntry]:

@@ -5,28 +5,28 @@ from collections.abc import Iterator
 import numpy as np
 
 from rig.analysis.freedom_beside import of_field_angles
-from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
 from rig.analysis.read_when import of_magnetometer
-from rig.data.magnetometer_entries import FieldDriftEntry, MagnetometerEntry, UniformityEntry
+from rig.analysis.reference.magnetic_field import MagnetometerResult
+from rig.data.entries.magnetometer import FieldDriftEntry, MagnetometerEntry, UniformityEntry
+from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import FIELD
-from rig.data.result_types import ErrorEntry
-from rig.estimation.magnetometer import MODEL, hard_iron
-from rig.report.axes import triple
-from rig.report.budget_table import assumed_lines
-from rig.report.c_functions import magnetometer_lines
-from rig.report.certificate import dcc_results
-from rig.report.elsewhere_entries import magnetometers_elsewhere
+from rig.estimation.reference.magnetometer import MODEL, hard_iron
+from rig.report.c_code.c_functions import magnetometer_lines
+from rig.report.entries.error import error_entry
+from rig.report.entries.external import magnetometers_elsewhere
+from rig.report.entries.triad import OF_MAGNETOMETERS, attitudes_entry
+from rig.report.entries.when import when_entry
 from rig.report.entry import counted, entry
-from rig.report.error_entry import error_entry
-from rig.report.kinds.characteristics import MAGNETOMETERS
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Standard
+from rig.report.findings.characteristics import MAGNETOMETERS
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Standard
 from rig.report.kinds.triad import Words, attitude_lines, method_lines, triad_kind
-from rig.report.told_words import told_from, told_lines
-from rig.report.triad_entry import OF_MAGNETOMETERS, attitudes_entry
-from rig.report.validity_words import when_words
-from rig.report.when_entry import when_entry
+from rig.report.tables import dcc_results
+from rig.report.tables.axes import triple
+from rig.report.tables.budget import assumed_lines
+from rig.report.words.told_words import told_from, told_lines
+from rig.report.words.validity_words import when_words
 
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 

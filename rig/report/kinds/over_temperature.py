@@ -5,20 +5,20 @@ from collections.abc import Iterator, Mapping
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
+from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
-from rig.data.motion_file import Item
-from rig.data.recorded_sensor import RecordedSensor
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.result_file import ResultDocument
-from rig.data.temperature_entries import OverTemperatureEntry
-from rig.report.certificate import dcc_results
-from rig.report.kinds.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Without, row_of
-from rig.report.rounding import plus_minus
-from rig.report.temperature_c_functions import temperature_lines
-from rig.report.temperature_entry import temperature_entry
-from rig.report.temperature_words import about_lines, shown_rows
+from rig.report.c_code.temperature import temperature_lines
+from rig.report.entries.temperature import temperature_entry
+from rig.report.findings.characteristics import BIAS_SLOPE_AT_REFERENCE, POLYNOMIALS
+from rig.report.findings.finding import Finding
+from rig.report.findings.followed import Followed
+from rig.report.findings.kind import Measured, ResultKind, Shown, Without, row_of
+from rig.report.tables import dcc_results
+from rig.report.words.rounding import plus_minus
+from rig.report.words.temperature_words import about_lines, shown_rows
 from rig.station.plain_text import plain
 
 
@@ -93,7 +93,7 @@ OVER_TEMPERATURE = ResultKind(
     shown=_shown,
     followed=_followed,
     header=temperature_lines,
-    figures="rig.report.temperature_figures:write_temperature_figures",
+    figures="rig.report.figures.temperature:write_temperature_figures",
     block="over_temperature.html.j2:over_temperature",
     measured=_measured,
     standard=Without("it hangs on that of the sensor whose curve it is"),

@@ -7,14 +7,14 @@ from typing import Any, Final, TypeVar
 
 from rig.data.installed_kinds import installed_kinds
 from rig.data.result_file import ResultDocument
+from rig.report.findings.characteristic import Outlet, Term, terms
+from rig.report.findings.finding import Finding
+from rig.report.findings.followed import Followed, known, parameters
+from rig.report.findings.kind import ResultKind, Shown, Without, row_of
 from rig.report.kinds.accelerometer import ACCELEROMETER
 from rig.report.kinds.bias_drift import BIAS_DRIFT
-from rig.report.kinds.characteristic import Outlet, Term, terms
 from rig.report.kinds.earth_rate import EARTHS_RATE
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Followed, known, parameters
 from rig.report.kinds.gyroscope import GYROSCOPE
-from rig.report.kinds.kind import ResultKind, Shown, Without, row_of
 from rig.report.kinds.magnetometer import MAGNETOMETER
 from rig.report.kinds.over_temperature import OVER_TEMPERATURE
 from rig.report.kinds.verification import VERIFICATION

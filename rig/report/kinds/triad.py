@@ -9,22 +9,22 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
-from rig.data.budget_entries import expanded_uncertainties
-from rig.data.magnetometer_entries import ReversalEntry
-from rig.data.motion_file import NOT_STATED
+from rig.data.entries.budget import expanded_uncertainties
+from rig.data.entries.magnetometer import ReversalEntry
+from rig.data.entries.result_types import ErrorEntry
 from rig.data.quantity import Quantity
+from rig.data.recording.motion_file import NOT_STATED
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.report.axes import line_of, scale_and_bias_table, triple
-from rig.report.budget_table import budget_table, expanded_heading
-from rig.report.kinds.characteristic import Characteristic
-from rig.report.kinds.characteristics import NON_ORTHOGONALITY
-from rig.report.kinds.corrected import Corrected, noise_of
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.followed import Calibrated, Followed, known, scale_and_bias
-from rig.report.kinds.kind import Measured, ResultKind, Shown, Standard, Three
-from rig.report.kinds.unexplained import of_attitudes
+from rig.report.findings.characteristic import Characteristic
+from rig.report.findings.characteristics import NON_ORTHOGONALITY
+from rig.report.findings.corrected import Corrected, noise_of
+from rig.report.findings.finding import Finding
+from rig.report.findings.followed import Calibrated, Followed, known, scale_and_bias
+from rig.report.findings.kind import Measured, ResultKind, Shown, Standard, Three
+from rig.report.findings.unexplained import of_attitudes
+from rig.report.tables.axes import line_of, scale_and_bias_table, triple
+from rig.report.tables.budget import budget_table, expanded_heading
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +188,7 @@ def triad_kind(
         shown=shown_of,
         followed=followed_of,
         header=header,
-        figures="rig.report.attitude_figures:write_attitude_figures",
+        figures="rig.report.figures.attitudes:write_attitude_figures",
         block=block,
         measured=measured,
         standard=standard,

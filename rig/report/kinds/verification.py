@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.comparison import Comparison
+from rig.analysis.gyroscope.comparison import Comparison
+from rig.analysis.gyroscope.verification import Verification
 from rig.analysis.outcome import Outcome
-from rig.analysis.verification import Verification
 from rig.data.quantity import RATE
 from rig.data.result_file import (
     ComparisonEntry,
@@ -17,10 +17,10 @@ from rig.data.result_file import (
     RotationEntry,
     VerificationEntry,
 )
-from rig.report.certificate import dcc_results
 from rig.report.entry import entry
-from rig.report.kinds.finding import Finding
-from rig.report.kinds.kind import Measured, ResultKind, Without
+from rig.report.findings.finding import Finding
+from rig.report.findings.kind import Measured, ResultKind, Without
+from rig.report.tables import dcc_results
 from rig.station.plain_text import plain
 
 
@@ -118,7 +118,7 @@ VERIFICATION = ResultKind(
     shown=NO_PARAMETER,
     followed=NO_PARAMETER,
     header=NO_PARAMETER,
-    figures="rig.report.figures:write_figures",
+    figures="rig.report.figures.verification:write_figures",
     block=Without("it stands in the block of its gyroscope, or alone where nothing was calibrated"),
     measured=_measured,
     standard=Without("it hangs on that of the reference beside it"),

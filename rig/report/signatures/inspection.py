@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.report.signatures.findings import Looked, not_as_signed, not_signed

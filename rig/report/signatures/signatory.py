@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.report.signatures.token_address import PASSPHRASE, TokenKey, is_token_address, token_key

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
-from rig.data.channel import stamped
+from rig.data.recording.channel import stamped
 
 MESSAGES_EACH = 4  # temperature, x, y, z: by the sequence number, whose 128 are a multiple of it
 GAUSS_T = 1e-4

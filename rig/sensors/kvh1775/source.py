@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
-from rig.data.channel import of_thermometer, stamped
+from rig.config.sensors.sensor_sections import OwnPortSection, SensorSection, field_name
 from rig.data.not_provided import POSSIBLE_C, Absent
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
-from rig.data.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import of_thermometer, stamped
+from rig.data.recording.recorded_sensor import RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import SEPARATORS, LinesSection
+from rig.config.sensors.lines_section import SEPARATORS, LinesSection
 from rig.estimation.arrays import Array
 from rig.sensors.lines.fields import FieldReader
 from rig.sensors.lines.numbers import numbers_at

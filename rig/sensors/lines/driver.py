@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import LinesSection
-from rig.config.sensor_sections import OwnPortSection
+from rig.config.sensors.lines_section import LinesSection
+from rig.config.sensors.sensor_sections import OwnPortSection
 from rig.config.units import UNITS
 from rig.errors.quoting import quote
 from rig.estimation.arrays import Array
@@ -176,7 +176,7 @@ class LinesDevice:
             raise SensorError(
                 "lines_time_stands",
                 f"{self.where} prints the same time {printed[0]:.15g} again and again",
-                "See which column is the time, and in which unit: docs/how-to/lines.md",
+                "See which column is the time, and in which unit: docs/how-to/at-the-rig/lines.md",
             )
         coarse = typical_s < 50 * step_s
         return count / span_s if coarse else 1 / typical_s if typical_s > 0 else count / span_s

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rig.config.lines_section import GYROSCOPE, SEPARATORS, LinesSection
+from rig.config.sensors.lines_section import GYROSCOPE, SEPARATORS, LinesSection
 from rig.data.not_provided import POSSIBLE_C, Absent
 from rig.estimation.arrays import Array
 

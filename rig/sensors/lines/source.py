@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import (
+from rig.config.sensors.lines_section import (
     ACCELEROMETER,
     GYROSCOPE,
     MAGNETOMETER,
@@ -17,11 +17,11 @@ from rig.config.lines_section import (
     LineRateSection,
     LinesSection,
 )
-from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
+from rig.config.sensors.sensor_sections import OwnPortSection, SensorSection, field_name, scalar_name
 from rig.config.units import UNITS
-from rig.data.channel import Channel, of_thermometer, of_three_axes, stamped
 from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity
-from rig.data.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import Channel, of_thermometer, of_three_axes, stamped
+from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.lines.driver import LinesDevice

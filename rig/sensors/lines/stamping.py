@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.lines_section import LONGEST_GAP_S, LinesSection, LineTimeSection
+from rig.config.sensors.lines_section import LONGEST_GAP_S, LinesSection, LineTimeSection
 from rig.config.units import UNITS
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from rig.config.lines_section import GAP
+from rig.config.sensors.lines_section import GAP
 from rig.sensors.lines.guessing import Guess
 from rig.sensors.lines.shape import Shape
 

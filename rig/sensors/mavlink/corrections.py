@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from rig.config.mavlink_section import MavlinkSection
+from rig.config.sensors.mavlink_section import MavlinkSection
 from rig.estimation.arrays import Array
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.dialect import ARDUPILOT

@@ -13,7 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from rig.config.own_folder import own_folder
+from rig.config.files.own_folder import own_folder
 from rig.errors import Refused
 from rig.sensors.mavlink.parameters import REAL32, WHOLE, Parameter
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.mavlink_section import MavlinkSection
-from rig.config.sensor_sections import SensorSection
-from rig.data.channel import Channel, of_thermometer, stamped
+from rig.config.sensors.mavlink_section import MavlinkSection
+from rig.config.sensors.sensor_sections import SensorSection
 from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
-from rig.data.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
+from rig.data.recording.channel import Channel, of_thermometer, stamped
+from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K, RecordedSensor, range_m_s2, recorded_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.corrections import Correction, correction_of, delay_s, names_of, refusals

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.config.hand_sections import HandSection
+from rig.config.procedures.hand_sections import HandSection
 from rig.errors import Fault, Problem
 from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg
@@ -64,7 +64,7 @@ class HandReport:
 
 
 class Hand:
-    """A `Turner` that is told nothing: who drives the operator is the runner's session (`rig.runner.by_hand`)."""
+    """A `Turner` that is told nothing: who drives the operator is the runner (`rig.runner.by_hand.session`)."""
 
     missed_states = 0
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from rig.data import silence
+from rig.data.processes import silence
 from rig.errors import Fault, Problem, Refused, RigError, refuse
 from rig.motion.carried import Carried
 from rig.motion.steps import Motion

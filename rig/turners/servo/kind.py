@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from math import degrees, pi, radians
 from pathlib import Path
 
-from rig.config.servo_section import ServoSection
+from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Problem
 from rig.motion.carried import Carried
 from rig.motion.geometry import DenavitHartenberg

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from rig.data import silence
+from rig.data.processes import silence
 from rig.errors import Problem
 from rig.turners.servo import problems
 from rig.turners.servo.bus import Bus, BusError, Denied, Lost, PortGone

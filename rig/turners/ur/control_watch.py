@@ -15,11 +15,11 @@ from typing import Literal
 
 from rig.errors import Problem
 from rig.turners.ur.condition import switched_to_local_control
-from rig.turners.ur.controller_words import ProgramException, ProgramStopped, words_in
-from rig.turners.ur.dashboard import Dashboard
+from rig.turners.ur.controller.controller_words import ProgramException, ProgramStopped, words_in
+from rig.turners.ur.controller.dashboard import Dashboard
+from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, packages
+from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x
-from rig.turners.ur.primary import PORT, ROBOT_MESSAGE, packages
-from rig.turners.ur.robot_api import RobotApi
 
 ASK_S = 0.5  # the control mode is asked so often
 LOOK_S = 0.1  # the thread ends within this when it is no longer wanted

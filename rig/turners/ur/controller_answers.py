@@ -10,14 +10,14 @@ from dataclasses import replace
 from rig.errors import Problem, Refused
 from rig.motion.state import ArmState, RuntimeState
 from rig.turners.ur.condition import MAKERS_SIMULATOR
-from rig.turners.ur.dashboard import Dashboard
+from rig.turners.ur.controller.dashboard import Dashboard
+from rig.turners.ur.controller.primary import Account, read_account
+from rig.turners.ur.controller.primary_stop import PrimaryStop
+from rig.turners.ur.controller.registers import free_half
+from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x, model_found, series_problem
 from rig.turners.ur.messages import Connected
-from rig.turners.ur.primary import Account, read_account
-from rig.turners.ur.primary_stop import PrimaryStop
-from rig.turners.ur.registers import free_half
 from rig.turners.ur.report import ArmReport
-from rig.turners.ur.robot_api import RobotApi
 
 LOOK_S = 1.0  # for a port that may be closed
 ANSWER_S = 5.0  # one that is open has so long to answer while nothing moves

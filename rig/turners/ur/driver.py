@@ -12,10 +12,12 @@ from rig.motion.carried import Carried
 from rig.motion.state import ArmState, RuntimeState
 from rig.motion.steps import Motion, travel
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
-from rig.turners.ur.child_link import ChildLink
-from rig.turners.ur.client_problems import link_lost
+from rig.turners.ur.child.client_problems import link_lost
+from rig.turners.ur.child.link import ChildLink
 from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, payload_refused, readiness
 from rig.turners.ur.control_watch import ControlWatch
+from rig.turners.ur.controller.robot_api import PORT as ROBOT_API_PORT
+from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.controller_answers import ANSWER_S, in_local_control, reported, stop_problem
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import (
@@ -32,11 +34,9 @@ from rig.turners.ur.messages import (
     TakeControl,
 )
 from rig.turners.ur.report import ArmReport
-from rig.turners.ur.robot_api import PORT as ROBOT_API_PORT
-from rig.turners.ur.robot_api import RobotApi
-from rig.turners.ur.stop_paths import StopPath, stop_paths
-from rig.turners.ur.stop_trial import stop_trial
-from rig.turners.ur.stopping import Order, Stop
+from rig.turners.ur.stopping.stop import Order, Stop
+from rig.turners.ur.stopping.stop_paths import StopPath, stop_paths
+from rig.turners.ur.stopping.stop_trial import stop_trial
 from rig.turners.ur.supervision import Stage, Supervision, stopped_at_start
 
 WATCH_S = 0.02  # the caller's watch is called at least this often

@@ -67,7 +67,7 @@ def series_problem(host: str, version: tuple[int, ...]) -> Problem | None:
             "polyscope_x",
             f"the controller at {host} is a PolyScope X {version_text(version)}, and the rig can stop an arm "
             f"there only from {since} on",
-            f"Update it to {since} or newer, or turn the sensors by other means: docs/how-to/other-hardware.md",
+            f"Update it to {since} or newer, or turn the sensors otherwise: docs/how-to/with-code/other-hardware.md",
         )
     if version[0] < E_SERIES:
         return Problem(

@@ -14,9 +14,9 @@ from rig.motion.preflight import way_to_home
 from rig.motion.state import JOINT_NAMES, Made
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
+from rig.turners.ur.controller.registers import registers_in_use
 from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.plan_problems import plan_problems
-from rig.turners.ur.registers import registers_in_use
 from rig.turners.ur.report import MAKER, ArmReport
 
 # How far the first motion may swing the large joints through the room, and the wrists.

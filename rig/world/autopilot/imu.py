@@ -6,13 +6,13 @@ from math import cos, pi, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.emulator.accelerometer import Accelerometer
-from firmware_host.emulator.gyroscope import Gyroscope
-from rig.config.world_faulty import SimulatedFaultySection
+from firmware_host.emulator.parts.accelerometer import Accelerometer
+from firmware_host.emulator.parts.gyroscope import Gyroscope
+from rig.config.world.faulty import SimulatedFaultySection
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
-from rig.world.ur10e.forward_kinematics import rotation_from_vector
+from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 RATE_HZ = 400.0  # at which it is read: a quick main loop's
 AVERAGED = 2  # readings in a mean of PX4's VehicleIMU: IMU_INTEG_RATE is 200 Hz

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.world_autopilot import SimulatedAutopilotSection
-from rig.config.world_models import WorldSection
+from rig.config.world.autopilot import SimulatedAutopilotSection
+from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
 from rig.world.autopilot.autopilot import SimulatedAutopilot
 from rig.world.autopilot.imu import Imu

@@ -8,9 +8,9 @@ shipped one. A file that does not begin with a program is none of these and stay
 import struct
 from pathlib import Path
 
-from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
-from rig.config.regular_file import UnfitFile, read_regular_file
-from rig.config.written_file import write_new
+from firmware_host.emulator.chip.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.config.files.written_file import write_new
 from rig.errors import Refused
 from rig.world.board.mounting import firmware
 

@@ -4,7 +4,7 @@ from math import expm1
 
 import numpy as np
 
-from rig.config.world_thermal import SimulatedThermalSection
+from rig.config.world.thermal import SimulatedThermalSection
 
 
 class HeatedPart:

@@ -5,9 +5,9 @@ from math import radians
 
 import numpy as np
 
-from firmware_host.emulator.magnetometer import MagnetometerTruth
-from rig.config.sensor_sections import MountingSection
-from rig.config.world_magnetism import SimulatedFieldSection
+from firmware_host.emulator.parts.magnetometer import MagnetometerTruth
+from rig.config.sensors.sensor_sections import MountingSection
+from rig.config.world.magnetism import SimulatedFieldSection
 from rig.world.board.sensor_truth import mounted_rows
 from rig.world.magnetic_field import MICROTESLA_T, Frames, MagneticField
 from rig.world.site import Vector

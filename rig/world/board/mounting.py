@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.flash_memory import FlashMemory
+from firmware_host.emulator.chip.flash_memory import FlashMemory
+from firmware_host.emulator.chip.spi_device import SpiDevice
 from firmware_host.emulator.machine import EmulatedBoard
-from firmware_host.emulator.spi_device import SpiDevice
 from firmware_host.parts import GYROSCOPES, MAGNETOMETERS
 from rig.config.models import RigConfig
-from rig.config.sensor_sections import SensorSection
-from rig.config.world_models import WorldSection
+from rig.config.sensors.sensor_sections import SensorSection
+from rig.config.world.laboratory import WorldSection
 from rig.world.board.heat import HeatedBody
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensing_element import MotionAt

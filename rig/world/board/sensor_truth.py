@@ -9,13 +9,13 @@ from math import radians
 
 import numpy as np
 
-from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, AccelerometerTruth
-from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
-from rig.config.sensor_sections import MountingSection, SensorSection, mounting_matrix
-from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
+from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, AccelerometerTruth
+from firmware_host.emulator.parts.gyroscope import GyroTruth, Temperature, Warming, readings
+from rig.config.sensors.sensor_sections import MountingSection, SensorSection, mounting_matrix
+from rig.config.world.laboratory import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.board.heat import HeatedPart
-from rig.world.ur10e.flange_motion import Components, Felt, moved
-from rig.world.ur10e.forward_kinematics import rotation_from_vector
+from rig.world.ur10e.motion.flange_motion import Components, Felt, moved
+from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:

@@ -11,10 +11,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
-from firmware_host.emulator.gyroscope import Gyroscope
-from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
-from rig.config.world_faulty import SimulatedFaultySection
+from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
+from firmware_host.emulator.parts.gyroscope import Gyroscope
+from firmware_host.emulator.parts.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
+from rig.config.world.faulty import SimulatedFaultySection
 from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats

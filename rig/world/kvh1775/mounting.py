@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.world_models import SimulatedKvhSection, WorldSection
+from rig.config.world.laboratory import SimulatedKvhSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth

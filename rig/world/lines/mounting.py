@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from rig.config.models import RigConfig
-from rig.config.world_lines import SimulatedLinesSection
-from rig.config.world_models import WorldSection
+from rig.config.world.laboratory import WorldSection
+from rig.config.world.lines import SimulatedLinesSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.instruments import FieldOf, MotionOf

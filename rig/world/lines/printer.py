@@ -11,12 +11,12 @@ from operator import xor
 
 import numpy as np
 
-from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
-from firmware_host.emulator.gyroscope import Gyroscope
-from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
-from rig.config.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
-from rig.config.world_faulty import SimulatedFaultySection
-from rig.config.world_lines import SimulatedLinesSection
+from firmware_host.emulator.parts.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
+from firmware_host.emulator.parts.gyroscope import Gyroscope
+from firmware_host.emulator.parts.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
+from rig.config.sensors.lines_section import LineAccelerationSection, LineFieldSection, LineRateSection, LinesSection
+from rig.config.world.faulty import SimulatedFaultySection
+from rig.config.world.lines import SimulatedLinesSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
 

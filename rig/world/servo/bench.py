@@ -6,22 +6,23 @@ from math import cos, sin
 
 import numpy as np
 
-from rig.config.servo_section import ServoSection
-from rig.config.world_models import WorldSection
+from rig.config.procedures.servo_section import ServoSection
+from rig.config.world.laboratory import WorldSection
 from rig.world.clock import TICK_S
 from rig.world.servo.bus import Bus
 from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.site import site_of
-from rig.world.ur10e.flange_motion import Felt, base, carried
-from rig.world.ur10e.forward_kinematics import Rotation, Vector
-from rig.world.ur10e.links import Link
+from rig.world.ur10e.motion.flange_motion import Felt, base, carried
+from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector
+from rig.world.ur10e.motion.links import Link
 
 BEHIND_S = 60.0  # wall time that the board may be behind the servo, and catches up
 AHEAD_S = 2 * TICK_S  # of the world's first tick, that nothing is asked of the shaft's future
 CHANGE_S = 1e-4  # the change of the rate is the difference of two
 SHAFT = Link(theta_rad=0.0, a_m=0.0, d_m=0.0, alpha_rad=0.0, cos_alpha=1.0, sin_alpha=0.0)
-# As it is set up for the rig (docs/how-to/servo.md): 1 Mbit/s, no return delay; the modes are the driver's to set.
+# As it is set up for the rig (docs/how-to/without-an-arm/servo.md): 1 Mbit/s, no return delay; the modes are the
+# driver's to set.
 BAUDS = {57600: 1, 115200: 2, 1_000_000: 3, 2_000_000: 4, 3_000_000: 5, 4_000_000: 6}
 
 

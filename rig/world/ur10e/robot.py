@@ -18,12 +18,12 @@ from rig.world.ur10e.controller_messages import (
     ReportLevel,
 )
 from rig.world.ur10e.faults import ArmFaults
-from rig.world.ur10e.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
-from rig.world.ur10e.joint_motion import Motion
-from rig.world.ur10e.links import NOMINAL, Links
-from rig.world.ur10e.models import MODELS, ArmModel
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
-from rig.world.ur10e.tcp_motion import TcpMotion, tcp_motion
+from rig.world.ur10e.motion.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
+from rig.world.ur10e.motion.joint_motion import Motion
+from rig.world.ur10e.motion.links import NOMINAL, Links
+from rig.world.ur10e.motion.models import MODELS, ArmModel
+from rig.world.ur10e.motion.tcp_motion import TcpMotion, tcp_motion
 
 ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it
 PROGRAM_STOP_RAD_S2 = 4.0

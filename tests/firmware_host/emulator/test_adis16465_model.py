@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import pytest
 
-from firmware_host.emulator.adis16465 import Adis16465
-from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.chip.bus import Violation
+from firmware_host.emulator.parts.adis16465 import Adis16465
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from support.board.spi_master import integers
 from support.parts.adis16465 import Adis16465Driver
-from support.spi_master import integers
 
 DIAG_STAT, X_GYRO_LOW, DATA_CNTR = 0x02, 0x04, 0x22
 FILT_CTRL, RANG_MDL, MSC_CTRL, DEC_RATE, GLOB_CMD, PROD_ID = 0x5C, 0x5E, 0x60, 0x64, 0x68, 0x72

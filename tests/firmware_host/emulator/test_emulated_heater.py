@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from firmware_host.emulator.flash_memory import STORE_OFFSET, FlashMemory
+from firmware_host.emulator.chip.flash_memory import STORE_OFFSET, FlashMemory
 from firmware_host.frames import encode
 from firmware_host.protocol import HEATER_CAUSES, HEATER_LIMIT_C, RESET_CAUSES
-from support.emulated_session import Session, shipped_flash
+from support.board.emulated_session import Session, shipped_flash
 
 POWER = 255
 OFF_WITHIN_S = 2.5

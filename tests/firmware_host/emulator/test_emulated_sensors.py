@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from firmware_host.emulator.spi_device import Fault
+from firmware_host.emulator.chip.spi_device import Fault
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import BATCH_AGE_US, ERRORS
-from support.emulated_session import BESIDE, PARTS, Session, samples
+from support.board.emulated_session import BESIDE, PARTS, Session, samples
 
 NAMES = list(PARTS)
 BATCH_AGE_S = BATCH_AGE_US / 1e6

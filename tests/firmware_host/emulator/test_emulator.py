@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_host.emulator.flash_memory import STORE_OFFSET, FlashMemory
-from firmware_host.emulator.gyroscope import GyroTruth
-from firmware_host.emulator.lsm9ds1 import WHO_AM_I, Lsm9ds1
+from firmware_host.emulator.chip.flash_memory import STORE_OFFSET, FlashMemory
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from firmware_host.emulator.parts.lsm9ds1 import WHO_AM_I, Lsm9ds1
 from firmware_host.errors import BoardError
 from firmware_host.frames import encode
 from firmware_host.protocol import BAUD_RATE, RESET_CAUSES
-from support import tiny_firmware
-from support.emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session, shipped_flash
+from support.board import tiny_firmware
+from support.board.emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session, shipped_flash
 
 SETTLING = 8  # conversions the firmware throws away after a configure
 

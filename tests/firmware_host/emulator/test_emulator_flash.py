@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.emulator.flash_memory import (
+from firmware_host.emulator.chip.flash_memory import (
     DOUBLEWORD_BYTES,
     FLASH_BYTES,
     PAGE_BYTES,
@@ -15,7 +15,7 @@ from firmware_host.emulator.flash_memory import (
 )
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.errors import BoardError
-from support import tiny_firmware
+from support.board import tiny_firmware
 
 FIRST_PAGE = STORE_OFFSET // PAGE_BYTES
 PROGERR, PGAERR, SIZERR, PGSERR = 1 << 3, 1 << 5, 1 << 6, 1 << 7

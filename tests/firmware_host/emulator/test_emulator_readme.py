@@ -17,5 +17,5 @@ def test_the_readme_s_example_runs() -> None:
 def test_the_readme_names_every_module() -> None:
     text = README.read_text(encoding="utf-8")
     parts = {f"{part.model.split(':')[0]}.py" for part in BOARD_PARTS.values()}  # one line tells of them all
-    modules = {file.name for file in EMULATOR.glob("*.py")} - {"__init__.py"} - parts
+    modules = {file.name for file in EMULATOR.rglob("*.py")} - {"__init__.py"} - parts
     assert {name for name in modules if f"`{name}`" not in text} == set()

@@ -2,9 +2,9 @@
 
 import pytest
 
-from firmware_host.emulator.bus import Peripheral
-from support.emulated_session import Session
-from support.svd import number, peripherals
+from firmware_host.emulator.chip.bus import Peripheral
+from support.board.emulated_session import Session
+from support.board.svd import number, peripherals
 
 MODELLED = {peripheral.name: peripheral for peripheral in Session().board.peripherals}
 MAKERS_NAMES = {"SysTick": "STK"}

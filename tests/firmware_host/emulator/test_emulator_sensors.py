@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_host.emulator.gyroscope import GyroTruth
-from firmware_host.emulator.mpu9250 import Mpu9250
-from firmware_host.emulator.spi_device import Fault
+from firmware_host.emulator.chip.spi_device import Fault
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from firmware_host.emulator.parts.mpu9250 import Mpu9250
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
-from support import tiny_firmware
-from support.emulated_session import (
+from support.board import tiny_firmware
+from support.board.emulated_session import (
     ACCELERATION,
     CRYSTAL_PPM,
     PARTS,

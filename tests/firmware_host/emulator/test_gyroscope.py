@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Warming, readings
-from firmware_host.emulator.triad import LowPass
+from firmware_host.emulator.parts.gyroscope import Gyroscope, GyroTruth, Warming, readings
+from firmware_host.emulator.parts.triad import LowPass
 
 
 def reading(truth: GyroTruth, *motion: float, time_s: float = 1.0, temperature_c: float = 25.0) -> list[float]:

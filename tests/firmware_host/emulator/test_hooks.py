@@ -10,7 +10,7 @@ from firmware_host.emulator.engine import Engine, QuickAccess
 from firmware_host.emulator.hooks import BlockTicks
 from firmware_host.emulator.timeline import Timeline
 from firmware_host.frames import encode
-from support.emulated_session import PARTS, RANGE_G, Session, samples
+from support.board.emulated_session import PARTS, RANGE_G, Session, samples
 
 COUNT, STATUS, DATA = (0x24, 4), (0x1_3008, 4), (0x1_300C, 2)  # offset and size of an access
 POLL_TICKS, POLLS = 40, 3  # reads of the counter closer together than this, more than so many in a row, are a wait

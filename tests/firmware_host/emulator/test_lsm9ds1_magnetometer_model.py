@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
-from firmware_host.emulator.magnetometer import MagnetometerTruth
-from firmware_host.emulator.spi_device import Fault
-from support.spi_master import Registers, integers
+from firmware_host.emulator.chip.bus import Violation
+from firmware_host.emulator.chip.spi_device import Fault
+from firmware_host.emulator.parts.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
+from firmware_host.emulator.parts.magnetometer import MagnetometerTruth
+from support.board.spi_master import Registers, integers
 
 STATUS, OUT = 0x27, 0x28
 COUNT_UP, BDU = 0x40, 0x40

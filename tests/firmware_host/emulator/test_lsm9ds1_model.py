@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.chip.bus import Violation
+from support.board.spi_master import Rate, integers, still
 from support.parts.lsm9ds1 import RATES, Lsm9ds1Driver
-from support.spi_master import Rate, integers, still
 
 INT1_CTRL, WHO_AM_I, CTRL_REG1_G, CTRL_REG8 = 0x0C, 0x0F, 0x10, 0x22
 STATUS, OUT_G, CTRL_REG6_XL, STATUS_AGAIN, OUT_XL = 0x17, 0x18, 0x20, 0x27, 0x28

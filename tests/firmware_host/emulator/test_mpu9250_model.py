@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.chip.bus import Violation
+from support.board.spi_master import integers
 from support.parts.mpu9250 import Mpu9250Driver
-from support.spi_master import integers
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG = 0x19, 0x1A, 0x1B, 0x1C
 INT_PIN_CFG, INT_ENABLE, INT_STATUS, ACCEL_OUT, GYRO_OUT = 0x37, 0x38, 0x3A, 0x3B, 0x43

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_host.emulator.accelerometer import AccelerometerTruth
-from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.gyroscope import GyroTruth
-from firmware_host.emulator.spi_device import Fault
-from support.data_sheet import DataSheet
+from firmware_host.emulator.chip.bus import Violation
+from firmware_host.emulator.chip.spi_device import Fault
+from firmware_host.emulator.parts.accelerometer import AccelerometerTruth
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from support.board.data_sheet import DataSheet
+from support.board.spi_master import Driver
 from support.parts import SHEETS
-from support.spi_master import Driver
 
 PARTS = tuple(SHEETS.values())
 DISCARD_S = 0.1  # every part's filters have settled

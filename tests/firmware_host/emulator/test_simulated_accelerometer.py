@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from firmware_host.emulator.accelerometer import Accelerometer, AccelerometerTruth, accelerations
-from firmware_host.emulator.gyroscope import Warming
+from firmware_host.emulator.parts.accelerometer import Accelerometer, AccelerometerTruth, accelerations
+from firmware_host.emulator.parts.gyroscope import Warming
 
 G_M_S2 = 9.80665
 TRUTH = AccelerometerTruth((1.02, 0.99, 1.01), (0.2, -0.1, 0.3), 0.0, (0.02, -0.01, 0.03), (1e-4, -9e-5, 2e-5))

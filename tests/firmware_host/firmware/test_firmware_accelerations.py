@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from support.host_board import (
+from support.board.host_board import (
     PERIOD_US,
     HostBoard,
     configured,

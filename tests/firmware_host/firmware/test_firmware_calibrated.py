@@ -11,9 +11,9 @@ from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import text
 from rig.estimation.arrays import Array
-from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
-from support.host_flash import HostFlash
-from support.warmed_sweeps import REFERENCE_C, calibrated, drawn, session
+from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
+from support.board.host_flash import HostFlash
+from support.motions.warmed_sweeps import REFERENCE_C, calibrated, drawn, session
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])

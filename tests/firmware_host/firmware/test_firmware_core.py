@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from firmware_host import protocol
 from firmware_host.frames import encode
 from firmware_host.parts import BOARD_PARTS, MAGNETOMETERS
-from support.host_board import PERIOD_US, HostBoard, convert, error_of, streaming_board
+from support.board.host_board import PERIOD_US, HostBoard, convert, error_of, streaming_board
 
 
 @pytest.fixture

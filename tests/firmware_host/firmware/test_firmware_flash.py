@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, STORE_PAGES, FlashMemory
+from firmware_host.emulator.chip.flash_memory import PAGE_BYTES, STORE_OFFSET, STORE_PAGES, FlashMemory
 from firmware_host.errors import BoardError
-from support import tiny_firmware
-from support.emulated_session import FIRST_RECORD
+from support.board import tiny_firmware
+from support.board.emulated_session import FIRST_RECORD
 from support.paths import FIRMWARE
 
-INCLUDES = (FIRMWARE / "core", FIRMWARE / "port_l432")
+INCLUDES = (FIRMWARE / "core", *(FIRMWARE / "core").glob("*/"), FIRMWARE / "port_l432")
 STORE = 0x0800_0000 + STORE_OFFSET
 
 SOURCE = f"""

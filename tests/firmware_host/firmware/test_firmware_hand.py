@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from firmware_host.emulator.gpio import Port
+from firmware_host.emulator.chip.gpio import Port
 from firmware_host.hand_answers import HandReport, HandSolved
-from rig.analysis.hand_on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
+from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
 from rig.errors import Fault
 from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
-from support.emulated_session import Session
-from support.hand_on_board import Played, alone, asked, begun, give, handled_alone, in_counts, play, pressed
-from support.handled_body import LSM9DS1, TWELVE, Recorded, handle
-from support.host_board import HostBoard, configured, core, error_of
+from support.board.emulated_session import Session
+from support.board.hand_on_board import Played, alone, asked, begun, give, handled_alone, in_counts, play, pressed
+from support.board.host_board import HostBoard, configured, core, error_of
+from support.external.handled_body import LSM9DS1, TWELVE, Recorded, handle
 
 pytestmark = pytest.mark.slow
 

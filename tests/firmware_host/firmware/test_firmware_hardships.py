@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from firmware_host.emulator.adis16465 import Adis16465
-from firmware_host.emulator.flash_memory import PAGE_BYTES
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.chip.flash_memory import PAGE_BYTES
+from firmware_host.emulator.parts.adis16465 import Adis16465
+from firmware_host.emulator.parts.lsm9ds1 import Lsm9ds1
 from firmware_host.frames import encode
-from support import emulated_session
-from support.emulated_session import FIRST_RECORD, Session, samples, shipped_flash
+from support.board import emulated_session
+from support.board.emulated_session import FIRST_RECORD, Session, samples, shipped_flash
 
 pytestmark = pytest.mark.slow
 

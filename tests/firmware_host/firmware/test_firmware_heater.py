@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from firmware_host.protocol import HEATER_CAUSES, HEATER_LIMIT_C
-from support.host_board import PERIOD_US, HostBoard, streaming_board
+from support.board.host_board import PERIOD_US, HostBoard, streaming_board
 
 POWER = 200
 

@@ -10,8 +10,8 @@ import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
+from support.board.svd import interrupts, number, peripherals, register
 from support.paths import FIRMWARE
-from support.svd import interrupts, number, peripherals, register
 
 IMAGE = FIRMWARE / "image"
 PORT = FIRMWARE / "port_l432"

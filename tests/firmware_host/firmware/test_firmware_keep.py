@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from firmware_host.frames import Frame
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES
-from rig.estimation.accumulator import Accumulator
 from rig.estimation.arrays import Array
-from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
+from rig.estimation.gyroscope.accumulator import Accumulator
+from support.board.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SPEED_RAD_S = 1.0472

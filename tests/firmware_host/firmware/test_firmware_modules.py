@@ -14,6 +14,7 @@ from elftools.elf.sections import SymbolTableSection
 from support.paths import FIRMWARE
 
 CORE = FIRMWARE / "core"
+INCLUDES = [f"-I{folder}" for folder in (CORE, *CORE.glob("*/"))]
 Needs = Mapping[str, set[str]]  # module, which is its .c and its .h → the modules it needs
 
 
@@ -55,13 +56,13 @@ def circle(needs: Needs) -> list[str]:
 def objects(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """The core, compiled for this machine, one object for each source."""
     out = tmp_path_factory.mktemp("objects")
-    sources = sorted(CORE.glob("*.c"))
-    subprocess.run(["gcc", "-std=gnu11", f"-I{CORE}", "-c", *map(str, sources)], cwd=out, check=True)
+    sources = sorted(CORE.rglob("*.c"))
+    subprocess.run(["gcc", "-std=gnu11", *INCLUDES, "-c", *map(str, sources)], cwd=out, check=True)
     return sorted(out.glob("*.o"))
 
 
 def test_no_module_of_the_core_includes_what_includes_it() -> None:
-    needs = included(sorted(CORE.glob("*.[ch]")))
+    needs = included(sorted(CORE.rglob("*.[ch]")))
     assert {"setups", "link", "kept", "solver"} <= needs["calibrating"]
     assert circle(needs) == []
 
@@ -75,7 +76,7 @@ def test_no_module_of_the_core_calls_what_calls_it(objects: list[Path]) -> None:
 
 @pytest.mark.slow
 def test_includes_and_calls_together_make_no_circle(objects: list[Path]) -> None:
-    by_include, by_call = included(sorted(CORE.glob("*.[ch]"))), called(objects)
+    by_include, by_call = included(sorted(CORE.rglob("*.[ch]"))), called(objects)
     both = {module: by_include.get(module, set()) | by_call.get(module, set()) for module in {*by_include, *by_call}}
     assert circle(both) == []
 

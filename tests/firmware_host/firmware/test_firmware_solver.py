@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from firmware_host.protocol import MAX_SCALE, METHODS, SOLUTION_STATUSES
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
-from support.host_board import core
+from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEstimator, Solution
+from support.board.host_board import core
 
 pytestmark = pytest.mark.slow
 
@@ -25,13 +25,13 @@ BIAS_AGREEMENT_RAD_S = 1e-5
 
 
 class CAccumulator(ctypes.Structure):
-    """`struct accumulator` of core/solver.h."""
+    """`struct accumulator` of core/calibration/solver.h."""
 
     _fields_ = (("r", ctypes.c_float * 56), ("count", ctypes.c_uint16))
 
 
 class CSolution(ctypes.Structure):
-    """`struct solution` of core/solver.h."""
+    """`struct solution` of core/calibration/solver.h."""
 
     _fields_ = (
         ("status", ctypes.c_int),

@@ -9,8 +9,8 @@ from zlib import crc32
 
 import pytest
 
-from support.host_board import core
-from support.host_flash import PAGE_BYTES, PAGES, HostFlash
+from support.board.host_board import core
+from support.board.host_flash import PAGE_BYTES, PAGES, HostFlash
 
 SEAL, CONSTANT_SEAL, OLD_SEAL = 0x334C4143, 0x324C4143, 0x314C4143  # those of before: of firmware 0.8.0 and 0.2.1
 RECORD_BYTES = 189
@@ -20,7 +20,7 @@ CONSTANT_BYTES = 109  # of a record, before what temperature changes; those of 0
 
 
 class Store:
-    """core/store.h for one sensor, with records as bytes; their sequence number is apart."""
+    """core/calibration/store.h for one sensor, with records as bytes; their sequence number is apart."""
 
     def __init__(self, sensor: int = 0) -> None:
         self.sensor = sensor

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashMemory
-from firmware_host.emulator.nvic import NMI, Nvic
+from firmware_host.emulator.chip.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashMemory
+from firmware_host.emulator.chip.nvic import NMI, Nvic
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
-from support.emulated_session import FIRST_RECORD, Session, shipped_flash
+from support.board.emulated_session import FIRST_RECORD, Session, shipped_flash
 
 pytestmark = pytest.mark.slow
 

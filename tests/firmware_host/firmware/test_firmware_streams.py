@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_host.frames import encode
-from support.host_board import (
+from support.board.host_board import (
     PERIOD_US,
     SETTLING,
     HostBoard,

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from firmware_host.frames import Frame, encode
 from firmware_host.parts import BOARD_PARTS
 from firmware_host.protocol import ERRORS
-from support.host_board import HostBoard, convert, sample_sequences
-from support.host_sensors import Nobody
+from support.board.host_board import HostBoard, convert, sample_sequences
+from support.board.host_sensors import Nobody
 
 SETUPS = ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 400.0, 125.0))
 PERIODS_US = (4202, 5000, 2500)

@@ -12,9 +12,9 @@ from typing import Any
 import yaml
 
 from support.fault_matrix.wires import ARM_PORTS, Wire, wires
+from support.laboratories.worlds import WorldHandle, hardware, worlds
 from support.paths import ROOT
-from support.warm import of_system, started
-from support.worlds import WorldHandle, hardware, worlds
+from support.processes.warm import of_system, started
 
 BOARD_PORT = 7321
 QUICK, REAL = 8.0, 1.0  # paces of the laboratory: on the way to the fault, and from it on

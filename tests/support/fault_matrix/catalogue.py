@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 from support.fault_matrix.bench import Bench
 from support.fault_matrix.wires import Damage, flipping, losing, repeating
-from support.waiting import PATIENCE_S
+from support.processes.waiting import PATIENCE_S
 
 Act = Callable[[Bench, Random], object]
 

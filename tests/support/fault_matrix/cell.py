@@ -12,7 +12,7 @@ import numpy as np
 from firmware_host.answers import SampleBatch
 from firmware_host.frames import FrameReader
 from firmware_host.protocol import SAMPLES
-from rig.data.run_file import read_run
+from rig.data.recording.run_file import read_run
 from rig.data.run_folder import recordings
 from rig.errors import RigError
 from rig.observation.windows import dwelt, swept

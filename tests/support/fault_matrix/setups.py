@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rig.data.result_file import read_result
-from support.worlds import merge
+from support.laboratories.worlds import merge
 
 COVERAGE = 2.0  # U = 2 u
 TRUTH: dict[str, dict[str, list[float]]] = {

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from random import Random
 
-from support.worlds import fresh_host
+from support.laboratories.worlds import fresh_host
 
 ARM_PORTS = {"dashboard": 29999, "primary": 30001, "secondary": 30002, "script": 30003, "rtde": 30004}
 RESET = struct.pack("ii", 1, 0)  # SO_LINGER: hang up without a farewell

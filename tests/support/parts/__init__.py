@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from firmware_host.parts import BOARD_PARTS, GYROSCOPES
-from support.data_sheet import DataSheet
+from support.board.data_sheet import DataSheet
 
 _OF = {part: import_module(f"support.parts.{part}") for part in BOARD_PARTS}
 SHEETS: dict[str, DataSheet] = {part: _OF[part].SHEET for part in GYROSCOPES}

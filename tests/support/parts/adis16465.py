@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Sequence
 
-from firmware_host.emulator.accelerometer import AccelerometerTruth
-from firmware_host.emulator.adis16465 import Adis16465
-from firmware_host.emulator.gyroscope import GyroTruth
-from support.data_sheet import DataSheet
-from support.spi_master import NO_ERRORS, Master, Rate, integers, still
+from firmware_host.emulator.parts.accelerometer import AccelerometerTruth
+from firmware_host.emulator.parts.adis16465 import Adis16465
+from firmware_host.emulator.parts.gyroscope import GyroTruth
+from support.board.data_sheet import DataSheet
+from support.board.spi_master import NO_ERRORS, Master, Rate, integers, still
 
 
 class Adis16465Driver(Master):

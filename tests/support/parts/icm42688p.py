@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from firmware_host.emulator.icm42688p import Icm42688P
-from support.data_sheet import DataSheet
-from support.host_sensors import ByteRegisters
-from support.spi_master import ModelledRegisters, integers
+from firmware_host.emulator.parts.icm42688p import Icm42688P
+from support.board.data_sheet import DataSheet
+from support.board.host_sensors import ByteRegisters
+from support.board.spi_master import ModelledRegisters, integers
 
 # Sections 14.37 and 14.38: codes by data rate in Hz, by range in degrees per second, and in g
 RATES = {12.5: 11, 25.0: 10, 50.0: 9, 100.0: 8, 200.0: 7, 500.0: 15, 1000.0: 6, 2000.0: 5}

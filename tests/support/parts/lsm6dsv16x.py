@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from firmware_host.emulator.lsm6dsv16x import Lsm6dsv16x
-from support.data_sheet import DataSheet
-from support.host_sensors import ByteRegisters
-from support.spi_master import ModelledRegisters, integers
+from firmware_host.emulator.parts.lsm6dsv16x import Lsm6dsv16x
+from support.board.data_sheet import DataSheet
+from support.board.host_sensors import ByteRegisters
+from support.board.spi_master import ModelledRegisters, integers
 
 # Table 20: the set and the code by data rate in Hz; tables 63 and 68: codes by range in degrees per second, and in g
 RATES = {

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Sequence
 
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
-from support.data_sheet import DataSheet
-from support.host_sensors import ByteRegisters
-from support.spi_master import ModelledRegisters, integers
+from firmware_host.emulator.parts.lsm9ds1 import Lsm9ds1
+from support.board.data_sheet import DataSheet
+from support.board.host_sensors import ByteRegisters
+from support.board.spi_master import ModelledRegisters, integers
 
 # Codes by data rate in Hz and by range in degrees per second
 RATES = {14.9: 1, 59.5: 2, 119.0: 3, 238.0: 4, 476.0: 5, 952.0: 6}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from support.host_sensors import ByteRegisters
+from support.board.host_sensors import ByteRegisters
 
 
 class Lsm9ds1MagnetometerRegisters(ByteRegisters):

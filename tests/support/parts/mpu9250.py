@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from firmware_host.emulator.mpu9250 import Mpu9250
-from support.data_sheet import DataSheet
-from support.host_sensors import ByteRegisters
-from support.spi_master import ModelledRegisters, integers
+from firmware_host.emulator.parts.mpu9250 import Mpu9250
+from support.board.data_sheet import DataSheet
+from support.board.host_sensors import ByteRegisters
+from support.board.spi_master import ModelledRegisters, integers
 
 # Codes by range in degrees per second, and in g
 RANGES = {250.0: 0, 500.0: 1, 1000.0: 2, 2000.0: 3}

@@ -12,10 +12,10 @@ from rig.errors import Fault
 from rig.turners.servo.registers import TRIPPED
 from rig.turners.servo.state import ServoState
 from rig.world.servo.truth import ServoTruth
-from support.driven_servo import STANDS_RAD_S, at_speed, held, turn, turn_on_and_on
-from support.forked import forked
-from support.servo_on_a_wire import SET_UP, ServoOnAWire, servo_on_a_wire
-from support.waiting import wait_for
+from support.processes.forked import forked
+from support.processes.waiting import wait_for
+from support.wires.driven_servo import STANDS_RAD_S, at_speed, held, turn, turn_on_and_on
+from support.wires.servo_on_a_wire import SET_UP, ServoOnAWire, servo_on_a_wire
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("no_crowd")]  # each fault takes its time to be known
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rig.errors import Fault, Refused
-from rig.observation.turn_speed import turn_speed
+from rig.observation.motion.turn_speed import turn_speed
 from rig.turners.servo.driver import Servo
 from rig.turners.servo.state import SERVO_STATE_DTYPE, ServoState
 from rig.world.servo.truth import ServoTruth
-from support.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
-from support.servo_on_a_wire import SET_UP, servo_on_a_wire
+from support.wires.driven_servo import BOARD, MODEL, STANDS_RAD_S, at_speed, held, turn
+from support.wires.servo_on_a_wire import SET_UP, servo_on_a_wire
 
 pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
 

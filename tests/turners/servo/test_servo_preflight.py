@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from rig.config.servo_section import ServoSection
+from rig.config.procedures.servo_section import ServoSection
 from rig.errors import Refused
 from rig.motion.carried import Carried
 from rig.motion.steps import Plan, Transfer
@@ -15,8 +15,8 @@ from rig.turners.servo.kind import SERVO
 from rig.turners.servo.latency import lower_latency
 from rig.turners.servo.preflight import servo_problems
 from rig.world.servo.truth import LineTruth, ServoTruth
-from support.driven_servo import BOARD, MODEL
-from support.servo_on_a_wire import PLAIN, SET_UP, servo_on_a_wire
+from support.wires.driven_servo import BOARD, MODEL
+from support.wires.servo_on_a_wire import PLAIN, SET_UP, servo_on_a_wire
 
 pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
 

@@ -1,4 +1,4 @@
-"""A controller's messages after a bad way, read by the rig; a hundred thousand: benchmarks/damaged_frames.py."""
+"""A controller's messages after a bad way, read by the rig; a hundred thousand: benchmarks/wire/damaged_frames.py."""
 
 import socket
 import threading
@@ -6,9 +6,9 @@ from contextlib import suppress
 
 import pytest
 
-from rig.turners.ur.dashboard import DASHBOARD_PORT, Dashboard
-from support.damaged_messages import carry_to_rig
-from support.worlds import fresh_host
+from rig.turners.ur.controller.dashboard import DASHBOARD_PORT, Dashboard
+from support.laboratories.worlds import fresh_host
+from support.wires.damaged_messages import carry_to_rig
 
 
 @pytest.mark.parametrize("name", ["RTDE", "dashboard", "primary"])

@@ -18,8 +18,8 @@ from rig.motion.carried import Carried
 from rig.motion.state import ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.ur.driver import Arm, look
-from support.waiting import wait_for
-from support.worlds import World, WorldHandle, merge
+from support.laboratories.worlds import World, WorldHandle, merge
+from support.processes.waiting import wait_for
 
 pytestmark = pytest.mark.slow
 

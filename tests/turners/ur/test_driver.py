@@ -21,20 +21,20 @@ import numpy as np
 import pytest
 
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
+from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.motion.carried import Carried
 from rig.motion.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.motion.steps import Transfer, trapezoid_duration
-from rig.plans.six_sweeps import plan_six_observation
-from rig.turners.ur.child_link import FROZEN_TICKS, TICK_S
+from rig.plans.motions.six_sweeps import plan_six_observation
+from rig.turners.ur.child.link import FROZEN_TICKS, TICK_S
 from rig.turners.ur.driver import Arm, look
 from rig.turners.ur.preflight import arm_problems
-from support.arm_relay import relay
-from support.rtde_reader import RtdeReader
-from support.ur10e import plan_problems
-from support.waiting import PATIENCE_S, wait_for
-from support.worlds import World, WorldHandle, merge
+from support.laboratories.worlds import World, WorldHandle, merge
+from support.processes.waiting import PATIENCE_S, wait_for
+from support.wires.arm_relay import relay
+from support.wires.rtde_reader import RtdeReader
+from support.wires.ur10e import plan_problems
 
 pytestmark = pytest.mark.slow
 
@@ -396,7 +396,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By as crowded a one a controller here would be excused for hours."""
-    monkeypatch.setattr("rig.data.silence.CROWDED", 1e6)
+    monkeypatch.setattr("rig.data.processes.silence.CROWDED", 1e6)
     monkeypatch.setattr(os, "getloadavg", lambda: (1e6, 1e6, 1e6))
     with relay(laboratory.host, outside_address()) as wire:
         with Arm(wire.host) as arm:
@@ -505,7 +505,9 @@ def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_
 def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.data.silence.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
+    monkeypatch.setattr(
+        "rig.data.processes.silence.crowding", lambda: 5.0
+    )  # so crowded that 3 s of silence are excused
     with Arm(laboratory.host) as arm:
         arm.take_control(PAYLOAD)
         laboratory.control({"do": "silence_arm", "duration_s": 3.0})

@@ -20,10 +20,10 @@ from rig.turners.ur.driver import look
 from rig.turners.ur.identity import identity_problems, model_found
 from rig.turners.ur.preflight import preflight_problems
 from rig.turners.ur.report import ArmReport, ArmSetup
-from rig.world.ur10e.models import MODELS
-from support.commands import rig
-from support.told_runs import report
-from support.worlds import World, WorldHandle, hardware, worlds
+from rig.world.ur10e.motion.models import MODELS
+from support.laboratories.commands import rig
+from support.laboratories.worlds import World, WorldHandle, hardware, worlds
+from support.page.told_runs import report
 
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 BY_NOMINAL = ArmSection(host="10.0.0.2", payload_kg=0.3, kinematics="nominal")

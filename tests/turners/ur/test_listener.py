@@ -7,9 +7,9 @@ from ipaddress import IPv4Address
 
 import pytest
 
-from rig.turners.ur.listener import listener
-from rig.turners.ur.rtde_packages import PORT
-from support.worlds import World, fresh_host
+from rig.turners.ur.controller.listener import listener
+from rig.turners.ur.controller.rtde_packages import PORT
+from support.laboratories.worlds import World, fresh_host
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells")
 

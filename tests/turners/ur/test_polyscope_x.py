@@ -8,14 +8,14 @@ from contextlib import closing, contextmanager, suppress
 
 import pytest
 
+from rig.turners.ur.controller.primary import PORT as PRIMARY_PORT
+from rig.turners.ur.controller.primary_stop import MODE_DATA, PrimaryStop
+from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import series_problem
-from rig.turners.ur.primary import PORT as PRIMARY_PORT
-from rig.turners.ur.primary_stop import MODE_DATA, PrimaryStop
-from rig.turners.ur.robot_api import RobotApi
-from rig.turners.ur.stop_paths import stop_paths
-from rig.turners.ur.stopping import Order
-from support.waiting import PATIENCE_S, wait_for
-from support.worlds import fresh_host
+from rig.turners.ur.stopping.stop import Order
+from rig.turners.ur.stopping.stop_paths import stop_paths
+from support.laboratories.worlds import fresh_host
+from support.processes.waiting import PATIENCE_S, wait_for
 
 API_PORT = 8077
 JSON = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%s"

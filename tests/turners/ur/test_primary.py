@@ -13,11 +13,11 @@ import pytest
 
 from rig.motion.geometry import DenavitHartenberg, flange_axes
 from rig.motion.state import JointLimits
+from rig.turners.ur.controller.primary import PORT, Account, read_account
 from rig.turners.ur.driver import look
-from rig.turners.ur.primary import PORT, Account, read_account
 from rig.turners.ur.report import ArmSetup
-from support.waiting import PATIENCE_S
-from support.worlds import World
+from support.laboratories.worlds import World
+from support.processes.waiting import PATIENCE_S
 
 HOST = "127.0.3.252"
 CALIBRATED = DenavitHartenberg(

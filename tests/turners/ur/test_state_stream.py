@@ -13,12 +13,12 @@ from itertools import pairwise
 import pytest
 
 from rig.errors import Refused
+from rig.turners.ur.controller.rtde_packages import HEADER, PORT
+from rig.turners.ur.controller.state_checks import clock_step
+from rig.turners.ur.controller.state_stream import PACKET, VARIABLES, StateStream
 from rig.turners.ur.driver import look
-from rig.turners.ur.rtde_packages import HEADER, PORT
-from rig.turners.ur.state_checks import clock_step
-from rig.turners.ur.state_stream import PACKET, VARIABLES, StateStream
-from support.waiting import PATIENCE_S, wait_for
-from support.worlds import fresh_host
+from support.laboratories.worlds import fresh_host
+from support.processes.waiting import PATIENCE_S, wait_for
 
 TYPES = ",".join(VARIABLES.values()).encode()
 

@@ -10,8 +10,8 @@ from rig.world.servo.registers import MODELS
 from rig.world.servo.servo import Servo
 from rig.world.servo.truth import LineTruth, ServoTruth
 from rig.world.servo.wire_format import Packet, Receiver, encode, encode_status
-from support.servo_on_a_wire import PLAIN, ServoOnAWire, servo_on_a_wire
-from support.waiting import wait_for
+from support.processes.waiting import wait_for
+from support.wires.servo_on_a_wire import PLAIN, ServoOnAWire, servo_on_a_wire
 
 dynamixel_sdk = pytest.importorskip("dynamixel_sdk")
 from dynamixel_easy_sdk.control_table import ControlTable  # noqa: E402

@@ -1,0 +1,53 @@
+"""Whether what is stated holds in laboratories unseen before: `python benchmarks/laboratory/hidden_worlds.py FOLDER`.
+
+Draws 60 laboratories with a quiet LSM9DS1, 40 with a noisy one, 20 with an ADIS16465 beside a quiet one, 20 of `imu`
+with three parts, 10 with a KVH 1775, 6 with a quiet LSM9DS1 on each of four other arms, 6 with an autopilot, and 100
+pairs and 40 of `imu` on arms that ripple by any order of the turn (tests/support/laboratories/hidden_worlds.py), runs
+`rig run` in each, and keeps its recording in FOLDER/family/seed; those that are there are not made again. Then all are
+solved, and a table says of each family, part and parameter: RMS of error over u, the share within U, the largest error
+over U, the spread of u, and which undamaged runs were refused and by what.
+`--solve-only` runs nothing. `--family NAME` and `--count N` take fewer.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
+
+from support.laboratories.hidden_results import Judged, held, solved
+from support.laboratories.hidden_worlds import FAMILIES, WORLDS, first_seed, recorded
+
+
+def table(family: str, runs: list[Judged]) -> None:
+    """Printed."""
+    refused = {run.folder.name: run.refused for run in runs if run.refused}
+    print(f"{family}: {len(runs)} runs, {len(refused)} refused")
+    for (part, parameter), line in held(runs).items():
+        print(f"  {part:10} {parameter:20} {line}")
+    for seed, names in refused.items():
+        print(f"  refused: {seed}: {', '.join(names)}")
+
+
+def main() -> None:
+    """As the module says."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--family", action="append", choices=list(FAMILIES))
+    parser.add_argument("--count", type=int)
+    parser.add_argument("--solve-only", action="store_true")
+    arguments = parser.parse_args()
+    for family in arguments.family or FAMILIES:
+        first, count = first_seed(family), min(arguments.count or WORLDS[family], WORLDS[family])
+        folders = [arguments.folder / family / str(seed) for seed in range(first, first + count)]
+        for folder in folders:
+            if not arguments.solve_only and not folder.exists():
+                recorded(family, int(folder.name), folder)
+        finished = [folder for folder in folders if (folder / "status").exists()]
+        if finished:
+            table(family, [solved(folder) for folder in finished])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""What a history costs: `python benchmarks/laboratory/history.py [--calibrations N]`.
+
+Printed are, each pair side by side in one run: how long it takes to look up one serial number among N calibrations and
+among a hundredth of them, and the ratio; how much longer the end of a run takes by its certificate and its entry, in a
+fresh process that has loaded what a run has; and what `rig --help` takes beside a Python that imports nothing.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import timeit
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from rig.history.entered.finished import Finished, finished_run
+from rig.history.store import History, Selection, open_history
+
+ROOT = Path(__file__).parents[2]
+FIXTURE = ROOT / "tests" / "fixtures" / "recordings" / "six_observation"
+OF_EACH = 20  # calibrations
+FIRST = datetime(2025, 1, 1, tzinfo=UTC)
+
+END_OF_RUN = """
+import sys, time
+from pathlib import Path
+import rig.commands.measure.carry_out
+from rig.commands.history.remember import remember
+from rig.config.judging.judging_sections import HistorySection
+from rig.data.result_file import read_result
+from rig.report.certificate.writer import write_certificate
+
+folder = Path(sys.argv[1])
+document = read_result(folder)
+began_s = time.perf_counter()
+write_certificate(None, document, folder)
+between_s = time.perf_counter()
+event, _ = remember(folder, HistorySection())
+assert type(event).__name__ == "Remembered", event
+print(between_s - began_s, time.perf_counter() - between_s)
+"""
+
+
+def runs(count: int) -> list[Finished]:
+    """`count` runs of `count / OF_EACH` sensors, taken in turn."""
+    first = finished_run(FIXTURE)
+    (sensor,) = first.document.gyroscopes.values()
+    slim = sensor.model_copy(update={"observations": (), "rests": ()})
+    found = []
+    for i in range(count):
+        started = (FIRST + timedelta(hours=i)).isoformat()
+        each = slim.model_copy(update={"serial_number": f"S-{i % (count // OF_EACH)}"})
+        provenance = first.document.provenance.model_copy(update={"started_utc": started})
+        document = first.document.model_copy(update={"provenance": provenance, "gyroscopes": {"gyro": each}})
+        found.append(replace(first, text=document.text(), document=document))
+    return found
+
+
+def look_up_s(history: History) -> float:
+    """Median of many."""
+    selection = Selection(serial_number="S-0")
+    assert len(history.calibrations(selection)) == OF_EACH
+    return float(np.median(timeit.repeat(lambda: history.calibrations(selection), number=1, repeat=200)))
+
+
+def process_s(*arguments: str) -> float:
+    """The least of several."""
+    least = np.inf
+    for _ in range(5):
+        began_s = time.perf_counter()
+        subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
+        least = min(least, time.perf_counter() - began_s)
+    return float(least)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--calibrations", type=int, default=10_000, metavar="N")
+    count = parser.parse_args().calibrations
+    with tempfile.TemporaryDirectory() as folder:
+        found = {}
+        for size in (count // 100, count):
+            with open_history(str(Path(folder) / f"{size}.sqlite")) as history:
+                began_s = time.perf_counter()
+                for each in runs(size):
+                    history.enter(each)
+                entered_s = time.perf_counter() - began_s
+                found[size] = look_up_s(history)
+            told = f"{1e3 * found[size]:.2f} ms to look up {OF_EACH} of one sensor"
+            print(f"{size} calibrations: {1e3 * entered_s / size:.1f} ms to make and enter each, {told}")
+        print(f"ratio {found[count] / found[count // 100]:.2f}")
+        run = Path(folder) / "run"
+        run.mkdir()
+        for file in FIXTURE.iterdir():
+            (run / file.name).write_bytes(file.read_bytes())
+        environment = {**os.environ, "RIG_HISTORY": str(Path(folder) / f"{count}.sqlite")}
+        command = [sys.executable, "-c", END_OF_RUN, str(run)]
+        times = []
+        for _ in range(3):
+            done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True)
+            times.append(list(map(float, done.stdout.split())))
+    certificate_s, entry_s = np.min(times, axis=0)
+    together = f"both {certificate_s + entry_s:.2f} s"
+    print(f"end of a run: certificate {certificate_s:.2f} s, history {entry_s:.2f} s, {together}")
+    bare_s, help_s = process_s("-c", ""), process_s("-m", "rig", "--help")
+    print(f"rig --help {help_s:.2f} s, a Python that imports nothing {bare_s:.2f} s, ratio {help_s / bare_s:.1f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""What the operator's page takes of a core: `python benchmarks/laboratory/page.py [seconds]`.
+
+A run's events fifty times a second, two sensors' worth of them. Told to nobody first, which is what this program takes
+of itself and is no part of the page; then to a page at which nobody looks; to one with five browsers that read ten
+frames a second; and with five more that never read. The browsers are processes of their own. Printed as well: the
+longest that the run's thread waited for the page, and the largest memory.
+"""
+
+import multiprocessing
+import resource
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice
+from multiprocessing.sharedctypes import Synchronized
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from rig.page.page_state import Shown
+from rig.page.server.control import Control
+from rig.page.server.feed import Feed
+from rig.page.server.serving import Address, serving
+from rig.station.events import RunEvent
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
+from support.page.told_runs import ABOUT, before_it_moves, moving, planned
+
+BROWSERS, STALLED = 5, 5
+PERIOD_S = 0.02  # between two looks at the arm, as in a run
+EVENTS = 3  # in each
+
+
+def asking(url: str) -> socket.socket:
+    """A connection that has asked for the stream."""
+    place = urlsplit(url)
+    connection = socket.create_connection((place.hostname or "", place.port or 0))
+    connection.sendall(f"GET /events HTTP/1.1\r\nHost: {place.netloc}\r\n\r\n".encode())
+    return connection
+
+
+def browser(url: str, frames: "Synchronized[int]") -> None:
+    """A browser that reads all that comes, and counts the frames."""
+    connection = asking(url)
+    while piece := connection.recv(1 << 16):
+        with frames.get_lock():
+            frames.value += piece.count(b"event: ")
+
+
+def told(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> float:
+    """Tell a run for so long; the longest that one event took, s."""
+    longest_s, end_s = 0.0, time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        for event in islice(events, EVENTS):
+            began_s = time.perf_counter()
+            listener(event)
+            longest_s = max(longest_s, time.perf_counter() - began_s)
+        time.sleep(PERIOD_S)
+    return longest_s
+
+
+def run_of(seconds: float) -> Iterator[RunEvent]:
+    """The events of a run that lasts longer than `seconds`, made before they are told."""
+    return iter([*islice(moving(planned(), 1e9, step_s=PERIOD_S), int(2 * EVENTS * seconds / PERIOD_S))])
+
+
+def measured(events: Iterator[RunEvent], listener: Callable[[RunEvent], None], seconds: float) -> tuple[float, float]:
+    """The share of a core, %, and the longest wait, s."""
+    used_s, began_s = time.process_time(), time.monotonic()
+    longest_s = told(events, listener, seconds)
+    return 100 * (time.process_time() - used_s) / (time.monotonic() - began_s), longest_s
+
+
+def with_page(seconds: float, reading: int, stalled: int) -> tuple[float, float, float]:
+    """The share of a core, %, the longest wait, s, and the frames a second that one browser has read."""
+    spawning, feed, events = multiprocessing.get_context("spawn"), Feed(Shown(ABOUT)), run_of(seconds)
+    frames = spawning.Value("l", 0)
+    for event in before_it_moves(planned()):
+        feed.event(event)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
+    ):
+        browsers = [spawning.Process(target=browser, args=(url, frames), daemon=True) for _ in range(reading)]
+        for process in browsers:
+            process.start()
+        silent = [asking(url) for _ in range(stalled)]
+        while frames.value < reading:  # each has the page
+            time.sleep(PERIOD_S)
+        before = frames.value
+        share, longest_s = measured(events, feed.event, seconds)
+        read = (frames.value - before) / seconds / max(reading, 1)
+        for connection in silent:
+            connection.close()
+        for process in browsers:
+            process.terminate()
+    return share, longest_s, read
+
+
+def main() -> None:
+    """Print what it takes, without and with the page."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    alone, _ = measured(run_of(seconds), lambda event: None, seconds)
+    print(f"{'told to nobody':30} {alone:5.2f} % of a core")
+    for what, reading, stalled in (
+        ("a page, nobody looks", 0, 0),
+        (f"{BROWSERS} browsers", BROWSERS, 0),
+        (f"{BROWSERS} browsers and {STALLED} stalled", BROWSERS, STALLED),
+    ):
+        share, longest_s, read = with_page(seconds, reading, stalled)
+        page = f"the page {share - alone:5.2f} %, {read:4.1f} frames/s read"
+        print(f"{what:30} {share:5.2f} % of a core, {page}, longest wait {1e3 * longest_s:.2f} ms")
+    print(f"largest memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

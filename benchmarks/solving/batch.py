@@ -1,0 +1,74 @@
+"""15,000 six-observation runs (30 gyroscopes × 500) at once, beside a loop of SciPy's Levenberg–Marquardt.
+
+python benchmarks/solving/batch.py
+
+The loop goes through every thirtieth run and its time is scaled; both see the same readings.
+"""
+
+import time
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
+from rig.study import simulation as sim
+
+EVERY = 30  # of the runs go through the loop
+
+
+def averaged_readings(speed_rad_s: float) -> Array:
+    """(15000, 6, 3) rad/s: SIX, section III-A, at the lower noise level."""
+    rng = np.random.default_rng(1)
+    means = []
+    for _ in range(sim.SETS):
+        scale, bias = sim.NORMAL.draw(rng)
+        F = sim.sensitivity(scale, sim.mountings(rng, sim.RUNS))
+        means.append(sim.mean_readings(rng, F, bias, sim.whole_turn(speed_rad_s, sim.NOISE_LEVELS_RAD_S[0])))
+    return np.concatenate(means)
+
+
+def by_loop(means: Array, speed_rad_s: float) -> Array:
+    """(n, 6) by one `least_squares` after another."""
+
+    def residuals(parameters: Array, readings: Array) -> Array:
+        turned = parameters[:3] * (readings + parameters[3:])
+        missing: Array = np.sum(turned * turned, axis=1) - speed_rad_s**2
+        return missing
+
+    start = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    return np.array([least_squares(residuals, start, method="lm", args=(m,)).x for m in means])
+
+
+def main() -> None:
+    """Print times, ratios and differences, at both speeds."""
+    print(f"{'15,000 runs':44}{'seconds':>10}{'µs a run':>10}{'times batch':>13}{'largest difference':>20}")
+    for speed, name in ((sim.ARM_RAD_S, "60°/s"), (sim.FAST_RAD_S, "3 rad/s")):
+        means = averaged_readings(speed)
+        batch_s = np.inf
+        for _ in range(5):
+            start = time.perf_counter()
+            solved = newton_batch(means, speed)
+            batch_s = min(batch_s, time.perf_counter() - start)
+        exact = np.concatenate([solved.scale, solved.bias_rad_s], axis=1)
+        assert solved.converged.all()
+        _line(f"closed form, batch, {name}", batch_s, len(means), batch_s, None)
+        start = time.perf_counter()
+        published = algorithm_1_batch(means, speed)
+        passed = time.perf_counter() - start
+        apart = np.abs(np.concatenate([published.scale, published.bias_rad_s], axis=1) - exact)[published.converged]
+        _line(f"Algorithm 1, batch, {name}", passed, len(means), batch_s, float(apart.max()))
+        start = time.perf_counter()
+        looped = by_loop(means[::EVERY], speed)
+        passed = (time.perf_counter() - start) * EVERY
+        apart = np.abs(looped - exact[::EVERY])
+        _line(f'least_squares("lm"), scaled loop, {name}', passed, len(means), batch_s, float(apart.max()))
+
+
+def _line(name: str, seconds: float, runs: int, batch_s: float, apart: float | None) -> None:
+    shown = "" if apart is None else f"{apart:.1e}"
+    print(f"{name:44}{seconds:10.3f}{seconds / runs * 1e6:10.2f}{seconds / batch_s:13.0f}{shown:>20}")
+
+
+if __name__ == "__main__":
+    main()

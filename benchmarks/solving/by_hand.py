@@ -1,0 +1,88 @@
+"""The same sessions by hand through imucal and through the rig's graph of rests and moves: errors of scale and axes.
+
+python benchmarks/solving/by_hand.py [SESSIONS]          # needs the extra `bench`
+
+A session of 40 s is twelve flips over all six faces and a whole turn back about each axis, as the simulated hand makes
+them (`rig.world.hand`). imucal is given its six holds and three turns without an error of annotation; the rig is given
+the readings and nothing else.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from imucal import FerrarisCalibration, FerrarisSignalRegions
+
+from rig.estimation.arrays import Array, scale_of
+from rig.estimation.by_hand import Handled, Told, solve_by_hand
+from rig.estimation.by_hand.session import FACES
+from rig.observation.by_hand.handled import handled
+from rig.world.hand.habits import Action, Turn
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
+from support.external.handled_body import TWELVE, handle
+
+SESSION: tuple[Action, ...] = (Turn(-1), TWELVE[0], Turn(-1), TWELVE[1], Turn(-1), *TWELVE[2:])  # on +z, +x and +y
+REST_S = 0.9
+GRAVITY_M_S2, PART_NAMES = 9.81, {"+": "p", "-": "a"}
+SESSIONS = 200
+
+
+def by_imucal(session: Handled) -> Array:
+    """F (3, 3) by the first hold on each face and the turns."""
+    assert session.acceleration is not None
+    sections: dict[str, Array] = {}
+    for rest in session.rests:
+        assert rest.acceleration_m_s2 is not None
+        face = FACES[int(np.argmax([rest.acceleration_m_s2 @ axis for axis in _axes()]))]
+        _add(sections, session, f"{face[1]}_{PART_NAMES[face[0]]}", (rest.start_s, rest.end_s))
+    for move, rest in zip(session.moves, session.rests, strict=False):
+        assert rest.acceleration_m_s2 is not None
+        inside = (session.time_s >= move.start_s) & (session.time_s <= move.end_s)
+        swept = np.trapezoid(session.rates[inside] - rest.mean_rad_s, session.time_s[inside], axis=0)
+        if np.linalg.norm(swept) > 5:
+            _add(sections, session, f"{'xyz'[int(np.argmax(np.abs(swept)))]}_rot", (move.start_s, move.end_s))
+    rate_hz = 1 / float(np.median(np.diff(session.time_s)))
+    found = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
+        FerrarisSignalRegions(**sections), rate_hz, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
+    )
+    return np.asarray(found.K_g @ found.R_g, dtype=np.float64)
+
+
+def _axes() -> list[Array]:
+    return [np.asarray((1.0 if face[0] == "+" else -1.0) * np.eye(3)["xyz".index(face[1])]) for face in FACES]
+
+
+def _add(sections: dict[str, Array], session: Handled, name: str, window: tuple[float, float]) -> None:
+    assert session.acceleration is not None
+    inside = (session.time_s >= window[0]) & (session.time_s <= window[1])
+    sections.setdefault(f"gyr_{name}", np.degrees(session.rates[inside]))
+    sections.setdefault(f"acc_{name}", session.acceleration[inside])
+
+
+def main(sessions: int) -> None:
+    """Print the RMS errors of scale factors and of what stands off the diagonal of F."""
+    errors: dict[str, list[tuple[Array, Array]]] = {"imucal, perfectly annotated": [], "graph of rests and moves": []}
+    lasting_s = 0.0
+    for seed in range(sessions):
+        recorded = handle(SESSION, seed, rest_s=REST_S)
+        session = handled(recorded.time_s, recorded.rates, recorded.acceleration)
+        lasting_s += float(np.ptp(recorded.time_s)) / sessions
+        found = (by_imucal(session), solve_by_hand(session, Told(20.0)).turned.matrix)
+        for each, matrix in zip(errors.values(), found, strict=True):
+            off = (matrix - recorded.matrix)[~np.eye(3, dtype=bool)]
+            each.append((scale_of(matrix) - recorded.truth[:3], off))
+    print(f"{sessions} sessions of {lasting_s:.0f} s")
+    rms = {
+        name: [float(np.sqrt(np.mean(np.square(part)))) for part in zip(*each, strict=True)]
+        for name, each in errors.items()
+    }
+    for name, (scale, beside) in rms.items():
+        print(f"{name:30} scale {scale:.2e}, off-diagonals {beside:.2e}")
+    theirs, ours = rms.values()
+    print(f"better by {theirs[0] / ours[0]:.1f} in scale, {theirs[1] / ours[1]:.1f} in the off-diagonals")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else SESSIONS)

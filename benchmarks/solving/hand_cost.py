@@ -1,0 +1,81 @@
+"""What a calibration by hand costs on the board: instructions of a reading and of a move, counted, and stack.
+
+python benchmarks/solving/hand_cost.py
+
+The firmware's hand.c, hand_motion.c and hand_solver.c are compiled with its compiler and flags, and given the readings
+of a simulated hand on an emulated Cortex-M4F. Counts are instructions, not time.
+"""
+
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from solver_cost import CODE, FIRMWARE, MEANS, RAM, Core, Cost
+
+from firmware_host.protocol import MESSAGE_BY_NAME
+from rig.world.hand.habits import FLIPS, Flip, Habits
+from rig.world.hand.hand import Hand
+
+SOURCES = [
+    *(FIRMWARE / "core" / "by_hand" / f"hand{part}.c" for part in ("", "_motion", "_solver")),
+    Path(__file__).with_suffix(".c"),
+]
+RATE_HZ, REST_S, NOISE_RAD_S = 119.0, 1.6, 1e-3
+PER_RAD_S, PER_M_S2 = np.radians(0.0175), 0.122e-3 * 9.80665
+STATE = RAM + 0x4000
+SETTLING = 1_000  # instructions: no reading costs so many unless it ends a block
+SOLVING = 20_000  # no block so many unless it ends a move
+
+
+def build(folder: Path) -> Path:
+    """The program, with the compiler and the flags of the firmware's Makefile."""
+    own = {name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    show = ["make", "-s", "--no-print-directory", "-C", str(FIRMWARE), "--eval=show: ; @echo $(CC) $(CFLAGS)", "show"]
+    command = subprocess.run(show, check=True, capture_output=True, text=True, env=own).stdout.split()
+    elf = folder / "hand.elf"
+    link = ["-nostartfiles", "--specs=nano.specs", "-Wl,--entry=0", f"-Wl,-Ttext={CODE:#x}", f"-Wl,-Tbss={STATE:#x}"]
+    subprocess.run([*command, *link, *map(str, SOURCES), "-o", str(elf)], check=True, cwd=FIRMWARE)
+    return elf
+
+
+def main() -> int:
+    """Print what a reading, a block of them, and a move cost."""
+    hand, now_s = Hand(Habits(), 1), 1.5
+    for face in FLIPS:
+        now_s = hand.act(Flip(face), now_s) + REST_S
+    time_s = np.arange(0.0, now_s, 1 / RATE_HZ)
+    felt, rng = hand.felt_at(time_s), np.random.default_rng(1)
+    noisy = felt.rate_rad_s + NOISE_RAD_S * rng.normal(size=felt.rate_rad_s.shape)
+    rates, forces = (
+        np.round(each / per).astype(np.int16)
+        for each, per in ((noisy, PER_RAD_S), (felt.specific_force_m_s2, PER_M_S2))
+    )
+    setup: dict[str, float] = dict.fromkeys((field.name for field in MESSAGE_BY_NAME["setup"].fields), 0)
+    setup |= {"rate_hz": RATE_HZ, "range_deg_s": 500.0, "sensitivity_rad_s": PER_RAD_S, "range_m_s2": 40.0}
+    costs: list[Cost] = []
+    with tempfile.TemporaryDirectory() as folder:
+        core = Core(build(Path(folder)))
+        core.write(MEANS, MESSAGE_BY_NAME["setup"].head.pack(*setup.values()))
+        core.call("begin", MEANS)
+        for number, (at_s, rate, force) in enumerate(
+            zip(time_s.tolist(), rates.tolist(), forces.tolist(), strict=True)
+        ):
+            core.write(MEANS, struct.pack("<QI7h", round(1e6 * at_s), number, *rate, *force, 0))
+            costs.append(core.call("add", MEANS)[1])
+    counts = np.array([cost.instructions for cost in costs])
+    plain, blocks, moves = counts[counts < SETTLING], counts[counts >= SETTLING], counts[counts >= SOLVING]
+    blocks = blocks[blocks < SOLVING]
+    print(f"a reading           {np.median(plain):8.0f} instructions, {plain.max()} at most")
+    print(f"the last of a block {np.median(blocks):8.0f} instructions, {blocks.max()} at most")
+    print(f"a move solved       {np.median(moves):8.0f} instructions, {moves.max()} at most; {len(moves)} moves")
+    print(f"in all              {counts.sum():8} instructions for {len(counts)} readings, {counts.mean():.0f} each")
+    print(f"stack               {max(cost.stack_bytes for cost in costs):8} B at most")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

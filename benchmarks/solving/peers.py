@@ -1,0 +1,105 @@
+"""The same simulated Ferraris session through imucal and through the rig's vector model: errors and time.
+
+python benchmarks/solving/peers.py          # needs the extra `bench`
+
+The session is imucal's: six still holds with ±x, ±y, ±z upwards, and one turn of −360° about each axis, 6 × 1000 and
+3 × 600 samples at 100 Hz. The sensor is mounted 3° askew, its accelerometer is ideal but for noise. imucal's
+reading = K_g R_g ω + b_g + K_ga a is the vector model with g-sensitivity; its 1/K_g is our scale, −b_g our bias.
+"""
+
+import timeit
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from imucal import FerrarisCalibration, FerrarisSignalRegions
+
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.vector_model import solve_vector_model
+from rig.study import simulation as sim
+
+Session = dict[str, Array]
+
+RATE_HZ, HELD, TURNED = 100.0, 1000, 600
+SCALE = np.array([1.1771, 1.1554, 1.1440])  # SIX, table II: the turntable's LSM9DS1
+BIAS_RAD_S = np.array([0.0077, -0.0100, -0.0051])
+NOISE_RAD_S, ACCELEROMETER_NOISE_M_S2 = 0.035, 0.02
+GRAVITY_M_S2 = 9.81
+SPEED_RAD_S = 2 * np.pi * RATE_HZ / TURNED
+HOLDS = [f"{axis}_{side}" for axis in "xyz" for side in "pa"]
+UP = {f"{axis}_{side}": sign * np.eye(3)[i] for i, axis in enumerate("xyz") for side, sign in (("p", 1), ("a", -1))}
+RUNS, ROUNDS = 300, 10
+
+
+def session(seed: int) -> Session:
+    """Samples by imucal's section names: `gyr_…` in rad/s, `acc_…` in m/s², each (n, 3)."""
+    rng = np.random.default_rng(seed)
+    mounting = sim.mountings(rng, 1, float(np.sin(np.radians(3))))[0]
+    F = sim.sensitivity(SCALE, mounting)
+    samples = {}
+    for hold in HOLDS:
+        samples[f"gyr_{hold}"] = NOISE_RAD_S * rng.normal(size=(HELD, 3)) - BIAS_RAD_S
+        samples[f"acc_{hold}"] = _accelerations(rng, mounting @ UP[hold], HELD)
+    for i, axis in enumerate("xyz"):
+        turn = -SPEED_RAD_S * F[:, i] - BIAS_RAD_S
+        samples[f"gyr_{axis}_rot"] = turn + NOISE_RAD_S * rng.normal(size=(TURNED, 3))
+        samples[f"acc_{axis}_rot"] = _accelerations(rng, mounting @ UP[f"{axis}_p"], TURNED)
+    return samples
+
+
+def _accelerations(rng: np.random.Generator, up: Array, count: int) -> Array:
+    return GRAVITY_M_S2 * up + ACCELEROMETER_NOISE_M_S2 * rng.normal(size=(count, 3))
+
+
+def in_degrees(samples: Session) -> Session:
+    """imucal wants °/s."""
+    return {name: np.degrees(data) if name.startswith("gyr") else data for name, data in samples.items()}
+
+
+def by_imucal(samples: Session) -> Array:
+    """(6,) kx ky kz bx by bz; imucal solves the accelerometer on the way."""
+    regions = FerrarisSignalRegions(**samples)
+    found = FerrarisCalibration(grav=GRAVITY_M_S2).compute(
+        regions, RATE_HZ, from_acc_unit="m/s^2", from_gyr_unit="deg/s"
+    )
+    return np.concatenate([1 / np.diag(found.K_g), -np.radians(found.b_g)])
+
+
+def by_vector_model(samples: Session, *, with_gravity: bool = False) -> Array:
+    """(6,) from the same gyroscope samples, averaged; covariance and every gate included."""
+    sections = [samples[f"gyr_{name}"] for name in (*HOLDS, "x_rot", "y_rot", "z_rot")]
+    by_axis = [section.T.copy() for section in sections]  # a sum along what lies side by side is four times as fast
+    means = np.array([readings.mean(axis=1) for readings in by_axis])
+    variances = np.array([readings.var(axis=1) / readings.shape[1] for readings in by_axis])
+    rates = np.concatenate([np.zeros((6, 3)), -SPEED_RAD_S * np.eye(3)])
+    up = np.concatenate([list(UP.values()), np.eye(3)])
+    solved = solve_vector_model(means, rates, variances, gravity_m_s2=GRAVITY_M_S2 * up if with_gravity else None)
+    return np.concatenate([solved.scale, solved.bias_rad_s])
+
+
+def main() -> None:
+    """Print errors over 300 sessions and the median time of one, taken in turns: a busy computer slows all alike."""
+    truth = np.concatenate([SCALE, BIAS_RAD_S])
+    sessions = [session(seed) for seed in range(RUNS)]
+    converted = [in_degrees(samples) for samples in sessions]
+    solvers: dict[str, tuple[Callable[[Session], Array], list[Session]]] = {
+        "imucal, with its accelerometer": (by_imucal, converted),
+        "vector model with g-sensitivity": (lambda samples: by_vector_model(samples, with_gravity=True), sessions),
+        "vector model": (by_vector_model, sessions),
+    }
+    taken_s = np.empty((len(solvers), ROUNDS, RUNS // ROUNDS))
+    for round_ in range(ROUNDS):
+        for solver, (solve, given) in enumerate(solvers.values()):
+            taken_s[solver, round_] = timeit.repeat(partial(solve, given[0]), number=1, repeat=RUNS // ROUNDS)
+    medians_s = np.median(taken_s, axis=(1, 2))
+    measured = f"{'RMS scale error':>18}{'RMS bias error rad/s':>23}{'covariance':>12}"
+    print(f"{'solver':34}{'median µs':>12}{'ratio':>8}{measured}")
+    for (name, (solve, given)), seconds in zip(solvers.items(), medians_s, strict=True):
+        errors = np.array([solve(samples) for samples in given]) - truth
+        scale, bias = np.sqrt(np.mean(errors[:, :3] ** 2)), np.sqrt(np.mean(errors[:, 3:] ** 2))
+        stated = "no" if name.startswith("imucal") else "yes"
+        print(f"{name:34}{seconds * 1e6:12.0f}{seconds / medians_s[0]:8.2f}{scale:18.2e}{bias:23.2e}{stated:>12}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""Damaged messages by the million: `python benchmarks/wire/damaged_frames.py [--frames N] [--messages N] [--seed N]`.
+
+Ten million damaged frames to the firmware's receiver, under the sanitizers for addresses and undefined behaviour, and
+ten million to the host's: bits flipped, runs lost, doubled, swapped, overwritten and inserted, ends cut, delimiters
+lost, blocks over-long, a wrong CRC in a frame of the right length, a right CRC around nonsense. Beside each stands a
+receiver written from the protocol's description alone, bit by bit, which says what was to be accepted: the firmware's
+must take the same, block by block, and the board must go on answering; the host's must hear the same frames as from the
+whole blocks alone. A hundred thousand damaged messages of RTDE, dashboard and primary interface each, to the rig's
+readers and to the simulated controller's: no crash, no hang, an end with a name.
+
+How many wrong frames to expect: damage that leaves a block of sound COBS passes a CRC of 32 bits with a chance of 2⁻³².
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
+from support.board.damaged_frames import Sent, build, to_firmware, to_host, write_sound
+from support.wires.damaged_messages import carry_to_rig, carry_to_world, readers
+
+ROOT = Path(__file__).parents[2]
+WARM_UP = 2000  # messages, after which memory may not grow
+GROWTH_MAX = 20 * 2**20  # bytes
+
+
+def tell(receiver: str, sent: Sent, spent_s: float) -> list[str]:
+    """What became of the frames sent to a receiver; what should not have."""
+    print(
+        f"{receiver}: {sent.frames} damaged frames, {sent.blocks} blocks between delimiters, {sent.refused} refused, "
+        f"{sent.as_sent} whole all the same, {sent.made} of nonsense with a right CRC, {sent.chance} right by chance "
+        f"(expected {sent.refused * 2**-32:.1g}); {spent_s:.0f} s",
+        flush=True,
+    )
+    return [f"{receiver}: {sent.chance} damaged blocks passed the CRC"] if sent.chance > 1 else []
+
+
+def frames(number: int, seed: int) -> list[str]:
+    """Damaged frames to both receivers of the serial line."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        program = build(folder)
+        began_s = time.perf_counter()
+        sent = to_firmware(program, number, seed, write_sound(folder / "host", "host", seed))
+        found = tell("the firmware's receiver", sent, time.perf_counter() - began_s)
+        print(f"  the board answered {sent.answers} of the accepted, {sent.errors} of them by a refusal", flush=True)
+        began_s = time.perf_counter()
+        sent, heard, of_whole = to_host(program, number, seed, write_sound(folder / "board", "board", seed))
+        found += tell("the host's receiver", sent, time.perf_counter() - began_s)
+    print(f"  it accepted {heard.accepted}, of them {heard.repeated} as repeated, and refused {heard.damaged}")
+    if (heard.frames, heard.digest, heard.repeated) != (of_whole.frames, of_whole.digest, of_whole.repeated):
+        found.append(f"the host heard other frames than came whole: {heard}, {of_whole}")
+    if heard.accepted + heard.damaged != sent.blocks:
+        found.append(f"the host took {heard.accepted} blocks and refused {heard.damaged}: {sent}")
+    return found
+
+
+def messages(side: str, carry: Callable[[str, int, int], Counter[str]], number: int, seed: int) -> list[str]:
+    """Damaged messages of the controller's protocols to one side of them."""
+    found: list[str] = []
+    for name in readers():
+        carry(name, min(number, WARM_UP), seed + 1)
+        before, began_s = rss(), time.perf_counter()
+        ends = carry(name, number, seed)
+        grown, spent_s = rss() - before, time.perf_counter() - began_s
+        told = ", ".join(f"{end} {count}" for end, count in ends.most_common())
+        print(
+            f"{side}, {name}: {number} damaged messages: {told}; {grown / 2**20:+.1f} MiB, {spent_s:.0f} s", flush=True
+        )
+        if grown > GROWTH_MAX:
+            found.append(f"{side}, {name}: memory has grown by {grown / 2**20:.0f} MiB")
+    return found
+
+
+def rss() -> int:
+    """Resident memory of this process, bytes."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=10_000_000, metavar="N", help="to each of both receivers")
+    parser.add_argument("--messages", type=int, default=100_000, metavar="N", help="of each protocol, to each side")
+    parser.add_argument("--seed", type=int, default=1, metavar="N")
+    options = parser.parse_args()
+    commit = subprocess.run(
+        ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+    )
+    found = frames(options.frames, options.seed)
+    found += messages("the simulated controller", carry_to_world, options.messages, options.seed)
+    found += messages("the rig", carry_to_rig, options.messages, options.seed)
+    print("\n".join(found) or "no crash, no hang, every end has its name, and nothing was accepted that should not be")
+    print(f"at commit {commit.stdout.strip() or 'unknown'}")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+"""What a slow reader costs the simulated laboratory: `python benchmarks/wire/slow_reader.py [--pace N] [--reads N]`.
+
+Starts the demonstration's world at N times real time. A prompt reader of the arm's states measures how fast the world's
+time passes, in turns alone and beside a client that reads N times a second, so that both see the same machine. Prints
+both paces, what the slow client changes, and the longest time in which the prompt reader got nothing.
+"""
+
+import argparse
+import json
+import socket
+import struct
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+
+DEMO = Path(__file__).parents[2] / "configs" / "demo.yaml"
+STATE = struct.Struct(">HBBd")  # size, type, recipe, time stamp
+
+
+def package(kind: str, payload: bytes) -> bytes:
+    return struct.pack(">HB", 3 + len(payload), ord(kind)) + payload
+
+
+def reader(host: str) -> socket.socket:
+    """A connection that is sent the controller's time stamp 125 times a second of its own time."""
+    client = socket.create_connection((host, 30004), 10.0)
+    setup = (("V", struct.pack(">H", 2), 4), ("O", struct.pack(">d", 125.0) + b"timestamp", 10), ("S", b"", 4))
+    for kind, payload, answer in setup:
+        client.sendall(package(kind, payload))
+        client.recv(answer, socket.MSG_WAITALL)
+    return client
+
+
+def measured(
+    prompt: socket.socket, slow: socket.socket | None, reads_hz: float, duration_s: float
+) -> tuple[float, float]:
+    """The world's seconds in a wall second, over `duration_s`, and the longest wait for a state (wall time)."""
+    heard_s, stamps_s, read_s = [time.monotonic()], [], time.monotonic()
+    while heard_s[-1] - heard_s[0] < duration_s:
+        stamps_s.append(STATE.unpack(prompt.recv(STATE.size, socket.MSG_WAITALL))[3])
+        heard_s.append(time.monotonic())
+        if slow is not None and heard_s[-1] - read_s > 1.0 / reads_hz:
+            read_s = heard_s[-1]
+            slow.recv(1 << 22)
+    longest_s = max(after - before for before, after in pairwise(heard_s))
+    return (stamps_s[-1] - stamps_s[0]) / (heard_s[-1] - heard_s[1]), longest_s
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pace", type=float, default=4.0, metavar="N", help="how many times as fast as real")
+    parser.add_argument("--reads", type=float, default=1.0, metavar="N", help="how often a second the client reads")
+    parser.add_argument("--turns", type=int, default=3, metavar="N", help="turns of ten seconds, alone and beside")
+    options = parser.parse_args()
+    command = [sys.executable, "-m", "rig.world", str(DEMO), "--until-eof"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as world:
+        assert world.stdin is not None and world.stdout is not None
+        ready = json.loads(world.stdout.readline())
+        host, port = ready["control"].rsplit(":", 1)
+        with socket.create_connection((host, int(port)), 10.0) as control:
+            control.sendall(json.dumps({"do": "pace", "time_scale": options.pace}).encode() + b"\n")
+            control.recv(4096)
+        alone, beside = [], []
+        with reader(ready["arm"]) as prompt:
+            for _ in range(options.turns):
+                alone.append(measured(prompt, None, options.reads, 10.0))
+                with reader(ready["arm"]) as slow:
+                    beside.append(measured(prompt, slow, options.reads, 10.0))
+        world.stdin.close()
+    for name, turns in (("alone", alone), ("beside", beside)):
+        print(f"{name}: {median(t[0] for t in turns):.3f} times real, longest wait {max(t[1] for t in turns):.3f} s")
+    change = median(after[0] / before[0] for before, after in zip(alone, beside, strict=True)) - 1.0
+    print(f"a client that reads {options.reads:g} times a second changes the pace by {change:+.2%}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

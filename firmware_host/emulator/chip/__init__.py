@@ -1,0 +1,1 @@
+"""The chip's peripherals: clocks, timers, buses, flash."""

@@ -1,0 +1,248 @@
+"""A device on the board's SPI bus, and the wires from it to the chip."""
+
+import math
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Protocol
+
+from firmware_host.emulator.chip.bus import Violation
+from firmware_host.emulator.chip.gpio import Exti, Port
+from firmware_host.emulator.chip.spi import Spi1
+from firmware_host.emulator.timeline import NEVER, TICK_HZ, Timeline
+
+
+class Fault(StrEnum):
+    """What can be wrong with a part on the bus."""
+
+    ABSENT = "absent"  # it is not there, or without supply: MISO and the interrupt line are left to their pulls
+    OTHER_PART = "other_part"  # its identity register reads as another part's
+    DAMAGED = "damaged"  # a bad contact: now and then a bit of what it sends is wrong
+    SILENT = "silent"  # its interrupt line is broken: it answers, and never says that there is something new
+
+
+class SpiDevice(Protocol):
+    """A part on the SPI bus, at register level. Times are virtual seconds and never go backwards.
+
+    `name`: the part, for messages. `chip_select`, `interrupt`: chip pins, such as "PA11". `spi_modes`, `spi_max_hz`:
+    what its bus interface accepts; the clock depends on what is accessed and is asked for after the first byte of
+    each access. `next_event_s`: when it next does something by itself, infinity for never. `fault`: what is wrong
+    with it; the wires see to all of it but the identity.
+    """
+
+    fault: Fault | None
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def chip_select(self) -> str: ...
+    @property
+    def interrupt(self) -> str: ...
+    @property
+    def spi_modes(self) -> tuple[int, ...]: ...
+    @property
+    def spi_max_hz(self) -> float: ...
+    @property
+    def next_event_s(self) -> float: ...
+    @property
+    def interrupt_level(self) -> bool: ...
+
+    def advance(self, time_s: float) -> None:
+        """Do everything due up to and including `time_s`."""
+
+    def select(self, time_s: float) -> None:
+        """Chip select falls, which neither moves the interrupt line nor `next_event_s`."""
+
+    def transfer(self, byte: int, time_s: float) -> int:
+        """Exchange one byte. Raises Violation for what the part does not allow or the model does not know."""
+
+    def foretell(self) -> bytes:
+        """What it answers to the next pairs of bytes, whatever they are and whatever happens before chip select rises.
+
+        Asked for after the first pair of an access; what it tells counts as exchanged.
+        """
+
+    def deselect(self, time_s: float) -> None:
+        """Chip select rises, likewise."""
+
+
+# The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the 4 MHz it is meant to have
+LOCKED_MSI = 122 * 32_768 / 4_000_000
+
+
+class BoardClock:
+    """Virtual seconds ↔ board ticks: the board starts at `boot_time_s`, its crystal is `crystal_ppm` fast.
+
+    The clock counts as locked to the crystal from the start; on the chip it has its own error for the first seconds.
+    """
+
+    def __init__(self, boot_time_s: float, crystal_ppm: float) -> None:
+        self._boot_time_s = boot_time_s
+        self._ticks_per_s = TICK_HZ * LOCKED_MSI * (1 + crystal_ppm * 1e-6)
+
+    def last_tick(self, time_s: float) -> int:
+        """The last tick at or before `time_s`."""
+        return math.floor((time_s - self._boot_time_s) * self._ticks_per_s)
+
+    def first_tick(self, time_s: float) -> int:
+        """The first tick at or after `time_s`."""
+        return math.ceil((time_s - self._boot_time_s) * self._ticks_per_s)
+
+    def seconds(self, tick: int) -> float:
+        return self._boot_time_s + tick / self._ticks_per_s
+
+
+_UNCHECKED = -1
+
+
+class SpiBus:
+    """The wires between SPI1 and the devices. `pins_connected()`: has the firmware put SPI1 on its pins?"""
+
+    def __init__(self, timeline: Timeline, spi: Spi1, pins_connected: Callable[[], bool]) -> None:
+        self._timeline = timeline
+        self._spi = spi
+        self._pins_connected = pins_connected
+        self._selected: list[DeviceLink] = []
+        self._checked = _UNCHECKED
+
+    def chip_select(self, link: "DeviceLink", low: bool) -> None:
+        """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
+        if self._spi.busy:
+            raise Violation(
+                "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
+            )
+        if low:
+            self._selected.append(link)
+        else:
+            self._selected.remove(link)
+        self._checked = _UNCHECKED
+        self._spi.bus.known_to = 0
+
+    def exchange(self, pair: int) -> int:
+        """Pass two bytes, the first one low, to the selected device; its answers, likewise.
+
+        Raises Violation when the bus is not set up as it must be.
+        """
+        spi, timeline, bus = self._spi, self._timeline, self._spi.bus
+        if timeline.next_due <= timeline.now:
+            timeline.run_due()
+        setups, checked = bus.setups, self._checked
+        if checked != setups:
+            self._check_wires()
+        if bus.known_from < bus.known_to:
+            answer = bus.foreseen()
+        else:
+            answer = self._selected[0].exchange(pair) if self._selected else 0xFFFF
+        if checked != setups:
+            self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
+            self._checked = bus.known_in = setups
+            if checked == _UNCHECKED and self._selected and (told := self._selected[0].foretell()):
+                bus.foresee(told)
+        return answer
+
+    def _check_wires(self) -> None:
+        if not self._pins_connected():
+            raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "Set MODER and AFRL first")
+        if len(self._selected) > 1:
+            raise Violation("bus_contention", "two chip selects are low at once", "Raise one before lowering the other")
+
+    def _check_clock(self, spi: Spi1) -> None:
+        for link in self._selected:
+            device = link.device
+            if spi.mode not in device.spi_modes or spi.clock_hz > device.spi_max_hz:
+                raise Violation(
+                    "spi_setup",
+                    f"SPI1 speaks mode {spi.mode} at {spi.clock_hz / 1e6:g} MHz to the {device.name}",
+                    f"This access takes mode {' or '.join(map(str, device.spi_modes))} "
+                    f"up to {device.spi_max_hz / 1e6:g} MHz",
+                )
+
+
+# Of a part with a bad contact, one byte in so many has a wrong bit: nearly every burst of the ADIS16465 has just one,
+# which its sum always shows
+_DAMAGED_BYTE = 21
+
+
+class DeviceLink:
+    """Connects a device to its chip select, its interrupt pin, the bus and the board's time."""
+
+    def __init__(
+        self,
+        device: SpiDevice,
+        bus: SpiBus,
+        *,
+        timeline: Timeline,
+        clock: BoardClock,
+        port_of: Callable[[str], Port],
+        exti: Exti,
+    ) -> None:
+        self.device = device
+        self._bus = bus
+        self._timeline = timeline
+        self._clock = clock
+        self._slot = timeline.register(self._event)
+        self._due_s = math.inf
+        self._interrupt_port, self._interrupt_pin = port_of(device.interrupt), int(device.interrupt[2:])
+        self._exti = exti
+        self._level = False
+        self._sent = 0  # bytes since the last damaged one
+        port_of(device.chip_select).watch(int(device.chip_select[2:]), self._chip_select)
+        self._settle()
+
+    def exchange(self, pair: int) -> int:
+        """Pass two bytes to the device, the first one low, and return its answers likewise."""
+        return self._transfer(pair) if self.device.fault is None else self._exchange_faulty(pair)
+
+    def _transfer(self, pair: int) -> int:
+        device = self.device
+        time_s = self._clock.seconds(self._timeline.now)
+        answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
+        if device.interrupt_level != self._level or device.next_event_s != self._due_s:
+            self._settle()
+        return answer
+
+    def foretell(self) -> bytes:
+        """What the device answers next, see `SpiDevice`; of a faulty one nothing is known."""
+        return self.device.foretell() if self.device.fault is None else b""
+
+    def _exchange_faulty(self, pair: int) -> int:
+        if self.device.fault is Fault.ABSENT:
+            return 0xFFFF
+        answer = self._transfer(pair)
+        if self.device.fault is Fault.DAMAGED:
+            self._sent += 2
+            if self._sent >= _DAMAGED_BYTE:
+                self._sent -= _DAMAGED_BYTE
+                answer ^= 0x0001 if self._sent else 0x0100
+        return answer
+
+    def _chip_select(self, high: bool) -> None:
+        timeline, device = self._timeline, self.device
+        now = timeline.now
+        if timeline.next_due <= now:
+            timeline.run_due()
+        self._bus.chip_select(self, not high)
+        time_s = self._clock.seconds(now)
+        if high:
+            device.deselect(time_s)
+        else:
+            device.select(time_s)
+        if device.fault is not None:  # it may just have come
+            self._settle()
+
+    def _event(self) -> None:
+        self.device.advance(self._due_s)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Take over what the device may have changed: its interrupt line and its next event."""
+        device = self.device
+        level = device.interrupt_level and device.fault not in (Fault.ABSENT, Fault.SILENT)
+        if level != self._level:
+            self._level = level
+            self._interrupt_port.drive(self._interrupt_pin, level)
+            if level and self._interrupt_port.is_input(self._interrupt_pin):
+                self._exti.rising_edge(self._interrupt_port, self._interrupt_pin)
+        due_s = device.next_event_s
+        if due_s != self._due_s:
+            self._due_s = due_s
+            self._timeline.schedule(self._slot, NEVER if math.isinf(due_s) else self._clock.first_tick(due_s))

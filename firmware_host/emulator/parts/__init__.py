@@ -1,0 +1,1 @@
+"""The sensors on the board's bus, at their registers."""

@@ -1,0 +1,41 @@
+"""What recordings of a session by hand amount to: every gyroscope solved from its rests and moves, and judged."""
+
+from collections.abc import Sequence
+
+from rig.analysis.by_hand.gyroscope import result_by_hand
+from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
+from rig.analysis.outcome import Outcome, origin_of
+from rig.analysis.verdict import judge
+from rig.data.recording.run_file import RunData
+from rig.errors import Refused
+from rig.estimation.by_hand import solve_by_hand
+from rig.observation.by_hand.runs import session_of, told_of
+
+
+def calibrated_by_hand(runs: Sequence[RunData]) -> Outcome:
+    """The outcome, as `rig.analysis.analyses.calibrate_by_hand` says."""
+    settings = runs[0].settings
+    if any(run.sensors != runs[0].sensors for run in runs):
+        raise Refused(
+            "different_sensors",
+            "the recordings do not describe the same sensors with the same settings",
+            "Solve them one by one",
+        )
+    results = {}
+    for name in settings.to_calibrate:
+        told = told_of(settings, runs[0].provenance, runs[0].sensors[name])
+        found = solve_by_hand(session_of(runs, name), told)
+        whole = name in settings.matrix_corrected
+        corrected_by = matrix_correction(found.turned) if whole else diagonal_correction(found.scale)
+        results[name] = result_by_hand(runs[0].sensors[name], found, corrected_by)
+    return Outcome(
+        settings=settings,
+        provenance=origin_of(runs),
+        results=results,
+        checks=judge(
+            {name: result.solution for name, result in results.items()},
+            settings.limits,
+            {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
+            settings.stated_uncertainty.decision_rule,
+        ),
+    )

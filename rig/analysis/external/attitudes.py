@@ -1,0 +1,203 @@
+"""From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal, get_args
+
+import numpy as np
+
+from rig.analysis.estimators import estimator_among
+from rig.analysis.external.increments import InIncrements, solve_turning
+from rig.analysis.external.placed_budget import budget_by_causes, noise_freedom
+from rig.analysis.external.placed_equations import Equations
+from rig.analysis.installed_kinds import OfKind
+from rig.analysis.reference.triad import Triad, check_mounted, check_seen, known_field, known_gravity
+from rig.data.installed_kinds import installed_kinds
+from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.recording.settings import Elsewhere, Site
+from rig.errors import Fault, or_fault
+from rig.errors.attempts import Attempts, attempt_each
+from rig.estimation.external.placement import NOISE, LaidDown, laid_down
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.gyroscope.earth_rate import check_earth_seen
+from rig.estimation.reference.accelerometer_model import Dwells
+from rig.estimation.reference.reference_model import BIAS, REFERENCE, SECOND, F
+from rig.estimation.reference.triaxial import EqualWeights, Method, TriaxialSolution
+from rig.observation.external.attitude_import import PlacedReadings
+from rig.observation.external.fixes import Turning
+from rig.observation.external.placements import Placements
+from rig.observation.statistics.mean import Held
+from rig.observation.stuck_check import check_reads
+
+Chosen = Method | Literal["increments"]
+METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
+CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
+TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
+NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
+ROUNDING = 1e-9  # of a mean: all readings of it were the same
+
+
+@dataclass(frozen=True, slots=True)
+class InAttitudes:
+    """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in.
+
+    `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it. Of a body that
+    was laid down, `laid` is how its placements differ, told by `elsewhere` rests without an attitude too, and `moving`
+    how many rows were left out for its movement; `dwells` are the placements. `seen` is what was read in attitudes.
+    `budget` is what the uncertainty of the chosen method is made of, the `triad` its scale and axes.
+    """
+
+    solution: TriaxialSolution
+    triad: Triad
+    beside: Attempts[Method, TriaxialSolution]
+    budget: Budget
+    seen: Dwells
+    reference_fault: Fault | None = None
+    laid: LaidDown | None = None
+    elsewhere: int = 0
+    moving: int = 0
+    dwells: tuple[Held, ...] = ()
+
+
+Result = InAttitudes | InIncrements
+
+
+def solve_placed(
+    name: str, placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
+) -> Attempts[Quantity, Result | OfKind]:
+    """Every quantity that was recorded of a sensor of that name, by `method`; None chooses the one that suits it.
+
+    That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
+    "maximum_likelihood".
+    """
+    any_mounting, exact_rates = asked.any_mounting, asked.exact_rates
+
+    def of_rate(turning: Turning) -> Result:
+        check_reads(turning.readings_rad_s, RATE)
+        chosen = method or ("maximum_likelihood" if exact_rates else "increments")
+        if chosen != "increments":
+            return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
+        return solve_turning(turning, asked.window_s, any_mounting=any_mounting)
+
+    solvers = {kind.quantity: kind.solve for kind in installed_kinds()}
+
+    def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
+        if not isinstance(placements, Fault):
+            _check_noisy(placements, quantity)
+        if quantity in solvers and not isinstance(placements, Fault):
+            of_kind: OfKind = solvers[quantity](name, placements, site)
+            return of_kind
+        known = known_gravity(site) if quantity == ACCELERATION else known_field(site, "--field-t, in tesla")
+        if isinstance(placements, Fault):
+            raise placements
+        chosen = "attitude_weighted" if method is None or method == "increments" else method
+        equations = Equations.of_placements(placements, quantity, known, second_order=second_order)
+        return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
+
+    solves = dict[Quantity, Callable[[], Result | OfKind]]()
+    for quantity in (each for each in placed.quantities if not asked.only or each.sensor in asked.only):
+        if quantity == RATE and placed.turning is not None:
+            solves[quantity] = partial(of_rate, placed.turning)
+        elif placed.placements is not None:
+            solves[quantity] = partial(of_reference, quantity, placed.placements)
+    return attempt_each(solves)
+
+
+def _check_noisy(placements: Placements, quantity: Quantity) -> None:
+    """Raises Fault `stuck_sensor` where a placement's readings of an axis are all the same."""
+    read = placements.read
+    nothing = read.variances[quantity] <= (ROUNDING * read.means[quantity]) ** 2
+    for row, axis in np.argwhere(nothing)[:1]:
+        window, reads = read.windows[row], read.means[quantity][row, axis]
+        raise Fault(
+            "stuck_sensor",
+            f"from {window.start_s:.4g} to {window.end_s:.4g} s the {quantity.sensor} reads {reads:g} {quantity.unit} "
+            f"on {quantity.axes[axis]} always: stuck, at the end of its range, or too coarse to show its noise",
+            "Check its supply, its bus wires and its range; record with all digits",
+        )
+
+
+def known_method(name: str | None) -> Chosen | None:
+    """Raises Refused `unknown_estimator`."""
+    return None if name is None else estimator_among(CHOICES, name)
+
+
+def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
+    solution = equations.solve(method)
+    if not any_mounting:
+        check_mounted(solution.matrix)
+    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
+    beside = equations.beside(method, *get_args(EqualWeights))
+    return InAttitudes(solution, Triad.of(solution), beside, budget, equations.seen, _not_the_earth(solution))
+
+
+def _of_placements(
+    placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
+) -> InAttitudes:
+    """The calibration from placements; what these do beside counts too, if the method allows for wrong attitudes."""
+    elsewhere, moving = placements.elsewhere, placements.left_out
+    solution, laid = _solved(equations, method, placements), None
+    if method == "attitude_weighted":
+        laid = laid_down(
+            solution.theta,
+            equations.placed,
+            elsewhere.means[quantity],
+            elsewhere.variances[quantity],
+        )
+        solution = _as_laid_down(solution, laid)
+    if solution.second_order is not None:
+        check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
+    if not any_mounting:
+        check_mounted(solution.matrix)
+    causes = {NOISE: solution.covariance} if laid is None else laid.causes
+    budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
+    return InAttitudes(
+        solution,
+        Triad.of(solution),
+        equations.beside(method, *METHODS),
+        budget,
+        equations.seen,
+        laid=laid,
+        elsewhere=len(elsewhere.windows),
+        moving=moving,
+        dwells=tuple(_dwells(placements, quantity)),
+    )
+
+
+def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Held]:
+    read = placements.read
+    for number, (attitude, window) in enumerate(zip(placements.attitudes, read.windows, strict=True)):
+        yield Held(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
+
+
+def _solved(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
+    """The solution; where the rests are not enough, it is said that rows were left out."""
+    try:
+        return equations.solve(method)
+    except Fault as fault:
+        if not placements.left_out or fault.name not in TOO_LITTLE:
+            raise
+        what = (
+            f"{fault.what}; {placements.left_out} rows in which the body moves are left out, for only rests tell a "
+            f"reference{''.join(f'; {each}' for each in placements.omitted)}"
+        )
+        raise Fault(fault.name, what, fault.remedy) from None
+
+
+def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
+    theta = laid.theta
+    return replace(
+        solution,
+        matrix=theta[F].reshape(3, 3),
+        reference=theta[REFERENCE],
+        bias=theta[BIAS],
+        second_order=None if solution.second_order is None else theta[15:],
+        covariance=laid.covariance,
+        attitude_error=laid.attitude_error,
+    )
+
+
+def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
+    """Why what a gyroscope's rates leave over is not the Earth's rate: as in a run, it must be seen to a tenth."""
+    return or_fault(partial(check_earth_seen, solution.reference, solution.covariance[REFERENCE, REFERENCE]))

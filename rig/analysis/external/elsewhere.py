@@ -1,0 +1,315 @@
+"""Readings recorded elsewhere, whose motion a file tells: what they give, and by what that is judged. Pure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.by_hand.gyroscope import solved_by_hand
+from rig.analysis.check import Check, fitness, unsolved_checks
+from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
+from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
+from rig.analysis.external.increments import InIncrements
+from rig.analysis.external.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
+from rig.analysis.external.sweeps_agree import check_agree, contradiction, counted, rows_left
+from rig.analysis.gyroscope.calibration import (
+    ALGORITHM_1,
+    NEWTON,
+    VECTOR,
+    SensorResult,
+    solve_observations,
+    solve_six_observation,
+    solve_vector,
+)
+from rig.analysis.gyroscope.correction import diagonal_correction, matrix_correction
+from rig.analysis.installed_kinds import KindFound, OfKind
+from rig.analysis.temperature.over_temperature import files_to_reference, with_rate_polynomials
+from rig.data.quantity import RATE, Quantity
+from rig.data.recording.motion_file import Item, ReadElsewhere
+from rig.data.recording.settings import RunSettings
+from rig.errors import Fault, Refused
+from rig.errors.attempts import attempt
+from rig.estimation.gyroscope import known_turns
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
+from rig.estimation.gyroscope.vector_model import VectorSolution
+from rig.estimation.reference import triaxial
+from rig.estimation.reference.reference_budget import fewest_freedom, scale_and_bias_covariance
+from rig.estimation.reference.reference_model import BIAS as OFFSET
+from rig.estimation.reference.reference_model import F
+from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
+from rig.estimation.sensor_axes import SensorAxes
+from rig.estimation.temperature.over_temperature import OverTemperature
+from rig.observation.external.attitude_import import placed_by
+from rig.observation.external.csv_import import ExternalData, averaged
+from rig.observation.external.csv_samples import Samples, samples_in
+from rig.observation.external.omitted import Omitted
+from rig.observation.external.turns import TurnedData
+from rig.observation.statistics.mean import by_axis
+from rig.observation.timebase import TimeBase
+
+BySweeps = Estimator | Literal["increments"]
+BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
+FROM_READINGS = "scatter of the readings"
+SWEEPS, FROM_RESIDUALS = "sweeps", "what the sweeps contradict each other by"
+NO_SWEEPS = Fault("too_few_observations", "a file of attitudes contains no sweeps", "Give sweeps in six directions")
+
+
+@dataclass(frozen=True, slots=True)
+class OfSensor:
+    """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
+
+    `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
+    rest; `of_kinds` is what solvers of installed kinds of sensors found; `polynomials` are there of a calibration over
+    temperature. `omitted` is what was left out of the recording, by the quantity that it is missing from, None of all;
+    `notes` say how it was read and solved, where that is not as a matter of course.
+    """
+
+    item: Item
+    gyroscope: SensorResult | None
+    rates: Result | None
+    at_rest: Mapping[Quantity, InAttitudes]
+    unsolved: Mapping[Quantity, Fault]
+    turned: TurnedData | None = None
+    of_kinds: tuple[KindFound, ...] = ()
+    polynomials: OverTemperature | None = None
+    omitted: tuple[tuple[Quantity | None, Omitted], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
+    """What readings gave of whose motion a file tells; `estimator` None takes what suits.
+
+    Raises Refused `unknown_estimator`; Fault as the observers do, and where no quantity has a solution what the
+    estimator does, or of several `nothing_solved` with every reason.
+    """
+    if read.tells == "turns":
+        return _with_notes(_by_hand(read, estimator), read)
+    found = (
+        _by_sweeps(read, estimator, settings.reference_c)
+        if read.tells == "sweeps"
+        else _by_attitudes(read, settings, estimator)
+    )
+    if found.gyroscope is None and not found.at_rest and not found.of_kinds:
+        raise _nothing_solved(found.unsolved)
+    return _with_notes(found, read)
+
+
+def _with_notes(sensor: OfSensor, read: ReadElsewhere) -> OfSensor:
+    return replace(sensor, notes=(*notes_on_reading(read, _samples(read).sampling), *sensor.notes))
+
+
+def checks_elsewhere(name: str, sensor: OfSensor) -> Iterator[Check]:
+    """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
+
+    And every quantity that was to be solved, and is not. No configuration states limits of anything else.
+    """
+    yield from unsolved_checks((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
+    if (gyroscope := sensor.gyroscope) is not None:
+        largest = triaxial.MAX_CONDITION if sensor.rates is not None else known_turns.MAX_CONDITION
+        yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
+    for quantity, result in sensor.at_rest.items():
+        yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
+        if (error := result.solution.attitude_error) is not None:
+            at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements tell it badly
+            yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
+
+
+def _by_hand(read: ReadElsewhere, name: str | None) -> OfSensor:
+    if name not in (None, "by_hand"):
+        estimator_among(("by_hand",), str(name))
+    return OfSensor(read.item, solved_by_hand(read.item, _samples(read), read.motion), None, {}, {})
+
+
+def _by_sweeps(read: ReadElsewhere, name: str | None, reference_c: float | None) -> OfSensor:
+    chosen = None if name is None else estimator_among(BY_SWEEPS, name)
+    data, polynomials = averaged(_samples(read), read.motion), None
+    if reference_c is not None and data.turned is not None:
+        raise Refused(
+            "bad_option",
+            "the body was turned from rest to rest, and over temperature mean rates are solved",
+            "Give sweeps at constant speed, with speed_rad_s; or leave out --reference-c",
+        )
+    if reference_c is not None:
+        data, polynomials = files_to_reference(data, reference_c)
+    solution, faults = solve_swept(data, chosen), dict[str, Fault]()
+    vector = (
+        solution
+        if isinstance(solution, VectorSolution | TurnedSolution)
+        else attempt(faults, VECTOR, lambda: counted(_vector(data), data))
+    )
+    gyroscope = SensorResult(
+        sensor=read.item,
+        solution=solution,
+        vector_model=vector,
+        explained=None,
+        uncertainty=budget_of(solution, data),
+        # Three sweeps may do for the vector model, not for the six observations.
+        six_observation=attempt(faults, NEWTON, lambda: solve_six_observation(data.sweeps, "newton")),
+        algorithm_1=attempt(faults, ALGORITHM_1, lambda: solve_six_observation(data.sweeps, "algorithm_1")),
+        observations=data.sweeps,
+        rests=data.rests,
+        time_bases=(),
+        corrected_by=(
+            matrix_correction(solution)
+            if isinstance(solution, VectorSolution | TurnedSolution)
+            else diagonal_correction(solution.scale)
+        ),
+        faults=faults,
+    )
+    by_turns = data.turned if isinstance(solution, TurnedSolution) else None
+    if polynomials is not None:
+        gyroscope, polynomials = with_rate_polynomials(gyroscope, polynomials)
+    notes = tuple(notes_on_turns(data, solution)) if chosen in (None, "increments") else ()
+    omitted = tuple((RATE, each) for each in data.omitted)
+    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes)
+
+
+def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
+    """Solves by `estimator`; None takes "increments" where the body was turned from rest to rest, else "vector".
+
+    Raises Fault as the estimators do, and `no_turns`.
+    """
+    if estimator is None:
+        estimator = "vector" if data.turned is None else "increments"
+    if estimator != "increments":
+        found = _vector(data)
+        check_agree(found, data)
+        return counted(found, data) if estimator == "vector" else solve_observations(data.sweeps, estimator, data.rests)
+    if data.turned is None:
+        raise Fault(
+            "no_turns",
+            "no row of the sweeps has an angle and begins and ends at rest",
+            "Let the body lie still for a second before and after each turn, and give angle_rad; or use vector",
+        )
+    start, turned = _vector(data), data.turned
+    return solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
+
+
+def budget_of(solution: Estimate, data: ExternalData) -> Budget:
+    """What its covariance is made of: of means nothing but their scatter."""
+    if data.turned is None or not isinstance(solution, TurnedSolution):
+        freedom, whole = _noise_freedom(solution, data), solution.covariance
+        more = contradiction(solution, data) if isinstance(solution, VectorSolution) else 1.0
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, whole / more**2)
+        if more == 1 or not isinstance(solution, VectorSolution):
+            return Budget((noise,))
+        beyond, left = whole - noise.covariance, float(max(rows_left(data), 1))
+        return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, left, beyond)))
+    known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    known |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)
+    lines = solution.budget.contributors
+    return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
+
+
+def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
+    """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    freedom = by_axis(each.freedom for each in averages)
+    if not isinstance(solution, VectorSolution):
+        return float(freedom.min())
+    variances = np.array([each.variance_rad2_s2 for each in averages])
+    return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
+
+
+def _vector(data: ExternalData) -> VectorSolution:
+    return solve_vector(data.sweeps, data.rests)
+
+
+def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
+    method, site, asked = known_method(name), settings.site, settings.elsewhere
+    assert asked is not None, "of readings of others"
+    placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
+    found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
+    rates = found.results.get(RATE)
+    told = rates if isinstance(rates, InAttitudes | InIncrements) else None
+    return OfSensor(
+        read.item,
+        gyroscope=None if told is None else _gyroscope(read.item, told, placed.clock),
+        rates=told,
+        at_rest={
+            quantity: result
+            for quantity, result in found.results.items()
+            if quantity != RATE and isinstance(result, InAttitudes)
+        },
+        unsolved=found.faults,
+        omitted=tuple(omitted_in_attitudes(placed, found.results)),
+        of_kinds=tuple(
+            KindFound(read.item.name, read.item, each, result)
+            for each, result in found.results.items()
+            if isinstance(result, OfKind)
+        ),
+    )
+
+
+def _samples(read: ReadElsewhere) -> Samples:
+    return samples_in(read.readings, "the recording")
+
+
+def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
+    """A gyroscope in attitudes as one that was swept is described."""
+    solution = _as_swept(result)
+    return SensorResult(
+        sensor=item,
+        solution=solution,
+        vector_model=solution,
+        explained=None,
+        uncertainty=solution.budget,
+        six_observation=None,
+        algorithm_1=None,
+        observations=(),
+        rests=(),
+        time_bases=() if clock is None else (clock,),
+        corrected_by=matrix_correction(solution),
+        faults=dict.fromkeys((NEWTON, ALGORITHM_1), NO_SWEEPS),
+    )
+
+
+def _as_swept(result: Result) -> TurnedSolution:
+    """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
+    solution, matrix = result.solution, result.solution.matrix
+    axes = SensorAxes.of(matrix)
+    of_matrix = np.r_[F, OFFSET]
+    sign = np.diag(RATE.parameter_signs)
+    lines = tuple(replace(line, covariance=sign @ line.covariance @ sign) for line in result.budget.contributors)
+    if isinstance(result, InIncrements):
+        observations, rank = len(result.solution.residuals_rad), 12
+        warnings: tuple[str, ...] = ()
+        residuals, estimator = np.zeros((0, 3)), "increments"
+    else:
+        of_rows = result.solution
+        observations, rank, warnings = of_rows.observations, of_rows.rank, of_rows.warnings
+        residuals, estimator = of_rows.residuals, str(of_rows.method)
+    return TurnedSolution(
+        scale=axes.scale,
+        bias_rad_s=RATE.offset * solution.bias,
+        covariance=sign @ scale_and_bias_covariance(matrix, axes.scale, solution.covariance) @ sign,
+        matrix=matrix,
+        matrix_covariance=solution.covariance[np.ix_(of_matrix, of_matrix)],
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        mounting=axes.mounting,
+        angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
+        residuals_rad_s=residuals,
+        widened=1.0,
+        widened_freedom=np.inf,
+        budget=Budget(lines),
+        observations=observations,
+        rank=rank,
+        condition=solution.condition,
+        iterations=solution.iterations,
+        warnings=warnings,
+        estimator=estimator,
+    )
+
+
+def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
+    """Every reason, each with its own remedy; the only one as it is."""
+    faults: Sequence[Fault] = list(unsolved.values())
+    if len(faults) == 1:
+        return faults[0]
+    reasons = "; ".join(f"{quantity}: {str(fault).rstrip('.')}" for quantity, fault in unsolved.items())
+    return Refused(
+        "nothing_solved", f"no sensor has a solution: {reasons}", "Do what the message says about your sensor"
+    )

@@ -1,0 +1,57 @@
+"""The uncertainty budget of a sensor calibrated in known attitudes: scale and bias, by what makes them uncertain."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.external.placed_equations import Equations
+from rig.data.entries.budget import IN_U
+from rig.estimation.arrays import Array, scale_of
+from rig.estimation.external import known_increments, placement
+from rig.estimation.gyroscope.budget import Budget, Contributor
+from rig.estimation.reference.reference_budget import (
+    fewest_freedom,
+    response_in_attitudes,
+    scale_and_bias,
+    scale_and_bias_covariance,
+)
+from rig.estimation.reference.triaxial import TriaxialSolution
+
+SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
+    placement.NOISE: ("A", "scatter of the readings"),
+    placement.ATTITUDES: ("A", f"what the readings say of them, {IN_U}"),
+    placement.PLACEMENTS: ("A", f"how the placements differ beside their attitudes, {IN_U}"),
+    known_increments.DELAY: ("A", f"found, within 50 ms of none, {IN_U}"),
+    known_increments.EARTHS_RATE: ("B", "its size, whichever way it points"),
+    known_increments.STRETCHES: ("A", f"how six stretches of the recording differ, {IN_U}"),
+}
+
+
+def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
+    """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by how the readings weigh."""
+    response = response_in_attitudes(solution, equations.seen)
+    told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
+    return fewest_freedom(told, equations.variances.ravel(), equations.freedom.ravel())
+
+
+def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
+    """The budget by what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
+
+    Sizes of errors that were found are uncertain themselves. Where their likelihood was integrated over, or the
+    covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:
+    so it is of the noise too, where no `noise_freedom` is given.
+    """
+    scale = scale_of(matrix)
+    lines = []
+    for name, each in causes.items():
+        kind, source = SOURCES[name]
+        freedom = np.inf
+        if name == placement.NOISE and noise_freedom is not None:
+            freedom = noise_freedom
+        elif name == placement.NOISE:
+            source = f"{source}, {IN_U}"
+        lines.append(
+            Contributor(name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, each))
+        )
+    return Budget(tuple(lines))

@@ -1,0 +1,119 @@
+"""What a sensor read in known attitudes, as the equations that every method of TRIAX solves."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from rig.analysis.external.inverted import solved_in
+from rig.data.quantity import ACCELERATION, Quantity
+from rig.errors import Fault
+from rig.errors.attempts import Attempts, attempt_each
+from rig.estimation.arrays import Array
+from rig.estimation.reference.accelerometer_model import Dwells
+from rig.estimation.reference.attitude_error import Placed
+from rig.estimation.reference.reference_model import Known, KnownNorm, KnownVector
+from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
+from rig.observation.external.attitude_import import PlacedReadings, Rows
+from rig.observation.external.placements import Placements
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """Readings `means` (N, 3) with `variances` (N, 3) in `attitudes` (N, 3, 3), of which `std_rad` (N,) is stated.
+
+    `freedom` (N, 3): with how many degrees of freedom the variances are known.
+    """
+
+    means: Array
+    variances: Array
+    attitudes: Array
+    std_rad: Array | None
+    known: Known
+    freedom: Array
+    second_order: bool = False
+
+    @staticmethod
+    def of_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
+        """A gyroscope's, by its reference's rates. Raises Fault `no_rates`."""
+        rows = placed.rows
+        if rows is None or rows.rates_rad_s is None or not exact_rates:
+            raise Fault(
+                "no_rates",
+                "the attitudes do not say how the table turned, or not that it is exact",
+                "Use increments, which need no rates; or give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s "
+                "in body coordinates, with --exact-rates where their noise is far below the sensor's",
+            )
+        known = KnownVector(rows.rates_rad_s)
+        if rows.variances is None or rows.freedom is None:
+            variances, freedom = _scatter(rows, known)
+        else:
+            variances, freedom = rows.variances, rows.freedom
+        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, known, freedom)
+
+    @staticmethod
+    def of_placements(
+        placements: Placements, quantity: Quantity, known: KnownNorm, *, second_order: bool
+    ) -> "Equations":
+        """The equations of a sensor that feels a constant reference."""
+        return Equations(
+            placements.read.means[quantity],
+            placements.read.variances[quantity],
+            placements.attitudes,
+            placements.attitude_std_rad,
+            known,
+            placements.read.freedom[quantity],
+            second_order and quantity == ACCELERATION,
+        )
+
+    @property
+    def seen(self) -> Dwells:
+        """What was read in which attitude."""
+        return Dwells(self.means, self.variances, self.attitudes)
+
+    @property
+    def placed(self) -> Placed:
+        """The readings as placed, of a sensor that feels a constant reference of known size."""
+        std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
+        nothing = np.zeros_like(self.means)
+        return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
+
+    def solve(self, method: Method) -> TriaxialSolution:
+        """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
+        return solved_in(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
+
+    def _solve(self, method: Method, attitudes: Array) -> TriaxialSolution:
+        return solve_triaxial(
+            self.means,
+            attitudes,
+            self.variances,
+            self.known,
+            second_order=self.second_order,
+            method=method,
+            attitude_std_rad=self.std_rad,
+        )
+
+    def beside(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
+        """The solutions by all other methods, or why there is none."""
+        return attempt_each({other: partial(self.solve, other) for other in others if other != method})
+
+
+def _scatter(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
+    """(N, 3) variances of the means from how they scatter about the model, each axis' noise alike in all rows.
+
+    And with how many degrees of freedom.
+
+    Equal weights: the model that weighs attitude errors would take them for noise here.
+    """
+    counts = rows.samples[:, None]
+    quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts
+    left = solve_triaxial(rows.means, rows.attitudes, quiet, known).residuals
+    freedom = len(rows.means) - 15 / 3
+    if freedom < 1:
+        raise Fault(
+            "too_few_observations",
+            f"{len(rows.means)} rows of few samples do not show their noise",
+            "Give longer rows, or more of them",
+        )
+    variances: Array = np.maximum(np.sum(left**2 * counts, axis=0) / freedom, 1e-30) / counts
+    return variances, np.full_like(variances, freedom)

@@ -1,0 +1,67 @@
+"""Whether a gyroscope's bias, as increments between attitudes tell it, is what it reads at rest.
+
+A gyroscope at rest reads its bias, and what the body turns unseen. The reference tells how fast it turned in each rest,
+and the scatter of that from rest to rest how well. How large its errors are while the body moves says little of them
+at rest: they may be those of its time stamps.
+"""
+
+import numpy as np
+
+from rig.data.quantity import RATE
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S
+from rig.estimation.external.known_increments import KnownIncrements
+from rig.estimation.reference.reference_model import BIAS
+from rig.estimation.statistics.coverage import rate_of_each
+from rig.observation.external.fixes import Turning
+from rig.observation.external.means_at_rest import means_at_rest
+
+FALSE_ALARM = 1e-3  # of recordings whose bias is that at rest, for one of three axes
+G_SENSITIVITY_RAD_S = 1e-3  # of one g, of a MEMS gyroscope: it lies in one attitude, and moves through many
+TAIL = 0.1  # of the rests, at either end, that may be none
+
+
+def check_rests_agree(turning: Turning, solution: KnownIncrements) -> None:
+    """Raises Fault `bias_contradicts_rests` where the bias is not what the gyroscope reads at rest.
+
+    A rest is one by its readings and by the attitudes of the rows in it. Rests may differ by as much as they do, by
+    what the reference does not see the body turn, and by what gravity does to a gyroscope.
+    """
+    at_rest = means_at_rest(turning, solution.clock_s)
+    if at_rest is None:
+        return
+    readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T
+    bias = np.median(readings, axis=0) - turned.mean(axis=0)
+    wander = np.ptp(np.quantile(readings, (TAIL, 1 - TAIL), axis=0), axis=0) / 2
+    known = G_SENSITIVITY_RAD_S**2 + EARTH_RATE_RAD_S**2
+    std = np.sqrt(np.diag(solution.covariance)[BIAS] + wander**2 + _unseen_rad_s(turned) ** 2 + known)
+    off = np.abs(solution.bias - bias) / std
+    worst = int(np.argmax(off))
+    if off[worst] <= _times_of(np.inf):
+        return
+    raise Fault(
+        "bias_contradicts_rests",
+        f"at rest the gyroscope reads {bias[worst]:+.2g} rad/s on {RATE.axes[worst]}, and the increments between "
+        f"attitudes tell a bias of {solution.bias[worst]:+.2g} ± {2 * std[worst]:.1g} rad/s: one of them is wrong",
+        "See that both files use one clock and that no readings are missing; turn more slowly, or add rows at rest",
+    )
+
+
+def _times_of(freedom: float) -> float:
+    """How many standard deviations the worst of three axes is off in `FALSE_ALARM` of sound recordings: Student's t."""
+    from scipy.special import ndtri, stdtrit
+
+    tail = rate_of_each(FALSE_ALARM, 2 * len(RATE.axes))
+    return -float(ndtri(tail) if np.isinf(freedom) else stdtrit(freedom, tail))
+
+
+def _unseen_rad_s(turned_rad_s: Array) -> float:
+    """Standard deviation of how fast the body turned unseen in the mean of all rests, about any axis.
+
+    By the scatter of what the reference says of each (k, 3), as much larger as Student's t asks for.
+    """
+    count = len(turned_rad_s)
+    scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))
+    wider = _times_of(float(3 * (count - 1))) / _times_of(np.inf)
+    return wider * scatter / float(np.sqrt(count))

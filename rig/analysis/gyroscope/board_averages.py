@@ -1,0 +1,28 @@
+"""The check of the board's own average of each sweep against the computer's mean of the same turn. Pure.
+
+A mean of readings beside a mean rate that does not belong to it shows here, and nowhere in the residuals.
+"""
+
+from collections.abc import Sequence
+
+from rig.analysis.check import Check, fitness
+from rig.observation.consistency.board_means import compare_board_means
+from rig.observation.observed_run import ObservedRun
+
+NAME = "board_average"
+LIMIT = 6.0  # standard deviations of the mean; both have its noise in common, and differ by a tenth of it as a rule
+
+
+def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
+    """Return the checks of every sweep whose averages contradict each other, or one of all of them.
+
+    None where the board averaged nothing. The value is the largest difference of the three axes over the standard
+    deviation of the computer's mean.
+    """
+    deviations = compare_board_means(sensor, recordings)
+    if not deviations:
+        return ()
+    beyond = [sweep for sweep, value in deviations.items() if not value <= LIMIT]
+    return tuple(fitness(sensor, "rate", NAME, deviations[sweep], LIMIT, sweep=sweep) for sweep in sorted(beyond)) or (
+        fitness(sensor, "rate", NAME, max(deviations.values()), LIMIT),
+    )

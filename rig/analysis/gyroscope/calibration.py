@@ -1,0 +1,275 @@
+"""From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from rig.analysis.estimators import DEFAULT_ESTIMATOR, Estimator, known_estimator
+from rig.analysis.gyroscope.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
+from rig.analysis.gyroscope.vector_inputs import known_of, see, unknown_of
+from rig.analysis.surroundings import Surroundings
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.errors import Fault, Refused
+from rig.errors.attempts import attempt
+from rig.estimation.arrays import Array
+from rig.estimation.by_hand import HandSolution
+from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEstimator, Solution
+from rig.estimation.gyroscope.budget import Budget, Unknown, budget
+from rig.estimation.gyroscope.earth_rate import EarthRate, find_earth_rate
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
+from rig.estimation.gyroscope.six_observation_budget import six_observation_budget
+from rig.estimation.gyroscope.vector_fit import Explained, Seen, explain
+from rig.estimation.gyroscope.vector_model import VectorSolution, solve_vector_model
+from rig.estimation.refusals import check_duplicates
+from rig.observation.average import Average
+from rig.observation.finished import finished_sweeps
+from rig.observation.observe import Observation
+from rig.observation.observed_run import AS_STATED, ObservedRun, observe_runs
+from rig.observation.timebase import TimeBase
+
+VECTOR, NEWTON, ALGORITHM_1, EARTH_RATE = "vector", "newton", "algorithm_1", "earth_rate"
+
+
+@dataclass(frozen=True, slots=True)
+class SensorResult:
+    """One sensor's calibration and what it rests on.
+
+    `explained` is the vector model with gravity and a wandering bias, None where it has no solution. The
+    `uncertainty` is that of the chosen solution, where it is the vector model's or `newton`'s; there is none of
+    another estimator.
+
+    `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
+    `six_observation` (exact) and `algorithm_1`, the paper's own. There is one time base for each recording that took
+    part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is the Earth's rate as the sensor
+    estimates it, None where it was not to. `by_hand` is there where a hand turned it. `faults` say why there is none of
+    these, by the estimator's name (VECTOR, NEWTON, ALGORITHM_1) and EARTH_RATE.
+    """
+
+    sensor: RecordedSensor | Item
+    solution: Estimate
+    vector_model: VectorSolution | TurnedSolution | None
+    explained: Explained | None
+    uncertainty: Budget | None
+    six_observation: Solution | None
+    algorithm_1: Solution | None
+    observations: tuple[Observation, ...]
+    rests: tuple[Average, ...]
+    time_bases: tuple[TimeBase, ...]
+    corrected_by: Correction
+    earth: EarthRate | None = None
+    by_hand: HandSolution | None = None
+    faults: Mapping[str, Fault] = field(default_factory=dict)
+
+    @property
+    def serial_number(self) -> str:
+        """Serial number of the sensor that was calibrated."""
+        return self.sensor.serial_number
+
+    @property
+    def scale(self) -> Array:
+        """(3,) scale factors by the chosen estimator: rate = scale × (reading + bias)."""
+        return self.solution.scale
+
+    @property
+    def bias_rad_s(self) -> Array:
+        """(3,) biases by the chosen estimator."""
+        return self.solution.bias_rad_s
+
+    @property
+    def correction(self) -> CorrectionKind:
+        """Whether the axes are corrected each for itself or by the whole matrix."""
+        return self.corrected_by.kind
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) M of g = M (m + b)."""
+        return self.corrected_by.matrix
+
+    @property
+    def temperature_c(self) -> float | None:
+        """Mean over the samples of all sweeps; None where no thermometer told it."""
+        averages = [observation.average for observation in self.observations]
+        if not averages or np.isnan([average.temperature_c for average in averages]).any():
+            return None
+        return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
+
+
+def observe_recordings(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
+    """All recordings of one calibration; those without a finished sweep add nothing.
+
+    The thresholds are those of the first recording; `turned` is as of `observe_runs`. Raises Refused
+    `different_sensors`; Fault `duplicated_observation` and as `observe_run` does.
+    """
+    if any(run.sensors != runs[0].sensors for run in runs):
+        raise Refused(
+            "different_sensors",
+            "the recordings do not describe the same sensors with the same settings",
+            "Solve them one by one",
+        )
+    _check_recordings(runs)
+    return observe_runs(runs, turned)
+
+
+def solve_observed(
+    sensors: Mapping[str, RecordedSensor],
+    recordings: Sequence[ObservedRun],
+    surroundings: Surroundings,
+    estimator: str = DEFAULT_ESTIMATOR,
+    matrix_corrected: Collection[str] = (),
+) -> dict[str, SensorResult]:
+    """Calibrate each of `sensors` from all recordings, which were made in these `surroundings`.
+
+    The whole matrix corrects the readings of those in `matrix_corrected`, if the estimator is the vector model: the
+    others take the axes to stand at right angles. Whatever the estimator, the sweeps must bear the six-observation
+    solution: a plan that lacks a direction is refused.
+    Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
+    """
+    chosen = known_estimator(estimator)
+    return {
+        name: _solve_sensor(name, sensor, recordings, surroundings, chosen, whole_matrix=name in matrix_corrected)
+        for name, sensor in sensors.items()
+    }
+
+
+def _solve_sensor(
+    name: str,
+    sensor: RecordedSensor,
+    recordings: Sequence[ObservedRun],
+    surroundings: Surroundings,
+    estimator: Estimator,
+    *,
+    whole_matrix: bool,
+) -> SensorResult:
+    parts = [recording.sensors[name] for recording in recordings]
+    observations = tuple(observation for part in parts for observation in part.revolutions)
+    rests = tuple(rest for part in parts for rest in part.rests)
+    mounting = np.array(sensor.mounting)
+    check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
+    six_observation = solve_six_observation(observations, "newton")
+    faults = dict[str, Fault]()
+    earth_rate: EarthRate | None = None
+    seen = see(recordings, name, surroundings)
+    if surroundings.finds_earth_rate:
+        known = known_of(surroundings, name)
+        earth_rate = attempt(faults, EARTH_RATE, lambda: find_earth_rate(seen, mounting, known))
+    explained = attempt(faults, VECTOR, lambda: explain(_with(earth_rate, seen), mounting))
+    vector_model = None if explained is None else explained.solution
+    algorithm_1 = attempt(faults, ALGORITHM_1, lambda: solve_six_observation(observations, "algorithm_1"))
+    solutions: dict[str, Estimate | None] = {VECTOR: vector_model, NEWTON: six_observation, ALGORITHM_1: algorithm_1}
+    solution = solutions[estimator] if estimator in solutions else solve_observations(observations, estimator)
+    if solution is None:
+        raise faults[estimator]
+    return SensorResult(
+        sensor=sensor,
+        solution=solution,
+        vector_model=vector_model,
+        explained=explained,
+        uncertainty=None
+        if explained is None
+        else _budget_of(
+            solution,
+            explained,
+            surroundings,
+            unknown_of(surroundings, name, earth_rate, sensor.stamp_std_s),
+            name,
+        ),
+        six_observation=six_observation,
+        algorithm_1=algorithm_1,
+        observations=observations,
+        rests=rests,
+        time_bases=tuple(part.time_base for part in parts),
+        corrected_by=_correction(solution, whole_matrix=whole_matrix),
+        earth=earth_rate,
+        faults=faults,
+    )
+
+
+def _budget_of(
+    solution: Estimate, explained: Explained, surroundings: Surroundings, unknown: Unknown, name: str
+) -> Budget | None:
+    """Return the budget of the chosen solution of the sensor `name`; there is one of two estimators."""
+    if isinstance(solution, VectorSolution):
+        return budget(explained, unknown)
+    if isinstance(solution, Solution) and solution.estimator == "newton":
+        axes_rad = float(np.radians(surroundings.uncertainty.of("non_orthogonality_deg", name)))
+        return six_observation_budget(explained, solution, unknown, axes_rad)
+    return None
+
+
+def _with(earth_rate: EarthRate | None, seen: Seen) -> Seen:
+    """Return what is explained with the Earth's rate that was estimated; else with what the site says, if anything."""
+    return seen if earth_rate is None else replace(seen, earth_rate_rad_s=earth_rate.rate_rad_s)
+
+
+def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
+    if whole_matrix and isinstance(solution, VectorSolution):
+        return matrix_correction(solution)
+    return diagonal_correction(solution.scale)
+
+
+def solve_observations(
+    observations: Sequence[Observation], estimator: Estimator, rests: Sequence[Average] = ()
+) -> Estimate:
+    """Scale and bias by any of the estimators; only the vector model makes use of rests."""
+    if estimator == "vector":
+        return solve_vector(observations, rests)
+    if estimator == "levenberg_marquardt":
+        return _solve_levenberg_marquardt(observations)
+    return solve_six_observation(observations, estimator)
+
+
+def solve_vector(
+    observations: Sequence[Observation], rests: Sequence[Average], nominal_mounting: Array | None = None
+) -> VectorSolution:
+    """The vector model of sweeps about known axes and of rests. Raises Fault as `solve_vector_model` does."""
+    averages = [*(observation.average for observation in observations), *rests]
+    rates = [observation.speed_rad_s * observation.axis_flange for observation in observations]
+    return solve_vector_model(
+        np.array([average.mean_rad_s for average in averages]),
+        np.array([*rates, *np.zeros((len(rests), 3))]),
+        np.array([average.variance_rad2_s2 for average in averages]),
+        speed_std_rad_s=[*(observation.speed_std_rad_s for observation in observations), *np.zeros(len(rests))],
+        nominal_mounting=nominal_mounting,
+    )
+
+
+def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
+    """Accumulate and solve: weighted by inverse variance, or all alike where the paper's algorithm is asked for."""
+    accumulated = Accumulator.empty()
+    for observation in observations:
+        average = observation.average
+        accumulated = accumulated.add(
+            average.mean_rad_s,
+            average.variance_rad2_s2,
+            observation.speed_rad_s,
+            observation.speed_std_rad_s,
+            weight=1.0 if estimator == "algorithm_1" else None,
+        )
+    return accumulated.solve(estimator)
+
+
+def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> LevenbergMarquardtSolution:
+    return solve_levenberg_marquardt(
+        np.array([observation.average.mean_rad_s for observation in observations]),
+        [observation.speed_rad_s for observation in observations],
+        np.array([observation.average.variance_rad2_s2 for observation in observations]),
+        speed_std_rad_s=[observation.speed_std_rad_s for observation in observations],
+    )
+
+
+def _check_recordings(runs: Sequence[RunData]) -> None:
+    """Raises Fault `duplicated_observation`: a recording given twice is no run that repeats its sweeps."""
+    for run, other in combinations(runs, 2):
+        again = finished_sweeps(run) & finished_sweeps(other)
+        if again and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
+            raise Fault(
+                "duplicated_observation",
+                f"two recordings hold the same samples of sweep {min(again)}",
+                "Give each recording once",
+            )

@@ -1,0 +1,140 @@
+"""All segments of a sensor's revolutions and rests in one table, with what arm and site made it sense in each. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.recording.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.vector_fit import Explained
+from rig.observation.consistency.raw_readings import REST, RawReadings
+from rig.observation.consistency.segments import FEWEST_AT_REST, MotionInterval, SegmentedAverage
+from rig.observation.consistency.transfers import Transfer
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """N segments of revolutions and rests, and the readings that they were averaged from.
+
+    sweep (N,): index of the revolution, −1 of a rest; transfers between sweeps and rests count down from −2.
+    position (N,): from −1 in the first segment of a window to 1 in the last.
+    means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
+    rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
+    gravity_m_s2 (N, 3): gravity as it is sensed, less the acceleration of the sensor, in that frame.
+    attitudes (N, 3, 3): from the base into that frame.
+    speed_std (N,): standard deviation of the mean speed, relative to it.
+    times_s (N, 2): start and end on the clock of the first recording; `intervals` are on that of their own.
+    roundings_rad_s (N, 3): standard uncertainty that rounding leaves in each mean.
+    unexplained_rad2_s2 (N, 3): part of the variances, of what neither arm nor noise explains.
+    """
+
+    sweep: NDArray[np.intp]
+    position: Array
+    means_rad_s: Array
+    variances_rad2_s2: Array
+    rates_rad_s: Array
+    gravity_m_s2: Array
+    attitudes: Array
+    speed_std: Array
+    times_s: Array
+    intervals: tuple[MotionInterval, ...]
+    readings: tuple[RawReadings, ...]
+    roundings_rad_s: Array | float = 0.0
+    unexplained_rad2_s2: Array | float = 0.0
+
+
+def stack_segments(windows: Sequence[SegmentedAverage], explained: Explained, site: Site) -> Segments:
+    """Return the segments of a gyroscope's windows, in the order in which `explained` was made from them.
+
+    The Earth's rate is that of `explained`: known by the site, or estimated.
+    """
+    seen = explained.seen
+    placed = list(zip(windows, seen.windows_s[:, 0], seen.acceleration_m_s2, strict=True))
+    segments = [segment for window in windows for segment in window.segments]
+    rates = [segment.rate_rad_s + segment.attitude @ seen.earth_rate_rad_s for segment in segments]
+    return Segments(
+        sweep=np.array([window.readings.sweep for window in windows for _ in window.segments]),
+        position=np.array([segment.position for segment in segments]),
+        means_rad_s=np.array([segment.mean.mean for segment in segments]),
+        variances_rad2_s2=np.array([segment.mean.variance for segment in segments]),
+        rates_rad_s=np.array(rates),
+        gravity_m_s2=np.array(
+            [segment.attitude @ site.down_m_s2 - sensed for window, _, sensed in placed for segment in window.segments]
+        ),
+        attitudes=np.array([segment.attitude for segment in segments]),
+        speed_std=np.array([window.speed_std for window in windows for _ in window.segments]),
+        times_s=np.array(
+            [
+                np.array([segment.interval.start_s, segment.interval.end_s]) - window.average.start_s + began_s
+                for window, began_s, _ in placed
+                for segment in window.segments
+            ]
+        ),
+        intervals=tuple(segment.interval for segment in segments),
+        readings=tuple(window.readings for window in windows),
+        roundings_rad_s=np.sqrt(np.array([segment.mean.rounding for segment in segments])),
+    )
+
+
+def with_transfers(
+    segments: Segments,
+    transfers: Sequence[Transfer],
+    windows: Sequence[SegmentedAverage],
+    explained: Explained,
+) -> Segments:
+    """Return the segments, and each transfer as one; their sweeps count down from below `REST`.
+
+    Their noise is that of the other segments, for as long as they last, or their own where that is more, and what a
+    vibration leaves of which the rests beside either end tell. `windows` are those of the segments.
+    """
+    if not transfers:
+        return segments
+    of_noise = segments.variances_rad2_s2 - np.square(segments.roundings_rad_s)
+    density = np.median(of_noise * np.diff(segments.times_s), axis=0)
+    intervals = tuple(transfer.interval for transfer in transfers)
+    own_times_s = np.array([[interval.start_s, interval.end_s] for interval in intervals])
+    times_s = own_times_s + np.array([[transfer.clock_offset_s] for transfer in transfers])
+    duration_s, count = np.diff(times_s), len(transfers)
+    noise = density / duration_s
+    unexplained = np.maximum([transfer.scatter_rad2_s2 for transfer in transfers] - noise, 0.0)
+    roundings = np.array([transfer.rounding_rad2_s2 for transfer in transfers])
+    vibration = _swings(windows, explained, times_s) / duration_s**2
+    earth_rad_s = explained.seen.earth_rate_rad_s
+    rates = [transfer.rate_rad_s + transfer.attitude @ earth_rad_s for transfer in transfers]
+    return replace(
+        segments,
+        sweep=np.concatenate([segments.sweep, REST - 1 - np.arange(count)]),
+        position=np.concatenate([segments.position, np.zeros(count)]),
+        means_rad_s=np.concatenate([segments.means_rad_s, [transfer.mean_rad_s for transfer in transfers]]),
+        variances_rad2_s2=np.concatenate([segments.variances_rad2_s2, noise + unexplained + vibration + roundings]),
+        unexplained_rad2_s2=np.concatenate([np.zeros(segments.means_rad_s.shape), unexplained]),
+        roundings_rad_s=np.concatenate(
+            [np.broadcast_to(segments.roundings_rad_s, segments.means_rad_s.shape), np.sqrt(roundings)]
+        ),
+        rates_rad_s=np.concatenate([segments.rates_rad_s, rates]),
+        gravity_m_s2=np.concatenate([segments.gravity_m_s2, [transfer.gravity_m_s2 for transfer in transfers]]),
+        attitudes=np.concatenate([segments.attitudes, [transfer.attitude for transfer in transfers]]),
+        speed_std=np.concatenate([segments.speed_std, np.zeros(count)]),
+        times_s=np.concatenate([segments.times_s, times_s]),
+        intervals=(*segments.intervals, *intervals),
+    )
+
+
+def _swings(windows: Sequence[SegmentedAverage], explained: Explained, times_s: Array) -> Array:
+    """Return (M, 3) rad² by which what vibrates differs from start to end of M transfers, by the rest nearest to each.
+
+    times_s (M, 2): start and end of the transfers on the clock of the first recording.
+    """
+    rests = [
+        (time_s, window.readings.swing_rad2)
+        for window, time_s in zip(windows, explained.seen.windows_s.mean(axis=1), strict=True)
+        if window.readings.sweep == REST and window.average.samples >= FEWEST_AT_REST  # fewer show no vibration
+    ]
+    if not rests:
+        return np.zeros((len(times_s), 3))
+    rests_s, swings_rad2 = (np.array(column) for column in zip(*rests, strict=True))
+    nearest = np.abs(times_s[:, :, None] - rests_s).argmin(axis=2)
+    nearby: Array = swings_rad2[nearest].mean(axis=1)
+    return nearby

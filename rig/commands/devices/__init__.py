@@ -1,0 +1,1 @@
+"""Commands about one device: board, KVH 1775, autopilot, a device that prints lines."""

@@ -1,0 +1,196 @@
+"""`rig autopilot …`: write a calibration into an autopilot's parameters, and bring the old ones back."""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.config_arguments import add_config
+from rig.errors import Refused
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.config.sensors.sensor_sections import SensorSection
+    from rig.data.result_file import ResultDocument
+    from rig.sensors.mavlink.journal import Change
+    from rig.sensors.mavlink.link import Link
+
+BEYOND = {
+    "gyroscope": "scale factors and axes of gyroscopes: no parameter holds them",
+    "accelerometer": "axes and second order of accelerometers: no parameter holds them",
+}
+
+
+def add(autopilot: ArgumentParser) -> None:
+    """The commands of `rig autopilot`."""
+    commands = autopilot.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    text = "write the calibration of a run that passed into the autopilot's parameters; the old ones are kept in a file"
+    store = commands.add_parser("store", help=text, description=text)
+    add_config(store)
+    store.add_argument("result", type=Path, metavar="RESULT", help="a run folder or its result.json")
+    store.add_argument("--old", type=Path, metavar="FILE", help="file for the old values (default: beside the result)")
+    text = "bring the autopilot back to the parameters in a file that `store` kept"
+    restore = commands.add_parser("restore", help=text, description=text)
+    add_config(restore)
+    restore.add_argument("file", type=Path, metavar="FILE", help="the file that `store` named")
+    restore.add_argument("--new", action="store_true", help="to the new values in it, not to the old ones")
+    for command, name in ((store, "store"), (restore, "restore")):
+        command.add_argument("--yes", action="store_true", help="do not ask before the autopilot is changed")
+        command.set_defaults(of_autopilot=name)
+
+
+def run(options: Namespace) -> int:
+    """Carry out the command of `rig autopilot` that is meant."""
+    return {"store": _store, "restore": _restore}[options.of_autopilot](options)
+
+
+def _store(options: Namespace) -> int:
+    from rig.data.result_file import passed_result
+    from rig.sensors.mavlink.journal import Change
+    from rig.sensors.mavlink.parameters import Parameter, field_of
+    from rig.sensors.mavlink.writing import place_of, unfinished
+    from rig.station.confirm import agreed_or_refused
+
+    result = passed_result(options.result)
+    with _connected(options) as (link, sections):
+        for problem in unfinished(link):
+            raise problem
+        wanted = _values(link.known.firmware, result, options.result, sections)
+        old = link.parameters(wanted)
+        if missing := wanted.keys() - old.keys():
+            raise Refused(
+                "autopilot_parameter_missing",
+                f"the autopilot at {link.port} has no parameter {', '.join(sorted(missing))}",
+                "See that it has that IMU, and that its firmware is no older than ArduPilot 4.0 or PX4 1.12",
+            )
+        new = {
+            name: Parameter(name, old[name].type, field_of(value), link.known.firmware)
+            for name, value in wanted.items()
+        }
+        planned = Change(place_of(link), link.known.firmware, old, new, _kept(options))
+        agreed_or_refused([f"In the {link.known.words}:", *_announced(planned, "new")], "store", options.yes)
+        planned.keep()
+        say(f"the old parameters are kept in {planned.kept}")
+        _changed(link, planned, "new")
+        for line in BEYOND.values():
+            say(f"not stored: {line}")
+    return 0
+
+
+def _restore(options: Namespace) -> int:
+    from rig.sensors.mavlink.journal import change_in
+    from rig.sensors.mavlink.writing import place_of
+    from rig.station.confirm import agreed_or_refused
+
+    planned = change_in(options.file)
+    with _connected(options) as (link, _):
+        if (planned.place, planned.firmware) != (place_of(link), link.known.firmware):
+            raise Refused(
+                "autopilot_other_uid",
+                f"{options.file} is of the autopilot {planned.place}, the one at {link.port} is {place_of(link)}",
+                "Connect that autopilot, or give the file of this one",
+            )
+        which = "new" if options.new else "old"
+        agreed_or_refused([f"In the {link.known.words}:", *_announced(planned, which)], "restore", options.yes)
+        _changed(link, planned, which)
+    return 0
+
+
+def _changed(link: "Link", planned: "Change", which: str) -> None:
+    from rig.errors import Fault, raised_as
+    from rig.sensors.mavlink.writing import change
+
+    to = planned.new if which == "new" else planned.old
+    with raised_as(Fault):
+        change(link, planned, to)
+    say(f"written and read back, bit by bit: {len(to)} parameters, the {which} ones")
+
+
+def _announced(planned: "Change", which: str) -> Iterator[str]:
+    to, others = (planned.new, planned.old) if which == "new" else (planned.old, planned.new)
+    for name, each in to.items():
+        yield f"  {name}: {each.value:.9g}, instead of {others[name].value:.9g}"
+
+
+def _values(
+    firmware: int, result: "ResultDocument", path: Path, sections: Mapping[str, "SensorSection"]
+) -> dict[str, float]:
+    """The parameters that hold what the run found of these sensors.
+
+    Raises Refused `not_in_result`, and as `refuse_other_sensor`.
+    """
+    from math import degrees
+
+    from rig.board.identify import refuse_other_sensor
+    from rig.data.quantity import RATE
+    from rig.report.exports.autopilots import ARDUPILOT as ARDUPILOTS
+    from rig.report.exports.autopilots import IMU, PX4
+    from rig.report.exports.calibrations import calibrations
+    from rig.sensors.mavlink.dialect import ARDUPILOT
+    from rig.sensors.mavlink.source import line_of
+
+    called = ARDUPILOTS if firmware == ARDUPILOT else PX4
+    values: dict[str, float] = {}
+    for found in calibrations(result).sensors:
+        section = sections.get(found.sensor)
+        if section is None or found.quantity not in IMU:
+            continue
+        of = found.part, found.serial_number
+        range_deg_s = degrees(found.full_scale or 0.0) if found.quantity == RATE else section.range_deg_s
+        refuse_other_sensor(f"{path}: the calibration of {found.sensor}", *of, range_deg_s, section)
+        values |= dict(called[found.quantity](line_of(section).instance, found))
+        if found.quantity == RATE and firmware == ARDUPILOT:
+            values["INS_GYR_CAL"] = 0.0  # or it finds offsets of its own at each boot
+    if not values:
+        raise Refused(
+            "not_in_result", f"{path} has no calibration for {', '.join(sections)}", "Give a run that calibrated them"
+        )
+    # Of ArduPilot's correction by temperature, which is off where a calibration was made.
+    return {name: value for name, value in values.items() if not name.endswith("_CALTEMP")}
+
+
+def _kept(options: Namespace) -> Path:
+    if options.old is not None:
+        return Path(options.old).resolve()
+    result = Path(options.result)
+    folder = result if result.is_dir() else result.parent
+    return (folder / f"autopilot-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.json").resolve()
+
+
+@contextmanager
+def _connected(options: Namespace) -> Iterator[tuple["Link", Mapping[str, "SensorSection"]]]:
+    """The only autopilot of a configuration, in its simulated laboratory if it has one, and the IMUs it is read by."""
+    from rig.commands.laboratory.claims import claimed_sensor
+    from rig.commands.laboratory.laboratory import simulated_laboratory
+    from rig.commands.laboratory.own_address import loaded_here
+    from rig.errors import raised_as
+    from rig.sensors.mavlink.link import Link
+    from rig.sensors.mavlink.source import line_of
+    from rig.sensors.registry import by_port
+
+    with ExitStack() as stack:
+        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
+        sensors = {name: each for name, each in loaded.config.sensors.items() if each.mavlink is not None}
+        found = [(port, sections) for port, _, sections in by_port(sensors)]
+        if len(found) != 1:
+            raise Refused(
+                "no_autopilot_section",
+                f"{options.config} has sensors of {len(found)} autopilots",
+                "Give a configuration with the sensors of one",
+            )
+        if loaded.simulated:
+            stack.enter_context(simulated_laboratory(loaded.text))
+            memory = "unless world.sensors.NAME.autopilot.parameter_file names a file that keeps it"
+            say(
+                f"simulated laboratory: its autopilot's memory lasts as long as this command, {memory}", file=sys.stderr
+            )
+        ((port, sections),) = found
+        name, section = next(iter(sections.items()))
+        stack.enter_context(claimed_sensor(name, port))
+        stack.enter_context(raised_as(Refused))
+        link = stack.enter_context(closing(Link(name, port, line_of(section).baud)))
+        link.identify()
+        yield link, sections

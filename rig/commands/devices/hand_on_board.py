@@ -1,0 +1,180 @@
+"""`rig board hand`: the board calibrates a gyroscope that is turned by hand; says what to do, and checks the answer.
+
+With `--fetch` the board has done so alone, begun by its button: its answer is taken as it is.
+"""
+
+import json
+import math
+import sys
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from firmware_host.client import Board, Calibration
+from rig.board.identify import (
+    changing,
+    configured_board,
+    configured_part,
+    find_sensor,
+    refuse_other_firmware,
+    refuse_other_sensor,
+    refusing,
+)
+from rig.board.store import store
+from rig.commands.laboratory.claims import claimed_board
+from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.commands.laboratory.own_address import loaded_here
+from rig.commands.laboratory.simulated_operator import SimulatedOperator
+from rig.config.models import RigConfig
+from rig.config.sensors.sensor_sections import SensorSection
+from rig.data.recording.hand_events import OfTheHand
+from rig.errors import Refused
+from rig.estimation.by_hand.solution import REAL_HANDS
+from rig.station.by_hand_words import by_hand_line
+from rig.station.confirm import agreed_or_refused, refuse_unless_answerable
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.runner.by_hand.on_board import CalibratedByBoard
+
+MOVES = range(8, 201)
+UNCHECKED = "the board's own answer alone: no readings are left by which double precision could check it"
+
+
+def hand(options: Namespace) -> int:
+    """Let the board calibrate, or fetch what it keeps; print it, and how far double precision differs.
+
+    Raises Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and as
+    `calibrated_by_board` and `kept_by_board`; Fault as the first of them.
+    """
+    if options.moves not in MOVES or not 0 < options.scale_std < 1:
+        raise Refused(
+            "bad_option",
+            f"--moves {options.moves} --scale-std {options.scale_std:g}",
+            f"Give {MOVES.start} to {MOVES.stop - 1} moves, and a standard uncertainty between 0 and 1",
+        )
+    if options.write:
+        refuse_unless_answerable(options.yes)
+    with ExitStack() as stack:
+        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
+        config = loaded.config
+        among = _sensors(config, options.sensor)
+        operator = None
+        if loaded.simulated:
+            operator = SimulatedOperator(stack.enter_context(simulated_laboratory(loaded.text)))
+        stack.enter_context(claimed_board(configured_board(config).port))
+        of_board = _fetched(config, among) if options.fetch else _made(config, next(iter(among)), options, operator)
+        board, name, found = stack.enter_context(of_board)
+        calibration = Calibration(
+            model="matrix_times_m_plus_b",
+            serial_number=config.sensors[name].serial_number,
+            written_utc=datetime.now(UTC),
+            temperature_c=found.solved.temperature_c,
+            matrix=found.solved.matrix,
+            bias_rad_s=found.solved.bias_rad_s,
+        )
+        crystal = 1e-6 * config.uncertainty.crystal_ppm / math.sqrt(3)
+        scale_u = 2 * math.hypot(found.solved.scale_std, REAL_HANDS, crystal)
+        if options.json:
+            print(json.dumps(_document(name, found, calibration, scale_u), indent=2))
+        else:
+            for line in _lines(name, found, calibration, scale_u):
+                say(line)
+        if options.write:
+            unchecked = [f"  {UNCHECKED}"] if found.agreement is None else []
+            agreed_or_refused([f"On the board {board.identity.unique_id}: {name}", *unchecked], "store", options.yes)
+            with changing():
+                if options.fetch:  # a record is of a sensor that is set up
+                    board.configure(found.index, config.sensors[name].rate_hz, config.sensors[name].range_deg_s)
+                record = store(board, found.index, calibration)
+            say(f"stored: {name}, record {record.sequence}", file=sys.stderr)
+    return 0
+
+
+def _sensors(config: RigConfig, wanted: str | None) -> dict[str, SensorSection]:
+    """The sensors that may be meant, the wanted one alone where one is. Raises Refused `no_such_sensor`."""
+    among = {name: section for name, section in config.to_calibrate.items() if section.on_board}
+    if not among or (wanted is not None and wanted not in among):
+        raise Refused(
+            "no_such_sensor",
+            f"--sensor {wanted}: the configuration has no such gyroscope on its board to calibrate",
+            f"Choose one of: {', '.join(among) or 'none'}",
+        )
+    return among if wanted is None else {wanted: among[wanted]}
+
+
+@contextmanager
+def _made(
+    config: RigConfig, name: str, options: Namespace, operator: SimulatedOperator | None
+) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
+    """A session that the board makes now, and the operator with it."""
+    from rig.runner.by_hand.on_board import calibrated_by_board
+
+    def tell(event: OfTheHand) -> None:
+        if (line := by_hand_line(event)) is not None:
+            say(line, file=sys.stderr)
+        if operator is not None:
+            operator.event(event)
+
+    with calibrated_by_board(config, name, options.moves, options.scale_std, tell) as (board, found):
+        yield board, name, found
+
+
+@contextmanager
+def _fetched(config: RigConfig, among: dict[str, SensorSection]) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
+    """What the board keeps of its last session, of one of the sensors that may be meant."""
+    from rig.runner.by_hand.on_board import kept_by_board
+
+    section = configured_board(config)
+    with ExitStack() as held:
+        with refusing():
+            board = held.enter_context(Board(section.port, section.baud, lambda batch: None))
+            refuse_other_firmware(board.identity)
+            found = kept_by_board(board)
+        part = configured_part(board.identity.sensors[found.index].part)
+        name = next((name for name, sensor in among.items() if sensor.part == part), None)
+        if name is None:
+            raise Refused(
+                "another_sensor",
+                f"the board has calibrated its {part} by hand, and that is none of: {', '.join(among)}",
+                "Correct --sensor or the configuration, or calibrate this sensor",
+            )
+        sensor = among[name]
+        find_sensor(board.identity, name, sensor)
+        refuse_other_sensor("the board's answer by hand", part, sensor.serial_number, found.solved.range_deg_s, sensor)
+        yield board, name, found
+
+
+def _document(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> dict[str, Any]:
+    agreement = by_board.agreement
+    return {
+        "sensor": name,
+        "serial_number": calibration.serial_number,
+        "moves": by_board.solved.taken,
+        "scale": list(calibration.scale),
+        "scale_std_of_session": by_board.solved.scale_std,
+        "expanded_scale": scale_u,
+        "matrix": [list(row) for row in calibration.matrix],
+        "bias_rad_s": list(calibration.bias_rad_s),
+        "temperature_c": calibration.temperature_c,
+        "matrix_difference": None if agreement is None else agreement.matrix_difference,
+        "bias_difference_rad_s": None if agreement is None else agreement.bias_difference_rad_s,
+    }
+
+
+def _lines(name: str, by_board: "CalibratedByBoard", calibration: Calibration, scale_u: float) -> Iterator[str]:
+    scale = " ".join(f"{value:.5f}" for value in calibration.scale)
+    bias = " ".join(f"{value:+.6f}" for value in calibration.bias_rad_s)
+    agreement, std = by_board.agreement, by_board.solved.scale_std
+    yield f"{name}: the board has calibrated it from {by_board.solved.taken} moves"
+    yield f"  scale  {scale}, U (k = 2) {scale_u:.1e}, of which {2 * std:.1e} by this session"
+    yield f"  bias   {bias} rad/s"
+    if agreement is None:
+        yield f"  {UNCHECKED}"
+    else:
+        yield (
+            f"  double precision differs by {agreement.matrix_difference:.1e} of scale, "
+            f"{agreement.bias_difference_rad_s:.1e} rad/s"
+        )

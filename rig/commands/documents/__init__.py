@@ -1,0 +1,1 @@
+"""Commands about what a finished run leaves: show, report, export, verify, explain."""

@@ -1,0 +1,174 @@
+"""`rig report`: the documents of a finished run once more, in other forms or with the customer's name in them."""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.config_arguments import add_set
+from rig.commands.history.named_history import add_history, named_history
+from rig.config.files.written_file import placed_together, write_new
+from rig.errors import Refused
+from rig.station.plain_text import say, say_on_terminal
+
+if TYPE_CHECKING:
+    from rig.report.certificate.content import Certificate
+    from rig.report.signatures.reason import Reason
+    from rig.report.signatures.signatory import Signatory
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig report`."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
+    parser.add_argument(
+        "--pdf",
+        action="store_true",
+        help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
+    )
+    parser.add_argument(
+        "--reversal",
+        type=Path,
+        metavar="FILE",
+        help="the file that `rig reversal` wrote by --out, of its magnetometers",
+    )
+    parser.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
+    parser.add_argument(
+        "--sign",
+        metavar="KEY",
+        help="sign the PDF (made if no form is asked for) and the digital certificate (extra `sign`): a PKCS#12 or PEM "
+        "file, or pkcs11:token=…;object=…?module-path=…; its passphrase or PIN in RIG_SIGNING_PASSPHRASE",
+    )
+    parser.add_argument(
+        "--time-server", metavar="URL", help="a time stamp (RFC 3161) of this server in the PDF's signature"
+    )
+    parser.add_argument(
+        "--long-term",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="put revocation lists under the PDF's signature (PAdES B-LT): of the authority of the key, and of that of "
+        "the time server, the list (CRL) and the certificate, as PEM; may be repeated",
+    )
+    add_history(parser)
+    add_set(parser, "say something else on the certificate, for example certificate.customer=Example")
+
+
+def run(options: Namespace) -> int:
+    """Write the certificate as `documents` does; returns 0, or 2 where a form that was asked for could not be made."""
+    _, left_out = documents(options)
+    for error in left_out:
+        say(f"rig: left out: {error}", sys.stderr)
+    return Refused.exit_status if left_out else 0
+
+
+def documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
+    """Certificate of a run folder or its result.json: HTML, and with `--dcc` and `--pdf` in these forms, into `--out`.
+
+    `--sign` is whose key signs these two, `--time-server` who says when. `--reversal` is what `rig reversal` wrote of
+    its magnetometers; `--history` where the certificate is noted, the user's own history by default, and never one that
+    the folder names. Returns the files, and why forms that were asked for could not be made. Raises Refused
+    `report_folder`, `bad_option`, and as `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`
+    and `signatory`.
+    """
+    if options.sign is None and options.time_server is not None:
+        raise Refused("bad_option", "--time-server is for what is signed", "Give --sign KEY too, or leave it out")
+    if options.long_term and options.time_server is None:
+        what = "--long-term says what was revoked at a time, and no time server says which"
+        raise Refused("bad_option", what, "Give --sign KEY and --time-server URL too, or leave it out")
+    if options.sign is None:
+        return _documents(options, None)
+    from rig.report.signatures.signatory import signatory
+
+    with signatory(options.sign) as by:
+        return _documents(options, by)
+
+
+def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], list[Refused]]:
+    from rig.commands.history.remember import journal_end, remember_certificate
+    from rig.data.entries.magnetometer import read_reversal
+    from rig.data.result_file import read_result
+    from rig.data.run_folder import RESULT, refuse_links
+    from rig.history.entered.issued import issued_certificate
+    from rig.report.certificate.content import certificate_of
+    from rig.report.certificate.page import certificate_page
+    from rig.report.certificate.pdf import PDF
+    from rig.report.certificate.statements import stated_in
+    from rig.report.certificate.writer import PAGE
+    from rig.report.signatures.reason import reason_of
+
+    pdf = options.pdf or (by is not None and not options.dcc)  # the page itself cannot carry a signature
+    file: Path = options.run / RESULT if options.run.is_dir() else options.run
+    result = read_result(file)
+    turned = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
+    certificate = certificate_of(result, stated_in(file.parent, options.overrides), turned)
+    end = None if by is None else journal_end(file.parent, named_history(options.history))
+    reason = reason_of(certificate, end)
+    written: dict[str, bytes] = {PAGE: certificate_page(certificate).encode()}
+    left_out: list[Refused] = []
+    digital = _digital(certificate, by, reason, left_out if options.dcc else None) if options.dcc or pdf else {}
+    if options.dcc:
+        written |= digital
+    folder: Path = options.out or file.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        refuse_links(*(folder / name for name in (*written, *([PDF] if pdf else []))))
+        with placed_together():
+            for name, content in written.items():
+                write_new(folder / name, content)
+            if pdf:
+                say_on_terminal("drawing the PDF")
+                try:
+                    attached = {RESULT: file.read_bytes(), **digital}
+                    written[PDF] = _pdf(written[PAGE].decode(), attached, by, reason, options)
+                    write_new(folder / PDF, written[PDF])
+                except Refused as error:
+                    left_out.append(error)
+    except OSError as error:
+        raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    for name in written:
+        say(str(folder / name))
+    issued = issued_certificate(certificate, written)
+    missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
+    if missed is not None:
+        say(f"rig: the certificate is in no history: {missed}", sys.stderr)
+    return [folder / name for name in written], left_out
+
+
+def _digital(
+    certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
+) -> dict[str, bytes]:
+    """The digital certificate by its name, signed where somebody signs; what it lacks is `left_out`, or only told."""
+    from rig.report.certificate.dcc import DCC, digital_certificate
+
+    try:
+        made = digital_certificate(certificate)
+    except Refused as error:
+        if left_out is None:
+            say(f"rig: no digital certificate is attached: {error.what}", sys.stderr)
+        else:
+            left_out.append(error)
+        return {}
+    if by is None:
+        return {DCC: made}
+    from rig.report.signatures.signing import signed_xml
+
+    return {DCC: signed_xml(made, by, reason)}
+
+
+def _pdf(
+    page: str, attached: Mapping[str, bytes], by: "Signatory | None", reason: "Reason", options: Namespace
+) -> bytes:
+    """The page as PDF, signed where somebody signs. Raises Refused as `pdf_of`, `authorities_in` and `signed_pdf`."""
+    from rig.report.certificate.pdf import pdf_of
+
+    made = pdf_of(page, attached)
+    if by is None:
+        return made
+    from rig.report.signatures.long_term import authorities_in
+    from rig.report.signatures.signing import signed_pdf
+
+    authorities = authorities_in(options.long_term) if options.long_term else None
+    return signed_pdf(made, by, reason, options.time_server, authorities)

@@ -1,0 +1,1 @@
+"""The commands of `rig history`, and what other commands ask of a history or enter into it."""

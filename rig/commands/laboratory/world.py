@@ -1,0 +1,21 @@
+"""`rig world`: only the simulated laboratory, in the foreground, for any client."""
+
+import subprocess
+import sys
+from argparse import ArgumentParser, Namespace
+
+from rig.commands.config_arguments import add_config
+from rig.commands.laboratory.laboratory import written
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig world`."""
+    add_config(parser)
+
+
+def run(options: Namespace) -> int:
+    """Run only the world of a configuration, until Ctrl-C; returns its exit status. Raises Refused as `load`."""
+    from rig.config.load import load
+
+    with written(load(options.config, options.overrides, sections=None).text) as config_path:
+        return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])

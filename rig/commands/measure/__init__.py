@@ -1,0 +1,1 @@
+"""Commands about one run on a rig: plan, check, run, resume, record."""

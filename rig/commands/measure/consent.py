@@ -1,0 +1,61 @@
+"""A run folder may have come from anywhere: to the addresses it names one connects if they are the user's own."""
+
+import hashlib
+import os
+import shlex
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.config.load import Loaded
+from rig.data.own_texts import is_own
+from rig.data.run_folder import CONFIG, resuming
+from rig.errors import Refused
+from rig.history.storage.address import ENVIRONMENT
+
+CONFIG_MAX_BYTES = 10_000_000
+
+
+def refuse_foreign_addresses(folder: Path, loaded: Loaded, agreed: Sequence[str] = ()) -> None:
+    """Where the folder's configuration is none that this user has run here, every address has to be in `agreed`.
+
+    Raises Refused `foreign_folder`.
+    """
+    if is_own(_sha256(folder / CONFIG)):
+        return
+    addresses = [(what, where) for what, where in _addresses(loaded) if where not in agreed]
+    if not addresses:
+        return
+    named = " ".join(f"--connect {shlex.quote(where)}" for _, where in addresses)
+    raise Refused(
+        "foreign_folder",
+        f"the {CONFIG} in {folder} was never run by you on this computer; it would connect to "
+        + ", ".join(f"{what} {where}" for what, where in addresses),
+        f"If all of this is yours, state it: {resuming(folder)} {named}",
+    )
+
+
+def _sha256(file: Path) -> str:
+    try:
+        return hashlib.sha256(read_regular_file(file, CONFIG_MAX_BYTES)).hexdigest()
+    except (UnfitFile, OSError):
+        return ""
+
+
+def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
+    """What a run would connect to. A simulated laboratory is on this computer, and answers there itself; it may keep
+    its board's flash in a file.
+    """
+    config = loaded.config
+    if loaded.flash_file is not None:
+        yield "the file of a simulated board's flash", str(loaded.flash_file)
+    if not loaded.simulated:
+        if config.turner.address:
+            yield "the arm", config.turner.address
+        if config.board is not None:
+            yield "the board", config.board.port
+        for name, section in config.sensors.items():
+            if section.own_port is not None:
+                yield f"the sensor {name}", section.own_port[1]
+    if config.history.url is not None and not config.history.off and not os.environ.get(ENVIRONMENT):
+        yield "the history", config.history.url

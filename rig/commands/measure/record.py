@@ -1,0 +1,52 @@
+"""`rig record`: the readings of the sensors alone, while something else turns them. No arm is connected to."""
+
+import shlex
+import sys
+from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
+from pathlib import Path
+
+from rig.commands.config_arguments import add_config
+from rig.commands.laboratory.laboratory import simulated_laboratory
+from rig.errors import Refused
+from rig.station.plain_text import say
+
+NO_CRYSTAL = (
+    "The board's clock does not follow its crystal: these times may be a per cent off. Another clock can correct them "
+    "(rig solve --attitudes FILE --estimate-clock-offset); rig solve --turns cannot use them"
+)
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig record`."""
+    add_config(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where each sensor gets a CSV file")
+    parser.add_argument(
+        "--duration-s", type=float, required=True, metavar="S", help="how long, by the sensors' own clocks"
+    )
+
+
+def run(options: Namespace) -> int:
+    """Record into CSV files in `--out` and print what each holds; returns 0.
+
+    Raises Refused `bad_option`, as `load_sensors`, and as `record_readings` does; Fault as that.
+    """
+    if not 0 < options.duration_s < float("inf"):
+        raise Refused("bad_option", f"--duration-s is {options.duration_s:g}", "Give a time above 0, in seconds")
+    from rig.commands.laboratory.own_address import own_address
+    from rig.config.load import load_sensors
+    from rig.runner.readings import record_readings
+
+    config, simulated = load_sensors(options.config, options.overrides)
+    with ExitStack() as stack:
+        if simulated is not None and (moved := stack.enter_context(own_address(config, simulated))):
+            config, simulated = load_sensors(options.config, [*options.overrides, *moved])
+        if simulated is not None:
+            stack.enter_context(simulated_laboratory(simulated))
+        recorded = record_readings(config, options.out, options.duration_s)
+    for path, each in recorded.items():
+        say(f"{path}: {each.seen.samples} samples, {each.seen.lost} lost")
+    if any(each.follows_crystal is False for each in recorded.values()):
+        say(NO_CRYSTAL, file=sys.stderr)
+    say(f"If they lay still: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
+    return 0

@@ -1,0 +1,1 @@
+"""Commands that compute and connect to nothing: solve, allan, reversal, study."""

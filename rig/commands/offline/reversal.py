@@ -1,0 +1,40 @@
+"""`rig reversal`: a magnetometer's own bias, from runs between which it was turned over on its extension."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from rig.commands.config_arguments import add_json
+from rig.errors import Refused
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig reversal`."""
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="run folders, or their run.h5: two or three")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file too")
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Print what the runs say together, and write it to `--out`; nothing else is changed. Returns 0.
+
+    Raises Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judged` and
+    `reversals` do.
+    """
+    from rig.analysis.reversal import reversals
+    from rig.config.files.written_file import write_new
+    from rig.observation.motion.arm_motion import turner_of
+    from rig.plans.recorded import judged, open_run
+    from rig.report.terminal.reversal import print_reversal, reversal_document
+
+    opened = [(str(each), open_run(each)) for each in options.runs]
+    for _, run in opened:
+        turner_of(run.movement[0])
+    document = reversal_document(reversals([(each, judged(run)) for each, run in opened]))
+    print_reversal(document, as_json=options.json)
+    if options.out is not None:
+        try:
+            write_new(options.out, document.text() + "\n")
+        except OSError as error:
+            what = f"{options.out} cannot be written: {error}"
+            raise Refused("report_folder", what, "Choose another with --out") from error
+    return 0

@@ -1,0 +1,1 @@
+"""Commands for series and for onlookers: station, floor, watch."""

@@ -1,0 +1,139 @@
+"""`rig watch`: a run that is recorded, replayed on the operator's page."""
+
+import math
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.page_arguments import PageWish, add_place, token_said, wait_for_interrupt
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.errors import Refused, raised_as
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.data.recording.run_file import RunData
+    from rig.data.result_file import ResultDocument
+    from rig.page.about import About
+    from rig.page.replay import Moment
+    from rig.page.server.feed import Feed
+    from rig.station.events import RunEvent
+
+LOG_TAIL = 3  # lines of the log that say how a run without a result ended
+LARGEST_LOG = 50_000_000  # bytes
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig watch`, which has a page in any case."""
+    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
+    add_place(parser)
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0 < speed < math.inf:
+        raise ValueError(text)
+    return speed
+
+
+def run(options: Namespace) -> int:
+    """Replay every recording in a run folder, `--speed` times as fast as it was; the page stays until Ctrl-C.
+
+    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `turner_of`, `check_arms_times` and
+    `read_result` do.
+    """
+    from rig.data.recording.run_file import read_run
+    from rig.data.result_file import read_result
+    from rig.data.run_folder import RESULT, recordings
+    from rig.observation.motion.arm_motion import check_arms_times, turner_of
+    from rig.page.page_state import Shown
+    from rig.page.replay import moments
+    from rig.page.server.control import Control
+    from rig.page.server.feed import Feed
+    from rig.page.server.serving import serving
+
+    folder: Path = options.run_folder
+    wanted = PageWish(options.page_address, token_said(options))
+    runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
+    if not runs:
+        raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
+    with raised_as(Refused):  # nothing runs here
+        for run in runs:
+            turner_of(run)
+            check_arms_times(run.states)
+    result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
+    feed = Feed(Shown(_about(folder, runs)))
+    with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
+        say(f"page: {url}", sys.stderr)
+        try:
+            for run in runs:
+                _replay(moments(run), feed, options.speed)
+            for event in _ending(folder, result):
+                feed.event(event)
+            say("All is replayed. The page stays until Ctrl-C.", sys.stderr)
+            wait_for_interrupt()
+        except KeyboardInterrupt:
+            pass
+    return 0
+
+
+def _about(folder: Path, runs: "list[RunData]") -> "About":
+    from rig.data.recording.provenance import calls_itself_simulated
+    from rig.observation.motion.arm_motion import turner_of
+    from rig.page.about import About
+    from rig.page.arm import geometry
+
+    parts: dict[str, str] = {}
+    for run in runs:
+        parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
+    made_with = runs[0].provenance
+    simulated = calls_itself_simulated(made_with.arm_software)
+    turner = turner_of(runs[0])
+    arm = geometry(turner.geometry, turner.joints)
+    arm |= {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
+    return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)
+
+
+def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
+    from rig.page.rows import Look
+
+    began_s = time.monotonic()
+    for moment in recorded:
+        wait_s = began_s + moment.at_s / speed - time.monotonic()
+        if wait_s > 0:
+            time.sleep(wait_s)
+        if isinstance(moment.event, Look):
+            feed.look(moment.event)
+        else:
+            feed.event(moment.event)
+
+
+def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
+    from rig.data.run_folder import RESULT
+    from rig.page.replay import ended
+    from rig.report.certificate.writer import PAGE as CERTIFICATE
+    from rig.station.events import DocumentWritten, Interrupted
+
+    if (folder / CERTIFICATE).is_file():
+        yield DocumentWritten(folder / CERTIFICATE)
+    if result is None:
+        yield Interrupted(last_words(folder))
+        return
+    yield DocumentWritten(folder / RESULT)
+    yield from ended(result)
+
+
+def last_words(folder: Path) -> str:
+    """How the log of a run without a result ends."""
+    from rig.data.run_folder import LOG
+
+    try:
+        log = read_regular_file(folder / LOG, LARGEST_LOG, follow_links=False)
+    except (OSError, UnfitFile):
+        log = b""
+    lines = log.decode("utf-8", errors="replace").splitlines()
+    said = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
+    return "; ".join(["this run has no result", *said[-LOG_TAIL:][-1:]])

@@ -1,0 +1,167 @@
+"""Configurations that build on one another: `base: demo.yaml`, and `--set path=value` on top of them all."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rig.config.files.yaml_text import DEPTH_MAX, Location, Unreadable, first_control_character, read_file, read_yaml
+from rig.errors.quoting import quote, shorten
+
+BASE = "base"
+SET = "--set"
+FILES_MAX = 8  # one on another
+
+Places = Mapping[Location, str]  # where each key stands, in words: "line 3", "demo.yaml, line 3", "--set"
+
+
+@dataclass(frozen=True, slots=True)
+class Layered:
+    """All that is said: the `document`, the `places` of its keys, and the `problems` found while putting it together.
+
+    `written` are the letters of every value that YAML takes for something else than text.
+    `text` is what was written, when one file says everything; None when the document was made of more.
+    """
+
+    document: dict[str, Any]
+    places: Places
+    written: Mapping[Location, str]
+    problems: tuple[str, ...]
+    text: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """One file's part."""
+
+    data: dict[str, Any]
+    places: Places
+    written: Mapping[Location, str]
+    problems: tuple[str, ...]
+
+
+def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
+    """A file, the files it builds on, and the overrides. Raises `Unreadable`."""
+    return put_together(read_file(path), path, overrides)
+
+
+def put_together(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
+    """A file's text with what it builds on; text of no file (`path` None) can build on none. Raises `Unreadable`."""
+    layers = list(_layers(text, path))
+    document: dict[str, Any] = {}
+    places: dict[Location, str] = {}
+    written: dict[Location, str] = {}
+    problems: list[str] = []
+    for layer in reversed(layers):
+        document = merge(document, layer.data)
+        places |= layer.places
+        written |= layer.written
+        problems += layer.problems
+    for item in overrides:
+        problems += _override(document, places, written, item)
+    return Layered(document, places, written, tuple(problems), None if overrides or len(layers) > 1 else text)
+
+
+def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """`over` on top of `base`: sections key by key, lists and values whole; null leaves out what the base says."""
+    merged = dict(base)
+    for key, value in over.items():
+        below = merged.get(key)
+        if value is None and key in merged:
+            del merged[key]
+        elif isinstance(value, dict):
+            merged[key] = merge(below if isinstance(below, dict) else {}, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
+    """A file and those below it, from the top."""
+    layer, names, files = _layer(text, ""), ["this file"], []
+    while BASE in layer.data:
+        where, wanted = f"{BASE} ({layer.places[(BASE,)]})", layer.data.pop(BASE)
+        yield layer
+        if path is None:
+            raise Unreadable(f"{where}: only a file can build on another")
+        if not isinstance(wanted, str):
+            raise Unreadable(f"{where}: {quote(wanted)}: must be the name of a file")
+        files.append(path.resolve())
+        names.append(shorten(wanted))
+        path = path.parent / wanted
+        try:
+            text = read_file(path)
+        except Unreadable as error:
+            raise Unreadable(f"{where}: {shorten(wanted)} {error.why}") from None
+        if path.resolve() in files:
+            raise Unreadable(f"{where}: the files build on one another in a circle: {' → '.join(names)}")
+        if len(files) == FILES_MAX:
+            raise Unreadable(f"{where}: more than {FILES_MAX} files one on another: {' → '.join(names)}")
+        layer = _layer(text, shorten(wanted))
+    yield layer
+
+
+def _layer(text: str, name: str) -> _Layer:
+    """One file's text; `name` is its name when it is not the one that was asked for."""
+    try:
+        document = read_yaml(text)
+        if not isinstance(document.data, dict):
+            raise Unreadable("the file must be a mapping with the keys arm, board, sensors, limits")
+    except Unreadable as error:
+        raise Unreadable(f"{name}: {error}" if name else str(error)) from None
+    prefix = f"{name}, " if name else ""
+    places = {location: f"{prefix}line {line}" for location, line in document.lines.items()}
+    return _Layer(
+        document.data, places, document.written, tuple(f"{name}: {it}" if name else it for it in document.problems)
+    )
+
+
+def _override(
+    document: dict[str, Any], places: dict[Location, str], written: dict[Location, str], item: str
+) -> Iterator[str]:
+    """Apply one `a.b.c=value` in place; yields a problem instead when it cannot be applied."""
+    path, equals, value = item.partition("=")
+    path = path.strip()
+    what = f"{SET} {shorten(item)}"
+    if not path or not equals or not value.strip():
+        yield f"{what}: must be path=value, for example {_example(item)}"
+        return
+    if first_control_character(path) is not None:
+        yield f"{what}: holds a control character"
+        return
+    *parents, last = location = tuple(path.split("."))
+    if len(location) > DEPTH_MAX:
+        yield f"{what}: more than {DEPTH_MAX} sections within one another"
+        return
+    if location[0] == BASE:
+        yield f"{what}: {BASE} is said by the file alone"
+        return
+    try:
+        said = read_yaml(value)
+    except Unreadable as error:
+        yield f"{what}: {error.why}"
+        return
+    yield from (f"{what}: {problem}" for problem in said.problems)
+    section = document
+    for depth, parent in enumerate(parents, start=1):
+        if parent not in section:
+            places[location[:depth]] = SET
+        below = section.setdefault(parent, {})
+        if not isinstance(below, dict):
+            yield f"{what}: {shorten(parent)} is not a section"
+            return
+        section = below
+    if said.data is None and last in section:
+        del section[last]
+    else:
+        section[last] = said.data
+    for place in [place for place in places if place[: len(location)] == location]:
+        del places[place]
+    places |= {(*location, *below): SET for below in ((), *said.lines)}
+    written |= {(*location, *below): letters for below, letters in said.written.items()}
+
+
+def _example(item: str) -> str:
+    """What is meant by `a.b:value`, else any."""
+    path, colon, value = item.partition(":")
+    return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

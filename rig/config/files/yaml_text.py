@@ -1,0 +1,187 @@
+"""Reads YAML that anybody may have written: plain data and the line of every key, or one sentence why not.
+
+Nothing a text holds makes reading it slow, large or deep: a configuration is a page, so what is far beyond that is
+refused instead of read.
+"""
+
+import unicodedata
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rig.config.files.regular_file import UnfitFile, read_regular_file
+from rig.errors.quoting import printable, quote, shorten
+
+Location = tuple[int | str, ...]
+
+SIZE_MAX_BYTES = 65_536  # the longest configuration shipped has 2,500
+NODES_MAX = 5_000  # keys and values, an alias counted as all it stands for
+DEPTH_MAX = 16  # sections within sections
+NUMBER_MAX_CHARACTERS = 40
+
+NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+TEXT = "tag:yaml.org,2002:str"
+NOTHING = "tag:yaml.org,2002:null"
+MERGE = "tag:yaml.org,2002:merge"
+OTHER_FILES = {  # what is given for a configuration by mistake, and where it belongs
+    ".py": "a Python script, no configuration; a procedure of your own is run by `rig run CONFIG --script FILE.py`",
+    ".h5": "a recording, no configuration; it is solved by `rig solve FILE.h5`",
+    ".csv": "a table of readings, no configuration; it is solved by `rig solve FILE.csv`",
+}
+UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # control, format, half a pair, breaks of lines and paragraphs
+
+
+class Unreadable(Exception):
+    """Why something cannot be read as a configuration, in one line."""
+
+    def __init__(self, why: str, line: int | None = None) -> None:
+        super().__init__(f"line {line}: {why}" if line else why)
+        self.why = why
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """What a text says: `data` as YAML reads it, the `lines` of its keys, and the `problems` of its keys and words.
+
+    `written` are the letters of every value that YAML takes for something else than text: a number, a date, a truth.
+    """
+
+    data: Any
+    lines: Mapping[Location, int]
+    written: Mapping[Location, str]
+    problems: tuple[str, ...]
+
+
+def first_control_character(text: str) -> str | None:
+    """The first character that does something instead of being seen: escape, carriage return, text direction …"""
+    return next((character for character in text if unicodedata.category(character) in UNSEEN), None)
+
+
+def read_file(path: Path) -> str:
+    """The text of a regular file of reasonable size. Raises `Unreadable`."""
+    if path.suffix in OTHER_FILES and path.is_file():
+        raise Unreadable(f"is {OTHER_FILES[path.suffix]}")
+    try:
+        content = read_regular_file(path, SIZE_MAX_BYTES)
+    except UnfitFile as unfit:
+        raise Unreadable(f"cannot be read: {unfit}") from None
+    except OSError as error:
+        raise Unreadable(f"cannot be read: {error.strerror}") from None
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Unreadable(f"cannot be read: byte {error.start + 1} is no UTF-8 text") from None
+
+
+def read_yaml(text: str) -> Document:
+    """One YAML document. Raises `Unreadable`."""
+    if len(text) > SIZE_MAX_BYTES:
+        raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is no configuration")
+    for number, line in enumerate(text.split("\n"), 1):
+        if (found := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
+            raise Unreadable(f"holds the control character {printable(found)}", number)
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        lines: dict[Location, int] = {}
+        written: dict[Location, str] = {}
+        problems = tuple(_survey(node, (), lines, written))
+        return Document(None if node is None else loader.construct_document(node), lines, written, problems)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        why = ", ".join(part for part in (error.context, error.problem) if part)
+        raise Unreadable(_shorten_words(why), mark.line + 1 if mark else None) from None
+    except yaml.YAMLError as error:
+        raise Unreadable(_shorten_words(" ".join(str(error).split()))) from None
+
+
+class _Loader(yaml.SafeLoader):
+    """Composes no more than a configuration can need; makes plain data only."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = self._nodes = 0
+        self._size_of: dict[str, int] = {}  # nodes that an alias stands for, once all of them are known
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if isinstance(event, yaml.AliasEvent):
+            anchor = str(event.anchor)
+            if anchor in self.anchors and anchor not in self._size_of:
+                raise _refusal(f"*{shorten(anchor)} stands inside what it stands for", event.start_mark)
+            self._count(self._size_of.get(anchor, 0), event.start_mark)
+            return super().compose_node(parent, index)
+        if getattr(event, "tag", None) is not None:
+            raise _refusal(f"{shorten(event.tag)}: tags are not used in a configuration", event.start_mark)
+        if self._depth == DEPTH_MAX:
+            raise _refusal(f"more than {DEPTH_MAX} sections or lists within one another", event.start_mark)
+        before = self._nodes
+        self._count(1, event.start_mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if event.anchor is not None:
+            self._size_of[event.anchor] = self._nodes - before
+        return node
+
+    def _count(self, nodes: int, mark: Any) -> None:
+        self._nodes += nodes
+        if self._nodes > NODES_MAX:
+            raise _refusal(f"more than {NODES_MAX} keys and values", mark)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        if node.tag in NUMBERS and len(node.value) > NUMBER_MAX_CHARACTERS:
+            raise _refusal(f"{shorten(node.value)} is too long for a number", node.start_mark)
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, OverflowError) as error:  # the 31st of February, a number without digits
+            raise _refusal(f"{shorten(str(node.value))} cannot be: {error}", node.start_mark) from None
+
+
+def _refusal(why: str, mark: Any) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=why, problem_mark=mark)
+
+
+def _survey(
+    node: yaml.Node | None, location: Location, lines: dict[Location, int], written: dict[Location, str]
+) -> Iterator[str]:
+    """Notes the line of every key, and what is `written` where it is no text; yields keys that are no words or stand
+    twice (YAML would keep the last).
+    """
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            line = key.start_mark.line + 1
+            if key.tag not in (TEXT, MERGE):
+                yield f"{dotted(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
+                continue
+            place = (*location, key.value)
+            if place in lines:
+                yield f"{dotted(place)}: given twice, on lines {lines[place]} and {line}"
+            lines[place] = line
+            yield from _visible(key, place)
+            yield from _survey(value, place, lines, written)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            yield from _survey(value, (*location, index), lines, written)
+    elif isinstance(node, yaml.ScalarNode):
+        if node.tag not in (TEXT, NOTHING):
+            written[location] = node.value
+        yield from _visible(node, location)
+
+
+def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
+    """Quotes can hide a control character behind an escape."""
+    if (found := first_control_character(node.value)) is not None:
+        yield f"{dotted(location)} (line {node.start_mark.line + 1}): holds the control character {printable(found)}"
+
+
+def dotted(location: Location) -> str:
+    """`sensors.gyro.rate_hz`; the file as a whole is `(file)`."""
+    return ".".join(shorten(str(part)) for part in location) or "(file)"
+
+
+def _shorten_words(text: str) -> str:
+    return " ".join(shorten(word) for word in text.split())

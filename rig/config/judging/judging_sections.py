@@ -1,0 +1,178 @@
+"""The sections that say where a measurement is made, and what becomes of its result: site, certificate, history."""
+
+from datetime import date
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from rig.config.judging.history_address import history_url
+from rig.config.section import RATIO, Section, Vector3, Words
+
+# Sine of the angle between the vertical and what a heading is given of: that of `rig.estimation.gyroscope.earth_rate`,
+# which the world must not reach through a section.
+MIN_LEVEL = 0.1
+
+
+class SiteSection(Section):
+    """Where the arm stands. With latitude and heading the Earth's rate is taken out. The texts are for certificates."""
+
+    laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
+    address: Words | None = Field(default=None, description="the laboratory's address, in one line")
+    country: Annotated[str, Field(pattern="^[A-Z]{2}$")] | None = Field(
+        default=None,
+        description="the laboratory's country, for digital certificates",
+        json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
+    )
+    place: Words | None = Field(
+        default=None, description="where the arm stands: site, room; if left out, a certificate does not state it"
+    )
+    time_reference: Words | None = Field(
+        default=None,
+        description="the time server that corrects this computer's clock, such as `NTP, ptbtime1.ptb.de`; without "
+        "it a certificate does not call the time traceable",
+    )
+    ambient_temperature_c: float | None = Field(
+        default=None, ge=-50, le=100, description="temperature of the air, as you measured it"
+    )
+    ambient_humidity_percent: float | None = Field(
+        default=None,
+        ge=0,
+        le=100,
+        description="relative humidity of the air, as you measured it",
+        json_schema_extra={"unit": "%"},
+    )
+    latitude_deg: float | None = Field(
+        default=None,
+        ge=-90,
+        le=90,
+        description="latitude, north is positive; give it together with heading_deg, or alone if the Earth's rate "
+        "is to be found",
+    )
+    heading_deg: float | None = Field(
+        default=None,
+        ge=-360,
+        le=360,
+        description="direction of the x axis of the arm's base: 0 north, 90 east; give it together with latitude_deg",
+    )
+    gravity_m_s2: float = Field(
+        default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
+    )
+    gravity_uncertainty_m_s2: float | None = Field(
+        default=None,
+        gt=0,
+        le=0.1,
+        description="expanded uncertainty (k = 2) of gravity_m_s2; if left out, a half-width of 0.0005 is used, "
+        "or of 0.03 if gravity_m_s2 is the standard value",
+        json_schema_extra={"unit": "m/s²"},
+    )
+    magnetic_field_ut: float | None = Field(
+        default=None,
+        ge=1,
+        le=1000,
+        description="size of the magnetic field at the magnetometer's place, measured there with a reference; the "
+        "scale factors are relative to it; without it a magnetometer is recorded but not calibrated",
+    )
+    magnetic_field_uncertainty_ut: float | None = Field(
+        default=None,
+        gt=0,
+        le=100,
+        description="expanded uncertainty (k = 2) of magnetic_field_ut; if left out, a half-width of 1 % is used",
+    )
+    gravity_reference: Words | None = Field(
+        default=None,
+        description="where gravity_m_s2 comes from, such as a gravimeter with its certificate or a gravity map; for "
+        "certificates",
+    )
+    magnetic_field_reference: Words | None = Field(
+        default=None, description="instrument with which magnetic_field_ut was measured; for certificates"
+    )
+    magnetic_field_upwards: bool = Field(
+        default=False,
+        description="whether this field points out of the ground, as it does south of the magnetic equator",
+    )
+    base_up: Vector3 = Field(
+        default=(0.0, 0.0, 1.0),
+        description="direction of up in the frame of the arm's base; 0 0 −1 if the arm hangs from a ceiling",
+        json_schema_extra=RATIO,
+    )
+
+    @field_validator("base_up")
+    @classmethod
+    def a_direction(cls, value: Vector3) -> Vector3:
+        """The direction that is up, of any length but zero."""
+        if not np.linalg.norm(value) > 1e-6:
+            raise ValueError("must be a direction, such as [0, 0, 1]")
+        return value
+
+    @model_validator(mode="after")
+    def a_heading_has_a_latitude(self) -> Self:
+        """The Earth's rate needs both where it is known."""
+        if self.heading_deg is not None and self.latitude_deg is None:
+            raise ValueError("needs latitude_deg and heading_deg, or neither")
+        if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
+            raise ValueError("heading_deg has no meaning if the x axis of the base points up or down")
+        return self
+
+    @property
+    def up(self) -> Vector3:
+        """Unit vector that points up, in the base's frame."""
+        x, y, z = (np.array(self.base_up) / np.linalg.norm(self.base_up)).tolist()
+        return x, y, z
+
+
+class CertificateSection(Section):
+    """What a certificate says about the order and about the responsible person. What is left out reads "not stated"."""
+
+    customer: Words | None = Field(default=None, description="the customer's name")
+    customer_address: Words | None = Field(default=None, description="the customer's address, in one line")
+    received: date | None = Field(
+        default=None,
+        description="the day on which the item was received",
+        json_schema_extra={"allowed": "date, as 2026-11-20"},
+    )
+    condition: Words | None = Field(default=None, description="the item's condition when it was received")
+    authorised_by: Words | None = Field(
+        default=None,
+        description="who authorises the certificate; if left out, the certificate has a line for a signature",
+    )
+    replaces: Words | None = Field(
+        default=None, description="the number of the certificate that this one amends and replaces"
+    )
+    issued: date | None = Field(
+        default=None,
+        description="the day on which the certificate is issued; if left out, the day on which the result was computed",
+        json_schema_extra={"allowed": "date, as 2026-11-20"},
+    )
+
+
+class HistorySection(Section):
+    """Where finished runs are remembered. If left out: in a file of the user (`RIG_HISTORY` names another)."""
+
+    url: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="an SQLite file on a disk of this computer, or `postgresql://user@host/name` of a database that "
+        "several rigs share; no password, which belongs in `~/.pgpass`",
+    )
+    off: bool = Field(default=False, description="`true`: this run is not entered into the history")
+    rig: Words | None = Field(
+        default=None, description="name of this rig in the history; if left out, the serial number of its arm"
+    )
+    operator: Words | None = Field(default=None, description="name of the operator, for the history")
+    note: Words | None = Field(default=None, description="a note about this run, for the history")
+    check_standards: tuple[Words, ...] = Field(
+        default=(),
+        max_length=100,
+        description="serial numbers of the check standards: sensors that are "
+        "calibrated again and again in order to watch the rig itself",
+    )
+
+    @field_validator("url")
+    @classmethod
+    def a_place_without_a_password(cls, value: str | None) -> str | None:
+        """A recording keeps the configuration, so a password in it would go wherever recordings go."""
+        if value is not None and "://" in value and history_url(value).password is not None:
+            raise ValueError("contains a password, and every recording would keep it; put it into ~/.pgpass")
+        return value

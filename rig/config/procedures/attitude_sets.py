@@ -1,0 +1,37 @@
+"""Attitudes by name: angles of the wrists 1, 2, 3 in degrees, with base, shoulder and elbow at home.
+
+Possible on every arm that is known but a UR3e, whose forearm is too short for them. Wrist 2 stays at -90°: there the
+flange keeps its distance from the forearm, and every attitude can be reached by a turn of wrist 1 and one of wrist 3.
+Their goodness is reckoned by `rig.estimation.design.attitude_design`.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+WristAngles = tuple[float, float, float]
+
+# D-optimal on the grid of 45°, for attitudes known to 1 mrad: an exchange search finds no eighteen that tell more by a
+# thousandth (tests/estimation/test_attitude_design.py).
+EIGHTEEN: tuple[WristAngles, ...] = (
+    *((-180, -90, wrist_3) for wrist_3 in (-135, -90, -45, 90, 135)),
+    *((-135, -90, 45), (-90, -90, -135)),
+    *((-45, -90, wrist_3) for wrist_3 in (-45, 45, 135)),
+    *((0, -90, wrist_3) for wrist_3 in (-180, -135, 0)),
+    *((45, -90, wrist_3) for wrist_3 in (-90, 90)),
+    *((90, -90, 45), (135, -90, -180), (135, -90, 0)),
+)
+# The same and eight with wrist 2 turned away from the forearm. While it stands at one angle, what the arm's iron adds
+# along wrist 1's axis looks like a part of the room's field, and what it adds along the flange's like a bias.
+MAGNETIC: tuple[WristAngles, ...] = (
+    *EIGHTEEN,
+    *((wrist_1, -45, wrist_3) for wrist_1, wrist_3 in zip((-180, -90, 0, 90), (0, 90, -180, -90), strict=True)),
+    *((wrist_1, -45, wrist_3) for wrist_1, wrist_3 in zip((-135, -45, 45, 135), (-90, 0, 90, 180), strict=True)),
+)
+# Each side of the flange up twice, with opposite headings: best for a table whose attitudes are exact.
+FACES: tuple[WristAngles, ...] = (
+    *((wrist_1, -90, wrist_3) for wrist_1 in (-180, 0) for wrist_3 in (-180, -90, 0, 90)),
+    *((wrist_1, -90, wrist_3) for wrist_1 in (-90, 90) for wrist_3 in (-90, 90)),
+)
+SETS: Mapping[str, tuple[WristAngles, ...]] = MappingProxyType(
+    {"eighteen": EIGHTEEN, "faces": FACES, "magnetic": MAGNETIC}
+)

@@ -1,0 +1,509 @@
+"""The `procedure:` section of each stock procedure. A procedure of one's own brings a section like these."""
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, Self, get_args
+
+import numpy as np
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.procedures.attitude_sets import SETS
+from rig.config.procedures.hand_sections import ByHandSection
+from rig.config.procedures.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
+from rig.config.procedures.stage_section import StageSection, Wrist
+from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
+from rig.config.section import DEFAULT_REST_S, RATIO, AccelerometerOrder, Direction, JointAngle
+
+__all__ = [
+    "DEFAULT_PROCEDURE",
+    "STOCK_SECTIONS",
+    "AttitudesSection",
+    "BiasDriftSection",
+    "ByHandSection",
+    "ImuSection",
+    "ProcedureSection",
+    "SixObservationSection",
+    "SixSweepsSection",
+    "StaticAttitudesSection",
+    "ThermalSection",
+    "VerifySection",
+]
+
+Speed = Annotated[float, Field(ge=0.5, le=SPEED_RANGE_DEG_S)]  # slower, and the board cannot keep a sweep's readings
+DEFAULT_PROCEDURE = "six_observation"
+LONGEST_SWEEP_S = 720  # once round at the slowest speed
+HOTTEST_HEATED_C = 65.0  # the heater overshoots the range a little
+# What polynomials need: that of `rig.estimation.temperature.over_temperature`, which the world must not reach through a
+# section.
+MIN_RANGE_C = 10.0
+
+
+class SixSweepsSection(ProcedureSection):
+    """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
+
+    axes: Literal[3, 6] = Field(
+        default=3,
+        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
+        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
+        json_schema_extra=RATIO,
+    )
+    order: tuple[Wrist, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="order in which the wrists turn, each once; if left out, the order in which a steady drift of "
+        "the bias causes the smallest error",
+    )
+    directions: tuple[Direction, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="direction in which each wrist turns first, and then second; if left out, the directions in "
+        "which a steady drift of the bias causes the smallest error",
+    )
+    repeats: int = Field(
+        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
+    )
+    speed_deg_s: Speed = Field(
+        default=60.0,
+        description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
+    )
+    speeds_deg_s: tuple[Speed, ...] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=8,
+        description="several speeds in place of `speed_deg_s`: every sweep is made at each speed, which shows the "
+        "nonlinearity of the sensor",
+    )
+    arc_deg: float = Field(
+        default=360.0,
+        ge=30,
+        le=3600,
+        description="how far a sweep turns at constant speed, centred on `arm.home_deg`; 360 and its multiples are "
+        "whole turns, whose angle is known because the circle closes; any other angle is that of the encoders: "
+        "`uncertainty.angle_std_deg`",
+    )
+    acceleration_deg_s2: float = Field(
+        default=240.0,
+        ge=0.1,
+        le=ACCELERATION_RANGE_DEG_S2,
+        description="acceleration of every motion; the ramps of a sweep are outside the revolution that is averaged",
+    )
+    rest_s: float = Field(default=DEFAULT_REST_S, ge=0, le=3600, description="time of standing still after each sweep")
+    margin_deg: float = Field(
+        default=2.0, gt=0, le=90, description="angle of constant speed before the revolution begins, and after it ends"
+    )
+
+    @model_validator(mode="after")
+    def every_direction_is_swept(self) -> Self:
+        """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
+        order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
+        if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
+            raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
+        if len(set(self.speeds)) < len(self.speeds):
+            raise ValueError("speeds_deg_s must name each speed once; repeats says how often everything is done")
+        return self
+
+    earth_rate: Literal["known", "find"] = Field(
+        default="known",
+        description="`known`: taken out if `site` gives latitude and heading, else part of the uncertainty; "
+        "`find`: found from the readings of a gyroscope that is good enough; this needs rests in many "
+        "attitudes (`imu`)",
+    )
+
+    @property
+    def finds_earth_rate(self) -> bool:
+        """Whether the file asks for the Earth's rate."""
+        return self.earth_rate == "find"
+
+    @property
+    def arcs(self) -> bool:
+        """Whether sweeps are no whole turns."""
+        return self.arc_deg % 360 != 0
+
+    @property
+    def mountings(self) -> tuple[StageSection, ...]:
+        """The stages, in which the item is mounted anew; none where it stays as it is."""
+        return ()
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """The speeds at which every sweep is made, °/s."""
+        return self.speeds_deg_s or (self.speed_deg_s,)
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """Sweeps beyond a sensor's range; a verification that could not pass."""
+        for name, sensor in config.sensors.items():
+            if max(self.speeds) * SPEED_TO_RANGE > sensor.range_deg_s:
+                key = "speeds_deg_s" if self.speeds_deg_s else "speed_deg_s"
+                yield (
+                    f"procedure.{key} {max(self.speeds):g} is too fast for sensors.{name}.range_deg_s "
+                    f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
+                )
+        yield from self._arc_problems(config)
+        if config.site.latitude_deg is not None and config.site.heading_deg is None and not self.finds_earth_rate:
+            yield "site needs latitude_deg and heading_deg, or neither; procedure.earth_rate: find needs no heading"
+        if self.needs_reference:
+            yield from verification_problems(config)
+
+    def _arc_problems(self, config: RigConfig) -> Iterator[str]:
+        """An arc that nobody knows well enough, or that takes longer than a board keeps readings."""
+        if self.arcs and config.uncertainty.angle_std_deg is None:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders measure how far a "
+                "sweep went: give "
+                "uncertainty.angle_std_deg, how far a joint may be from the angle of its encoder"
+            )
+        if self.arcs and self.finds_earth_rate:
+            yield f"procedure.earth_rate: find needs whole turns, and procedure.arc_deg is {self.arc_deg:g}"
+        slowest = min(self.speeds)
+        if self.arc_deg / slowest > LONGEST_SWEEP_S:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} takes {self.arc_deg / slowest:.0f} s at {slowest:g} °/s: the "
+                f"board keeps the readings of {LONGEST_SWEEP_S} s"
+            )
+
+
+class SixObservationSection(SixSweepsSection):
+    """Six sweeps that calibrate; with `verify` the same movement again, to verify."""
+
+    name: Literal["six_observation"] = Field(default="six_observation", description="this procedure")
+    verify: bool = Field(
+        default=False,
+        description="if the calibration passes, store it on the board, then repeat the movement with readings "
+        "that the board corrects, and compare them with the reference's",
+    )
+    stages: tuple[StageSection, ...] = Field(
+        default=(),
+        max_length=12,
+        description="mountings of the item, gone through one after the other",
+    )
+    target_scale_u: float | None = Field(
+        default=None,
+        gt=0,
+        lt=0.1,
+        description="expanded uncertainty of the scale factors at which the run ends: after a repeat, with the arm at "
+        "home; without it and `target_bias_u_rad_s`, it ends when all repeats are made; a run that does not come to it "
+        "fails the check `scale_u`",
+        json_schema_extra=RATIO,
+    )
+    target_bias_u_rad_s: float | None = Field(
+        default=None,
+        gt=0,
+        lt=1,
+        description="the same of the biases, with the check `bias_u`; where both are given, both must be reached",
+    )
+
+    @property
+    def then_verify(self) -> bool:
+        """Whether the file asks for a verification after the calibration."""
+        return self.verify
+
+    @property
+    def mountings(self) -> tuple[StageSection, ...]:
+        """The stages that the file names."""
+        return self.stages
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """The problems of the sweeps; a verification compares one whole movement, not several mountings.
+
+        A magnetometer would be recorded, and only at the end of the run nobody could calibrate it.
+        """
+        yield from SixSweepsSection.problems(self, config)
+        if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):
+            yield (
+                "procedure.target_scale_u and target_bias_u_rad_s (or name: shortest) end a run after a repeat, and "
+                "procedure.stages has its repeats in each mounting: leave out one or the other"
+            )
+        if self.stages and self.verify:
+            yield (
+                "procedure.verify repeats one movement with one mounting, and stages have several: leave out "
+                "procedure.stages, or calibrate in stages first and run procedure.name: verify afterwards"
+            )
+        beyond = "procedure.stages" if self.stages else f"procedure.arc_deg {self.arc_deg:g}" if self.arcs else None
+        if beyond is not None and config.magnetometers:
+            yield (
+                f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated with {beyond}: that takes "
+                "attitudes, in one mounting and with whole turns (imu, static_attitudes); leave it out, or "
+                f"{beyond.partition(' ')[0]}"
+            )
+
+
+class VerifySection(SixSweepsSection):
+    """Six sweeps with corrected readings, which are compared with a reference's."""
+
+    name: Literal["verify"] = Field(default="verify", description="this procedure")
+    verify: bool = Field(
+        default=False,
+        description="no effect here; allowed, so that one file can be used for a calibration and for its verification",
+    )
+
+    @property
+    def needs_reference(self) -> bool:
+        """Whether a reference gyroscope is needed: always."""
+        return True
+
+
+def set_of_that_name(value: Any) -> Any:
+    """The attitudes a name stands for; those that are given one by one as they are."""
+    if not isinstance(value, str):
+        return value
+    if value not in SETS:
+        raise ValueError(f"no set of attitudes; allowed: {', '.join(SETS)}, or a list of them")
+    return SETS[value]
+
+
+class AttitudesSection(ProcedureSection):
+    """Attitudes in which the arm stands still: which, how long, how often."""
+
+    attitudes: Annotated[tuple[tuple[JointAngle, JointAngle, JointAngle], ...], BeforeValidator(set_of_that_name)] = (
+        Field(
+            default=SETS["eighteen"],
+            min_length=1,
+            max_length=100,
+            description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that "
+            "are the best for exact attitudes; `magnetic`: the eighteen, and eight more for "
+            "magnetometers; or a list of your own, with the angles of wrists 1, 2 and 3 for each "
+            "attitude; base, shoulder and elbow stay as in `arm.home_deg`",
+            json_schema_extra={
+                "unit": "°",
+                "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
+                "usual": "`eighteen`",
+            },
+        )
+    )
+    dwell_s: float = Field(
+        default=DEFAULT_REST_S, ge=0.1, le=3600, description="time of standing still in each attitude"
+    )
+    settle_s: float = Field(
+        default=5.0,
+        gt=0,
+        le=5,
+        description="how long the sensors may take to settle before; if they take longer, the run ends",
+    )
+    second_order: bool = Field(
+        default=False,
+        description="whether the attitudes must also determine an accelerometer's second-order terms; this "
+        "triples the uncertainty of its bias",
+    )
+    field_test_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=600,
+        description="time of standing still at home before the attitudes and after them, which shows whether the "
+        "magnetic field drifted; `0`: no such test",
+    )
+    repeats: int = Field(
+        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
+    )
+    acceleration_deg_s2: float = Field(
+        default=240.0, ge=0.1, le=ACCELERATION_RANGE_DEG_S2, description="acceleration of every motion"
+    )
+
+    @field_validator("attitudes")
+    @classmethod
+    def each_once(cls, value: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float, float, float], ...]:
+        """Attitudes without a second one alike, which tells nothing new of the arm's errors: it makes them alike."""
+        found: set[tuple[float, ...]] = set()
+        for attitude in value:
+            turned = tuple(np.mod(attitude, 360).tolist())
+            if turned in found:
+                raise ValueError(f"{list(attitude)} is listed twice; repeats says how often everything is done")
+            found.add(turned)
+        return value
+
+    @property
+    def accelerometer_order(self) -> AccelerometerOrder:
+        """Order of the accelerometer's model that the file asks for."""
+        return 2 if self.second_order else 1
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """What the calibration of an accelerometer lacks."""
+        if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
+            yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
+        lacking = config.limits.lacking("accelerometer")
+        if self.repeats > 1:
+            lacking += config.limits.lacking("repeated attitudes")  # it is verified by the last repeat
+        if lacking:
+            yield f"an accelerometer's calibration needs {', '.join(lacking)}"
+
+
+class StaticAttitudesSection(AttitudesSection):
+    """The arm stands still in attitudes that determine an accelerometer's scale, angles and bias."""
+
+    name: Literal["static_attitudes"] = Field(default="static_attitudes", description="this procedure")
+
+
+class BiasDriftSection(AttitudesSection):
+    """The arm goes through the attitudes again and again, for hours: how the bias drifts. By default ten hours, as in
+    TRIAX."""
+
+    name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
+    dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
+    repeats: int = Field(
+        default=10,
+        ge=2,
+        le=100,
+        description="how many times the arm goes through all attitudes",
+        json_schema_extra=RATIO,
+    )
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """What the calibration of an accelerometer lacks, and limits of the drift."""
+        yield from AttitudesSection.problems(self, config)
+        if lacking := config.limits.lacking("bias drift"):
+            yield f"a bias that is watched needs {', '.join(lacking)}"
+
+
+class ImuSection(SixSweepsSection, AttitudesSection):
+    """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """The problems of the sweeps and of the attitudes."""
+        yield from SixSweepsSection.problems(self, config)
+        yield from AttitudesSection.problems(self, config)
+        if self.arc_deg != 360:
+            yield (
+                f"procedure.arc_deg {self.arc_deg:g} is not for imu: of each sweep an accelerometer's wave is found, "
+                "which is that of one whole turn; leave it at 360, or use six_observation"
+            )
+
+    name: Literal["imu"] = Field(default="imu", description="this procedure")
+    axes: Literal[3, 6] = Field(
+        default=6,
+        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
+        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
+        json_schema_extra=RATIO,
+    )
+
+
+class ThermalSection(SixSweepsSection, AttitudesSection):
+    """Sweeps, and attitudes if accelerometers are calibrated too, in sets that are repeated while the sensors warm and
+    cool."""
+
+    name: Literal["thermal"] = Field(default="thermal", description="this procedure")
+    from_c: float = Field(
+        ge=-40, le=85, description="lower end of the range of temperatures, by the part's thermometer"
+    )
+    to_c: float = Field(ge=-40, le=85, description="upper end of the range")
+    max_step_k: float = Field(
+        default=5.0,
+        gt=0,
+        le=50,
+        description="how far neighbouring sets may be apart",
+        json_schema_extra={"unit": "K"},
+    )
+    max_rate_k_per_min: float = Field(
+        default=2.0,
+        gt=0,
+        le=100,
+        description="how fast the temperature may change; if it changes faster, the run ends (`too_fast`)",
+        json_schema_extra={"unit": "K/min"},
+    )
+    reference_c: float = Field(
+        default=25.0, ge=-40, le=85, description="temperature at which scale factors and biases are stated"
+    )
+    heater_power: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="most power of the heater on the board's pin, as a part of all it has; `0`: the operator, or "
+        "the board's own warm-up, changes the temperature",
+        json_schema_extra=RATIO,
+    )
+    both_directions: bool = Field(
+        default=True,
+        description="whether the range must be covered while the sensors warm and again while they cool, which shows "
+        "their hysteresis",
+    )
+    with_attitudes: bool = Field(
+        default=False, description="whether each set has the attitudes too, which calibrate accelerometers"
+    )
+    max_temperature_c: float = Field(
+        default=70.0,
+        ge=0,
+        le=105,
+        description="temperature above which the run ends (`overheated`); the board switches its heater off at 70 "
+        "in any case",
+    )
+    timeout_min: float = Field(
+        default=20.0,
+        gt=0,
+        le=1000,
+        description="longest wait for the next temperature; after it the run ends (`range_not_reached`)",
+        json_schema_extra={"unit": "min"},
+    )
+    repeats: int = Field(
+        default=40,
+        ge=2,
+        le=100,
+        description="how many sets are made at most; if the range is not covered then, the run ends "
+        "(`range_not_reached`)",
+        json_schema_extra=RATIO,
+    )
+
+    @model_validator(mode="after")
+    def a_range_with_several_temperatures(self) -> Self:
+        """What makes sets enough for polynomials, which are found only after the run."""
+        gaps, ways = (2, "") if self.both_directions else (3, " with both_directions: false")
+        if self.to_c - self.from_c < gaps * self.max_step_k:
+            raise ValueError(
+                f"from_c and to_c must be {gaps} gaps apart at least{ways}: a line through two points shows nothing"
+            )
+        least_k = MIN_RANGE_C + self.max_step_k
+        if self.to_c - self.from_c < least_k:
+            raise ValueError(f"from_c and to_c must be {MIN_RANGE_C:g} K and a gap apart at least: {least_k:g} K")
+        if not self.max_step_k / 2 <= self.reference_c - self.from_c <= self.to_c - self.from_c - self.max_step_k / 2:
+            raise ValueError("reference_c must lie between from_c and to_c, half a gap from each: sets end before them")
+        if self.max_temperature_c <= self.to_c:
+            raise ValueError("max_temperature_c must lie above to_c")
+        return self
+
+    @property
+    def accelerometer_order(self) -> AccelerometerOrder:
+        """Order of the accelerometer's model where a set has attitudes; else 0."""
+        return (2 if self.second_order else 1) if self.with_attitudes else 0
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """The problems of the sweeps and of the attitudes, a heater that cannot be, and sensors without a board."""
+        yield from SixSweepsSection.problems(self, config)
+        if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
+            yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
+        if self.arc_deg != 360:
+            yield f"procedure.arc_deg {self.arc_deg:g} is not for thermal: leave it at 360"
+        if self.finds_earth_rate:
+            yield "procedure.earth_rate: find is not for thermal: the biases move; give site.heading_deg"
+        if config.magnetometers:
+            yield f"magnetometers.{', '.join(config.magnetometers)} cannot be calibrated over temperature; leave it out"
+        if self.heater_power > 0 and not config.on_board:
+            yield "procedure.heater_power: the heater hangs on the board, and no sensor is on one"
+        if self.heater_power > 0 and self.to_c > HOTTEST_HEATED_C:
+            yield (
+                f"procedure.to_c {self.to_c:g} is too hot for the heater, which the board switches off at 70: at most "
+                f"{HOTTEST_HEATED_C:g}"
+            )
+
+
+# By the names of the procedures, which say their sections too but lie above: a file is read without them.
+STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
+    {
+        "six_observation": SixObservationSection,
+        "verify": VerifySection,
+        "static_attitudes": StaticAttitudesSection,
+        "imu": ImuSection,
+        "bias_drift": BiasDriftSection,
+        "by_hand": ByHandSection,
+        "servo_six_observation": ServoSixObservationSection,
+        "thermal": ThermalSection,
+    }
+)
+
+
+def verification_problems(config: RigConfig) -> Iterator[str]:
+    """What a verification lacks: without a reference or without limits it could not pass."""
+    lacking = []
+    if config.reference is None:
+        lacking.append("a sensor with role: reference to compare with")
+    if limits := config.limits.lacking("verification"):
+        lacking.append(" and ".join(limits))
+    if lacking:
+        yield f"a verification needs {', and '.join(lacking)}"

@@ -1,0 +1,63 @@
+"""The section of one stage of a procedure: how the item is mounted then, and what is turned."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from rig.config.section import Section, Vector3
+from rig.config.sensors.sensor_sections import MountingSection, mounting_matrix
+
+Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
+Instruction = Annotated[str, Field(min_length=1, max_length=500)]
+
+
+class StageMountSection(MountingSection):
+    """Which flange axis each axis of the item points along in this stage: a right-handed frame."""
+
+    rotation_deg: Vector3 = Field(
+        default=(0.0, 0.0, 0.0),
+        description="rotation vector, in the item's own axes, by which it is turned beyond that",
+    )
+
+
+class StageSection(Section):
+    """One of a list of stages: the operator mounts the item so, then this is swept and recorded."""
+
+    instruction: Instruction = Field(
+        description="what the operator is to do before this stage, such as `turn the board by 90° about wrist 3`"
+    )
+    sweeps: tuple[Wrist, ...] | None = Field(
+        default=None, min_length=1, max_length=3, description="which wrists are swept in this stage; left out, all"
+    )
+    mount: StageMountSection = Field(
+        default=StageMountSection(), description="how the item is mounted in this stage, nominally"
+    )
+
+    @field_validator("sweeps")
+    @classmethod
+    def each_wrist_once(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
+        """A wrist that stands there twice says nothing more."""
+        if value is not None and len(set(value)) < len(value):
+            raise ValueError("must name each wrist once; procedure.repeats says how often everything is done")
+        return value
+
+
+def mount_matrix(mount: StageMountSection) -> np.ndarray:
+    """(3, 3) rotation that takes a flange-frame vector into the item's frame: row i is the item's axis i.
+
+    The item sits as its axes say and is turned by the rotation vector then: components change by the inverse of that.
+    """
+    matrix: np.ndarray = rotation_by(np.radians(mount.rotation_deg)).T @ mounting_matrix(mount)
+    return matrix
+
+
+def rotation_by(vector_rad: np.ndarray) -> np.ndarray:
+    """(3, 3) the rotation by a rotation vector (3,), v + φ × v for small ones (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(vector_rad))
+    x, y, z = vector_rad
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turned: np.ndarray = (
+        np.eye(3) + np.sinc(angle / np.pi) * cross + np.sinc(angle / 2 / np.pi) ** 2 / 2 * cross @ cross
+    )
+    return turned

@@ -1,0 +1,299 @@
+"""The sections of a sensor: its part and rate, how it is mounted, the port of its own, what of it is known before."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Protocol, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+
+from rig.config.section import RATIO, Positive, Section, Vector3, checked_port
+from rig.config.sensors.lines_section import GAP, LinesSection
+from rig.config.sensors.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
+from rig.config.sensors.mavlink_section import MavlinkSection
+from rig.config.sensors.sensor_catalogue import CATALOGUE, MAGNETOMETERS, PARTS, MagnetometerName, PartName, in_words
+
+AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
+OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
+
+
+def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
+    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
+    axes = {"x": 0, "y": 1, "z": 2}
+    rows = np.zeros((3, 3))
+    for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
+        rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
+    return rows
+
+
+def field_name(sensor: str) -> str:
+    """The name of the magnetometer in the instrument on a port of its own called `sensor`."""
+    return f"{sensor}_field"
+
+
+def scalar_name(sensor: str, scalar: str) -> str:
+    """The name of what has no axes, called `scalar` in the lines of the device called `sensor`."""
+    return f"{sensor}_{scalar}"
+
+
+# The speeds that a KVH 1775 knows, and those that microcontrollers are set to beside them.
+KVH1775_BAUDS = (9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200)
+Baud = Literal[
+    9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 500000, 576000, 921600, 1000000, 1500000, 2000000,
+    3000000, 4147200,
+]  # fmt: skip
+
+
+class OwnPortSection(Section):
+    """The serial port of a sensor that is not on the board, and what it sends there."""
+
+    port: str = Field(
+        min_length=1,
+        max_length=255,
+        description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
+    )
+    baud: Baud = Field(
+        default=921600,
+        description="speed to which the sensor is set; the rig does not change it in the sensor",
+        json_schema_extra={"unit": "Bd"},
+    )
+    message: Literal["A", "B", "C"] = Field(
+        default="B",
+        description="of a `kvh1775`: format of its messages: `B` contains the sensor's own microseconds, which show "
+        "without doubt how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
+        "field, recorded as the magnetometer `<sensor>_field`",
+    )
+    rotation: Literal["delta", "rate"] = Field(
+        default="delta",
+        description="of a `kvh1775`: `delta`: the angle since the message before, without aliasing; `rate`: the rate "
+        "after the sensor's own filter",
+    )
+
+    @field_validator("port")
+    @classmethod
+    def an_address_has_host_and_port(cls, value: str) -> str:
+        """A port as the board's: `socket://host:port` with both."""
+        return checked_port(value)
+
+
+class MountingSection(Section):
+    """The flange axis along which each sensor axis points, as a right-handed frame. A few degrees off do not matter."""
+
+    x: AxisName = Field(default="+x", description="the flange axis along which the sensor's x axis points")
+    y: AxisName = Field(default="+y", description="the flange axis along which the sensor's y axis points")
+    z: AxisName = Field(default="+z", description="the flange axis along which the sensor's z axis points")
+
+    @model_validator(mode="after")
+    def right_handed(self) -> Self:
+        """A mirrored or doubled axis is not a mounting."""
+        if not np.isclose(np.linalg.det(mounting_matrix(self)), 1.0):
+            raise ValueError("must name three different axes that form a right-handed frame, for example +x, +y, +z")
+        return self
+
+
+class TurntableSection(Section):
+    """The reference's own calibration from before: rate = scale · (reading + bias_rad_s)."""
+
+    scale: tuple[Positive, Positive, Positive] = Field(
+        default=(1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
+    )
+    bias_rad_s: Vector3 = Field(default=(0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
+
+
+class AccelerationSection(Section):
+    """The part's accelerometer. Without this section it is not read. Procedures with attitudes calibrate it."""
+
+    range_g: float = Field(
+        description="full scale of the accelerometer, one of the part's ranges",
+        json_schema_extra={**OF_THE_PART, "unit": "g"},
+    )
+
+
+class ConfiguredSensor(Protocol):
+    """What every sensor's section has, whatever it measures; what its part can do is in the catalogue."""
+
+    @property
+    def part(self) -> str: ...
+    @property
+    def serial_number(self) -> str: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def mounting(self) -> MountingSection: ...
+
+
+def checked_serial_number(value: str) -> str:
+    """A serial number that the board can store beside the calibration. Raises ValueError when it could not."""
+    if value == GAP:
+        raise ValueError("nobody but you knows it: write the number of this specimen here")
+    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board can store no others")
+    return value
+
+
+def the_part_has_it(value: float, info: ValidationInfo) -> float:
+    """A rate or range that the part can do, never silently another one."""
+    part = CATALOGUE.get(info.data.get("part", ""))
+    if part is None:
+        return value
+    return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
+
+
+SerialNumber = Annotated[str, AfterValidator(checked_serial_number)]
+OfThePart = Annotated[float, AfterValidator(the_part_has_it)]
+
+
+class SensorSection(Section):
+    """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
+
+    part: PartName = Field(description="which gyroscope it is; `lines` is any that prints its samples as lines")
+    serial_number: SerialNumber = Field(
+        description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
+        "its own, and another number is refused",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+    )
+    role: Literal["calibrate", "reference"] = Field(
+        default="calibrate",
+        description="purpose of the sensor: it is calibrated, or it is the reference with which the others are "
+        "compared; at most one is the reference",
+    )
+    rate_hz: OfThePart = Field(
+        description="samples per second, one of the part's rates; 333.33 means 1000/3", json_schema_extra=OF_THE_PART
+    )
+    range_deg_s: OfThePart = Field(
+        description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
+        json_schema_extra=OF_THE_PART,
+    )
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+    correction: Literal["matrix", "diagonal"] = Field(
+        default="diagonal",
+        description="how the board and `calibration.h` correct readings: `diagonal`, each axis alone, as in the "
+        "paper; `matrix`, with the whole matrix, which also brings the axes to right angles",
+    )
+    turntable: TurntableSection = Field(
+        default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+    )
+    acceleration: AccelerationSection | None = Field(
+        default=None, description="its accelerometer; left out, only the gyroscope is read"
+    )
+    serial: OwnPortSection | None = Field(
+        default=None, description="its own serial port, of a `kvh1775` or `lines`; the other parts are on the board"
+    )
+    mavlink: MavlinkSection | None = Field(
+        default=None, description="the autopilot that the IMU is in, of a `mavlink`; other parts have none"
+    )
+    lines: LinesSection | None = Field(default=None, description="what it prints, of `lines`")
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the board reads it."""
+        return self.own_port is None
+
+    @property
+    def own_port(self) -> tuple[str, str] | None:
+        """The port beside the board's that it answers at, after the key in its section that says so."""
+        if self.serial is not None:
+            return "serial.port", self.serial.port
+        return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
+
+    def brings(self, name: str) -> set[str]:
+        """The names of the other sensors whose readings come by its port, where it is called `name`."""
+        if self.lines is None:
+            return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
+        field = {field_name(name)} if self.lines.field is not None else set()
+        return field | {scalar_name(name, scalar) for scalar in self.lines.scalars}
+
+    @model_validator(mode="before")
+    @classmethod
+    def usual_of_the_part(cls, data: Any) -> Any:
+        """The section with the part's usual data rate and ranges where they are left out."""
+        if not isinstance(data, Mapping):
+            return data
+        name = data.get("part")
+        # A part that is not known is an error of its own, whatever stands in for it here.
+        part = PARTS[name] if isinstance(name, str) and name in PARTS else next(iter(PARTS.values()))
+        if part.any_rate:  # nothing is usual of a part that may be any
+            return data
+        usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
+        whole = {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
+        acceleration = data.get("acceleration")
+        if isinstance(acceleration, Mapping) and acceleration.get("range_g") is None:
+            whole["acceleration"] = {**acceleration, "range_g": part.ranges_g[0]}
+        return whole
+
+    @field_validator("acceleration")
+    @classmethod
+    def a_range_of_its_accelerometer(
+        cls, value: AccelerationSection | None, info: ValidationInfo
+    ) -> AccelerationSection | None:
+        """A range that the part's accelerometer has."""
+        part = PARTS.get(info.data.get("part", ""))
+        if value is None or part is None:
+            return value
+        if part.any_rate:
+            if value.range_g <= 0:
+                raise ValueError("state range_g, the full scale to which its program sets the accelerometer")
+            return value
+        if value.range_g not in part.ranges_g:
+            raise ValueError(f"the part has no range_g {value.range_g:g}; it has {', '.join(map(str, part.ranges_g))}")
+        return value
+
+    @model_validator(mode="after")
+    def its_own_port_carries_it(self) -> Self:
+        """A part has a port of its own or it is on the board."""
+        if self.part == "mavlink" or self.mavlink is not None:
+            return self._in_an_autopilot()
+        own_port = PARTS[self.part].own_port
+        if own_port != (self.serial is not None):
+            raise ValueError(
+                f"{self.part} is {'not on the board: give its section serial' if own_port else 'on the board: leave'}"
+                f"{'' if own_port else ' serial out'}"
+            )
+        if (self.part == "lines") != (self.lines is not None):
+            raise ValueError("part lines and a section lines go together: it says what the device prints")
+        if self.lines is not None and self.acceleration is not None and self.lines.acceleration is None:
+            raise ValueError("its accelerometer is to be read: give lines.acceleration, and the columns ax ay az")
+        if self.serial is not None:
+            if self.part == "kvh1775" and self.serial.baud not in KVH1775_BAUDS:
+                raise ValueError(f"a kvh1775 knows serial.baud {', '.join(map(str, KVH1775_BAUDS))}")
+            size = KVH1775_MESSAGE_BYTES[self.serial.message] if self.lines is None else self.lines.least_bytes
+            problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
+            if problem is not None:
+                raise ValueError(problem)
+        return self
+
+    def _in_an_autopilot(self) -> Self:
+        if self.part != "mavlink":
+            raise ValueError(f"{self.part} is in no autopilot: leave mavlink out")
+        if self.mavlink is None or self.serial is not None:
+            raise ValueError("mavlink is in an autopilot: give its section mavlink, and no serial")
+        return self
+
+    @field_validator("turntable")
+    @classmethod
+    def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
+        """A sensor that is to be calibrated has no calibration yet."""
+        if info.data.get("role") == "calibrate":
+            raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
+        return value
+
+
+class MagnetometerSection(Section):
+    """One magnetometer on the board, under a name that no gyroscope has: recorded, and calibrated in attitudes."""
+
+    part: MagnetometerName = Field(description="which magnetometer it is")
+    serial_number: SerialNumber = Field(
+        description="serial number of this sensor; in every result",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+    )
+    rate_hz: OfThePart = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
+        description="samples per second, one of the part's rates",
+        json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
+    )
+    range_gauss: OfThePart = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss[0],
+        description="full scale, one of the part's ranges; 1 gauss is 100 µT, twice the Earth's field",
+        json_schema_extra={"unit": "gauss", "allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss)},
+    )
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")

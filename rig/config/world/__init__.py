@@ -1,0 +1,1 @@
+"""The `world:` section: what the simulated laboratory simulates."""

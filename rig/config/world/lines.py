@@ -1,0 +1,68 @@
+"""The section of a simulated device that prints lines: its clock, what it prints besides, what it loses."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from rig.config.section import RATIO, Section
+from rig.config.sensors.lines_section import LinesSection
+
+
+class SimulatedLinesSection(Section):
+    """The simulated device that prints lines around its gyroscope. It prints as `sensors.<name>.lines` says."""
+
+    oscillator_ppm: float = Field(default=40.0, ge=-20_000, le=20_000, description="how much too fast its clock runs")
+    uptime_s: float = Field(
+        default=2.0, ge=0, le=1e6, description="how long it has been on; its time starts again at zero after its wrap"
+    )
+    boot_text: tuple[Annotated[str, Field(max_length=200)], ...] = Field(
+        default=("ets Jul 29 2019 12:21:46", "rst:0x1 (POWERON_RESET)", "gyro ok, 1000 dps"),
+        max_length=20,
+        description="lines that it prints when it gets power",
+        json_schema_extra={"usual": "three lines", "allowed": "at most 20 lines"},
+    )
+    comment_every: int = Field(
+        default=0, ge=0, description="after so many samples it prints a comment; `0`: never", json_schema_extra=RATIO
+    )
+    lost_fraction: float = Field(
+        default=0.0, ge=0, le=0.5, description="share of the samples that it does not print", json_schema_extra=RATIO
+    )
+    stolen: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="share of what it prints that another program reads, which has opened the same port",
+        json_schema_extra=RATIO,
+    )
+    bit_error_rate: float = Field(
+        default=0.0, ge=0, le=0.01, description="share of wrong bits on the line", json_schema_extra=RATIO
+    )
+    scalars: dict[str, float] = Field(
+        default={},
+        description="the number that it prints in a column of `lines.scalars`, by its name; left out, 0",
+        json_schema_extra={"unit": "as printed", "allowed": "a number for each name"},
+    )
+    trailing_separator: bool = Field(default=False, description="whether a separator stands behind the last column too")
+    texts: tuple[Annotated[str, Field(max_length=40)], ...] = Field(
+        default=(),
+        max_length=40,
+        description="what it prints in the columns `-`, from left to right, such as a date; left out, 0",
+        json_schema_extra={"usual": "none", "allowed": "at most 40 texts"},
+    )
+    colours: bool = Field(
+        default=False, description="whether codes for colours stand around a line, as of ESP-IDF's log"
+    )
+    temperature_text: str | None = Field(
+        default=None,
+        max_length=20,
+        description="what it prints for its temperature, such as `nan` or `-127.00`; left out, its temperature",
+        json_schema_extra={"usual": "its temperature", "allowed": "at most 20 characters"},
+    )
+    time_decimals: int = Field(
+        default=6, ge=0, le=9, description="decimals of its time, where that is in seconds", json_schema_extra=RATIO
+    )
+    time_in_single: bool = Field(default=False, description="whether its time is a number in single precision")
+    prints: LinesSection | None = Field(
+        default=None, description="what it prints in truth, for tests of what is refused; left out, as the section says"
+    )
+    pty: bool = Field(default=False, description="also offer its port as a pseudo-terminal (POSIX)")

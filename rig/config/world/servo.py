@@ -1,0 +1,51 @@
+"""The `world.servo:` section: what the simulated servo is in truth."""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rig.config.procedures.servo_section import ServoName
+from rig.config.section import RATIO, Section
+
+MILLISECONDS: dict[str, Any] = {"unit": "ms"}
+Error = Annotated[float, Field(ge=0, le=10)]
+
+
+class SimulatedServoSection(Section):
+    """The simulated servo: its encoder, its gear, its line. It runs in real time."""
+
+    model: ServoName | None = Field(
+        default=None,
+        description="which servo it is; another one than `turner.model` is for tests of the refusal",
+        json_schema_extra={"usual": "as `turner.model`"},
+    )
+    firmware: int = Field(default=48, ge=1, le=255, description="version of its firmware", json_schema_extra=RATIO)
+    start_deg: float = Field(default=150.0, ge=0, lt=360, description="where its shaft stands at first")
+    encoder_once_deg: Error = Field(
+        default=1.0, description="amplitude of the encoder's error that comes once per turn"
+    )
+    encoder_twice_deg: Error = Field(
+        default=0.3, description="amplitude of the encoder's error that comes twice per turn"
+    )
+    encoder_noise_deg: Error = Field(default=0.06, description="standard deviation of one reading")
+    backlash_deg: Error = Field(default=0.25, description="play of the gear")
+    ripple_fraction: float = Field(
+        default=0.07, ge=0, lt=0.5, description="amplitude of the gear's ripple over the rate", json_schema_extra=RATIO
+    )
+    ripple_per_turn: int = Field(
+        default=20, ge=1, le=200, description="how many times the ripple comes in one turn", json_schema_extra=RATIO
+    )
+    lag_ms: float = Field(
+        default=15.0, ge=0, le=200, description="how late the shaft follows", json_schema_extra=MILLISECONDS
+    )
+    tick_ppm: float = Field(default=3000.0, ge=-20_000, le=20_000, description="how much too fast its own clock runs")
+    fall_deg_s: float = Field(
+        default=0.0, ge=-360, le=360, description="how fast the shaft falls with torque off; 0 where it is balanced"
+    )
+    latency_ms: float = Field(
+        default=0.0,
+        ge=0,
+        le=50,
+        description="the adapter hands on what came this often; 0: at once",
+        json_schema_extra=MILLISECONDS,
+    )

@@ -1,0 +1,1 @@
+"""What `result.json` says of each kind of result."""

@@ -1,0 +1,126 @@
+"""What `result.json` says of accelerometers."""
+
+from rig.data.entries.budget import BudgetEntry
+from rig.data.entries.result_types import (
+    ConditionsEntry,
+    DetectionLimitEntry,
+    Entry,
+    ErrorEntry,
+    Freedom3,
+    Matrix3,
+    Matrix6,
+    Method,
+    PlacementEntry,
+    PositiveVector3,
+    Role,
+    Vector3,
+)
+
+
+class AccelerationSolutionEntry(Entry):
+    """The solution of one method from the dwells alone."""
+
+    method: str
+    scale: PositiveVector3
+    bias_m_s2: Vector3
+    matrix: Matrix3
+    rank: int
+    condition: float
+
+
+class DwellEntry(Entry):
+    """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
+
+    `residual_std_m_s2` is what the solve expects that to scatter by, null in results of before. `attitude` takes a
+    vector of the arm's base frame into the flange's.
+    """
+
+    index: int
+    name: str
+    attitude: Matrix3
+    mean_m_s2: Vector3
+    mean_std_m_s2: Vector3
+    noise_m_s2: Vector3
+    residual_m_s2: Vector3
+    samples: int
+    duration_s: float
+    temperature_c: float | None = None
+    residual_std_m_s2: Vector3 | None = None
+
+
+class ValidationEntry(Entry):
+    """The last repeat of the attitudes, which the calibration does not know: size of acceleration less gravity."""
+
+    dwells: int
+    rms_m_s2: float
+    max_m_s2: float
+
+
+class AlignmentEntry(Entry):
+    """The small rotation vector that takes the gyroscope's frame into the accelerometer's beside it."""
+
+    rotation_rad: Vector3
+    std_rad: Vector3
+
+
+class AccelerometerEntry(Entry):
+    """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
+
+    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
+      says what makes it up; null in results of before there was one. `gravity_m_s2` is what the scale is relative to.
+    - With its `nonlinearity` in the `budget`, `scale` is that of the readings at 1 g up and 1 g down, `bias_m_s2` the
+      reading at 0 g, whatever curve the sensor has between.
+    - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
+      attitudes are off about each axis, by the readings' own account.
+    - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
+      the gyroscope, are there where sweeps were made.
+    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `conditions`: when scale and bias were read, and how warm it was then; `temperature_c` is that
+      temperature, in results of before the mean over the dwells.
+    - `…_degrees_of_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
+    - `placement`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
+    - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
+      matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
+    """
+
+    part: str
+    serial_number: str
+    range_m_s2: float | None = None
+    role: Role
+    model: str
+    estimator: Method
+    gravity_m_s2: float
+    scale: PositiveVector3
+    bias_m_s2: Vector3
+    covariance: Matrix6
+    covariance_order: tuple[str, ...]
+    covariance_units: tuple[str, ...]
+    matrix: Matrix3
+    non_orthogonality_rad: Vector3
+    non_orthogonality_std_rad: Vector3
+    second_order_s2_m: Vector3 | None
+    second_order_std_s2_m: Vector3 | None
+    reference_m_s2: Vector3
+    attitude_error_rad: float | None
+    attitude_error_std_rad: float | None
+    lever_arm_m: Vector3 | None
+    lever_arm_std_m: Vector3 | None
+    delay_s: float | None
+    delay_std_s: float | None
+    alignment: AlignmentEntry | None
+    dwells: tuple[DwellEntry, ...]
+    sweeps: int
+    rank: int
+    condition: float
+    temperature_c: float | None
+    correction_matrix: Matrix3
+    other_methods: dict[str, AccelerationSolutionEntry | ErrorEntry]
+    validation: ValidationEntry | None
+    warnings: tuple[str, ...]
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None
+    conditions: ConditionsEntry | None = None
+    non_orthogonality_degrees_of_freedom: Freedom3 | None = None
+    second_order_degrees_of_freedom: Freedom3 | None = None
+    detection_limits: tuple[DetectionLimitEntry, ...] = ()
+    placement: PlacementEntry | None = None

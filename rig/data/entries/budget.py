@@ -1,0 +1,97 @@
+"""The uncertainty's part of `result.json`."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from rig.data.entries.result_types import Entry, Vector6
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR, covered
+
+IN_U = "how well is in u"  # ends the source of what was found, and of which no degrees of freedom are left to count
+# Infinite degrees of freedom are null.
+Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
+
+
+class ContributorEntry(Entry):
+    """One line of the budget; `half_width` in `unit` is null where it was measured.
+
+    Of a normal distribution it is the expanded uncertainty (k = 2) that somebody stated.
+    `std` and `variance_fraction` (of the variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
+    """
+
+    name: str
+    kind: Literal["A", "B"]
+    distribution: Literal["normal", "rectangular"]
+    half_width: float | None
+    unit: str
+    source: str
+    degrees_of_freedom: float | None
+    std: Vector6
+    variance_fraction: Vector6
+
+
+class BudgetEntry(Entry):
+    """What makes up `covariance_combined`; `expanded` is `coverage_factors` × `std`.
+
+    These are Student's t of the effective `degrees_of_freedom`, so that each interval holds the true value with its
+    part of `coverage_probabilities`. `coverage_factor` is the largest of them: in results of before all are that one,
+    and it alone stands there.
+    """
+
+    contributors: tuple[ContributorEntry, ...]
+    std: Vector6
+    coverage_factor: float
+    expanded: Vector6
+    degrees_of_freedom: Freedom6
+    coverage_factors: Vector6 | None = None
+    coverage_probabilities: Vector6 | None = None
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Coverage factor k of each parameter."""
+        return self.coverage_factors or (self.coverage_factor,) * 6
+
+    @property
+    def known(self) -> tuple[float, ...]:
+        """Effective degrees of freedom of each, infinite ones too."""
+        return tuple(math.inf if each is None else each for each in self.degrees_of_freedom)
+
+    @property
+    def probabilities(self) -> tuple[float, ...]:
+        """Probability with which each U covers the true value; of results of before by Student's t as well."""
+        return self.coverage_probabilities or tuple(covered(self.factors, self.known).tolist())
+
+
+def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
+    """(6,) U of scale and bias, by the budget; without one, two standard deviations by the solution's covariance."""
+    if budget is not None:
+        return budget.expanded
+    return [COVERAGE_FACTOR * covariance[i][i] ** 0.5 for i in range(len(covariance))]
+
+
+class BiasProcessEntry(Entry):
+    """How the bias wandered: a mean over `averaging_time_s`; an hour changes it by `hour_std_rad_s` (1σ)."""
+
+    random_walk_rad_s_sqrt_s: float
+    scatter_rad_s: float
+    degrees_of_freedom: int
+    averaging_time_s: float
+    hour_std_rad_s: float
+
+
+class ClockComparisonEntry(Entry):
+    """The controller's clock against another."""
+
+    clock: str
+    error: float
+    std: float
+
+
+class ClockEntry(Entry):
+    """How much too fast the controller's clock ran, a fraction, and by what it is known; speeds are corrected."""
+
+    error: float
+    std: float
+    comparisons: tuple[ClockComparisonEntry, ...]

@@ -1,0 +1,193 @@
+"""What `result.json` says of magnetometers."""
+
+import json
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import Field
+
+from rig.data.checked import read_document
+from rig.data.entries.budget import BudgetEntry
+from rig.data.entries.result_types import (
+    ConditionsEntry,
+    DetectionLimitEntry,
+    Entry,
+    ErrorEntry,
+    Freedom3,
+    Matrix3,
+    Matrix6,
+    Method,
+    PlacementEntry,
+    PositiveVector3,
+    Utc,
+    Vector3,
+)
+
+REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
+
+
+class FieldSolutionEntry(Entry):
+    """The solution of one method."""
+
+    method: str
+    scale: PositiveVector3
+    bias_t: Vector3
+    matrix: Matrix3
+    rank: int
+    condition: float
+
+
+class FieldDwellEntry(Entry):
+    """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
+
+    `residual_std_t` is what the solve expects that to scatter by, null in results of before. `attitude` takes a vector
+    of the arm's base frame into the flange's.
+    """
+
+    index: int
+    name: str
+    attitude: Matrix3
+    mean_t: Vector3
+    mean_std_t: Vector3
+    noise_t: Vector3
+    residual_t: Vector3
+    samples: int
+    duration_s: float
+    residual_std_t: Vector3 | None = None
+
+
+class UniformityEntry(Entry):
+    """Whether the field was the same in all attitudes: χ² of the residuals, and `limit`, what noise rarely makes it.
+
+    `attitude_error_rad` is what the attitudes were allowed to be off about each axis, by the accelerometer's account.
+    """
+
+    chi_square: float
+    degrees_of_freedom: int
+    limit: float
+    attitude_error_rad: float
+
+
+class FieldDriftEntry(Entry):
+    """The largest change of the readings between two tests in one attitude, its σ, its χ², and what noise rarely makes
+    that."""
+
+    change_t: Vector3
+    std_t: Vector3
+    chi_square: float
+    limit: float
+
+
+class MagnetometerEntry(Entry):
+    """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
+
+    - It is that of the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
+      `hard_iron_t` is F⁻¹ b. No limit of the verdict judges it.
+    - `arm_field_in_bias`: the arm's own field, as far as it turns with the flange, is in the bias, and no residual
+      shows it. Runs with the sensor turned over tell them apart (`rig reversal`).
+    - `extension_m` is where it sits on the flange, `uniformity` whether the field was the same in all attitudes,
+      `drift` whether it stayed the same, null where it was not tested.
+    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
+      says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
+    - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
+      about each axis, by the readings' own account.
+    - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `conditions`: when scale and bias were read; `non_orthogonality_degrees_of_freedom` are null where they have no
+      end.
+    - `placement`: where a file told the attitudes, and no arm held them; nobody told its range then.
+    - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
+    """
+
+    part: str
+    serial_number: str
+    range_t: float | None = None
+    model: str
+    estimator: Method
+    arm_field_in_bias: bool = True
+    extension_m: Vector3 = (0.0, 0.0, 0.0)
+    uniformity: UniformityEntry | None = None
+    drift: FieldDriftEntry | None = None
+    field_t: float
+    scale: PositiveVector3
+    bias_t: Vector3
+    covariance: Matrix6
+    covariance_order: tuple[str, ...]
+    covariance_units: tuple[str, ...]
+    matrix: Matrix3
+    hard_iron_t: Vector3
+    non_orthogonality_rad: Vector3
+    non_orthogonality_std_rad: Vector3
+    field_base_t: Vector3
+    attitude_error_rad: float | None
+    attitude_error_std_rad: float | None
+    dwells: tuple[FieldDwellEntry, ...]
+    rank: int
+    condition: float
+    correction_matrix: Matrix3
+    other_methods: dict[str, FieldSolutionEntry | ErrorEntry]
+    warnings: tuple[str, ...]
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None
+    conditions: ConditionsEntry | None = None
+    non_orthogonality_degrees_of_freedom: Freedom3 | None = None
+    detection_limits: tuple[DetectionLimitEntry, ...] = ()
+    placement: PlacementEntry | None = None
+
+
+class AsMountedEntry(Entry):
+    """One run of a reversal: how the sensor was mounted, and the bias found so, with the arm's field in it."""
+
+    run: str
+    started_utc: Utc
+    mounting: Matrix3
+    bias_t: Vector3
+    bias_std_t: Vector3
+    field_base_t: Vector3
+
+
+class ReversalEntry(Entry):
+    """A magnetometer's bias and the arm's field, told apart by turning the sensor over.
+
+    - `bias_t` is the sensor's own, but on an axis that was never turned over: `arm_field_in_bias` is true there, and it
+      is the bias as mounted.
+    - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
+    - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
+    - `scale` and `correction_matrix` are the means of the runs'. `…_degrees_of_freedom` are those of the standard
+      deviations of that name, null where they have no end; files of before do not count them.
+    """
+
+    part: str
+    serial_number: str
+    scale: PositiveVector3
+    scale_std: Vector3
+    bias_t: Vector3
+    bias_std_t: Vector3
+    arm_field_in_bias: tuple[bool, bool, bool]
+    arm_field_t: Vector3
+    arm_field_std_t: Vector3
+    covariance: Matrix6
+    correction_matrix: Matrix3
+    chi_square: float
+    degrees_of_freedom: int
+    limit: float
+    runs: tuple[AsMountedEntry, ...]
+    scale_degrees_of_freedom: Freedom3 | None = None
+    bias_degrees_of_freedom: Freedom3 | None = None
+    arm_field_degrees_of_freedom: Freedom3 | None = None
+
+
+class ReversalDocument(Entry):
+    """What `rig reversal` finds, by magnetometer, of schema "rig.reversal/1"."""
+
+    schema_name: Literal["rig.reversal/1"] = Field(alias="schema")
+    magnetometers: dict[str, ReversalEntry]
+
+    def text(self) -> str:
+        """The document as JSON."""
+        return json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
+
+
+def read_reversal(path: Path) -> ReversalDocument:
+    """What `rig reversal … --out` wrote. Raises Refused `no_result`, `not_a_result`."""
+    remedy = "Give the file of `rig reversal RUN RUN --out FILE`"
+    return read_document(ReversalDocument, path, REVERSAL_MAX_BYTES, what="a reversal", remedy=remedy)

@@ -1,0 +1,69 @@
+"""What `result.json` says of a calibration over temperature."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from rig.data.entries.result_types import Covariance, Entry, Freedom, Vector2, Vector3, Vector6
+
+Cubic = Annotated[tuple[Vector3, ...], Field(min_length=4, max_length=4)]
+
+
+class TemperatureContributorEntry(Entry):
+    """What makes up the uncertainty; `std` is that of kx ky kz bx by bz at the reference temperature."""
+
+    name: str
+    kind: Literal["A", "B"]
+    distribution: Literal["normal", "rectangular"]
+    source: str
+    degrees_of_freedom: Freedom
+    std: Vector6
+
+
+class AtTemperatureEntry(Entry):
+    """Scale and bias at a temperature, with their expanded uncertainties."""
+
+    temperature_c: float
+    scale: Vector3
+    bias: Vector3
+    expanded_scale: Vector3
+    expanded_bias: Vector3
+
+
+class OverTemperatureEntry(Entry):
+    """Scale and bias of one quantity of a sensor: Σ coefficient (T − reference)ⁿ, n from 0 to 3, in SI units per Kⁿ.
+
+    The bias has the sign that it has in the calibration, and its `unit`. Both hold in `range_c` and nowhere else, by
+    the part's own thermometer, in `table` from one end to the other. `orders` are those that the readings call for, of
+    scale and bias; `covariance` (24, 24) is in the order scale n = 0 x y z, n = 1 x y z, …, then the bias. `hysteresis`
+    is how far a warming sensor is from the middle of warming and cooling, where that is largest, null if it did not go
+    both ways: then it is not in the uncertainty. `lag_s` is by how much the thermometer is behind.
+    """
+
+    part: str
+    serial_number: str
+    full_scale: float | None
+    unit: str
+    reference_c: float
+    range_c: Vector2
+    orders: tuple[int, int]
+    scale: Cubic
+    bias: Cubic
+    covariance: Covariance
+    contributors: tuple[TemperatureContributorEntry, ...]
+    table: tuple[AtTemperatureEntry, ...]
+    lag_s: float
+    lag_std_s: float
+    hysteresis: Vector6 | None
+    hysteresis_std: Vector6 | None
+    repeats: int
+
+    def at(self, temperature_c: float) -> tuple[Vector3, Vector3]:
+        """Scale and bias at a temperature, wherever it is."""
+        powers = [(temperature_c - self.reference_c) ** n for n in range(4)]
+
+        def value(cubic: Cubic) -> Vector3:
+            x, y, z = (sum(power * each[i] for power, each in zip(powers, cubic, strict=True)) for i in range(3))
+            return x, y, z
+
+        return value(self.scale), value(self.bias)

@@ -1,0 +1,111 @@
+"""Reads one file as a process: `python -m rig.data.processes.reading_child`, with a request as JSON on stdin.
+
+Writes what the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a dict, an array
+in NumPy's format. What cannot be read ends in one line on stderr and a `Status`.
+"""
+
+import errno
+import io
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn
+
+import numpy as np
+
+from rig.data.processes.reading_process import Part, Status
+from rig.errors import Refused
+
+_SIGNAL_AT_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of prctl(2)
+
+
+def _main() -> NoReturn:
+    request = json.load(sys.stdin)
+    limits: Mapping[str, Any] = request["limits"]
+    _end_with_parent()
+    written_bytes = _limit(limits)
+    try:
+        with _output() as out:
+            for part in _read(request):
+                out.write(_encoded(part))
+    except Refused as refused:
+        _end(Status.REFUSED, json.dumps(refused.problem))
+    except MemoryError:
+        _end(Status.NO_MEMORY)
+    except Exception as error:  # of whatever kind: what a file is damaged into is up to chance
+        code = error.errno if isinstance(error, OSError) else None
+        if code == errno.EFBIG and written_bytes == limits["written_bytes"]:
+            _end(Status.TOO_LONG)
+        if code in (errno.EFBIG, errno.ENOSPC, errno.EDQUOT):
+            _end(Status.NO_ROOM, str(error))
+        _end(Status.UNREADABLE, " ".join(str(error).split()).rstrip(".") or type(error).__name__)
+    _end(Status.READ)
+
+
+def _output() -> BinaryIO:
+    """Return what stdout was, which from now on is nowhere: libraries print what they think of a file."""
+    out = os.fdopen(os.dup(1), "wb")
+    with Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    return out
+
+
+def _read(request: Mapping[str, Any]) -> Iterator[Part]:
+    module, _, function = request["reader"].partition(":")
+    parts: Iterator[Part] = getattr(import_module(module), function)(Path(request["path"]), **request["arguments"])
+    return parts
+
+
+def _encoded(part: Part) -> bytes:
+    if isinstance(part, dict):
+        return json.dumps(part).encode() + b"\n"
+    encoded = io.BytesIO()
+    np.save(encoded, part, allow_pickle=False)
+    return encoded.getvalue()
+
+
+def _end_with_parent() -> None:
+    """Let the system kill this process as soon as nobody waits for it any more; Ctrl-C is for whoever does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(_SIGNAL_AT_PARENTS_DEATH, signal.SIGKILL)
+
+
+def _limit(limits: Mapping[str, Any]) -> int | None:
+    """Let this process take no more than the limits; return how long a file may be that it writes."""
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return None
+    processor_s = int(limits["processor_s"]) + 1
+    _lower(resource.RLIMIT_CORE, 0)
+    _lower(resource.RLIMIT_AS, limits["memory_bytes"])
+    _lower(resource.RLIMIT_CPU, processor_s)
+    return _lower(resource.RLIMIT_FSIZE, limits["written_bytes"])
+
+
+def _lower(what: int, limit: int) -> int:
+    """Lower a limit of this process, unless it is lower already; return what it is then."""
+    import resource
+
+    soft, hard = resource.getrlimit(what)
+    limit = min(limit, *(each for each in (soft, hard) if each != resource.RLIM_INFINITY), limit)
+    resource.setrlimit(what, (limit, hard))
+    return limit
+
+
+def _end(status: Status, why: str = "") -> NoReturn:
+    """End without closing what is open: HDF5 may not close what it could not open."""
+    sys.stderr.write(why + "\n" if why else "")
+    sys.stderr.flush()
+    os._exit(status)
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,222 @@
+"""Reads a file that somebody else made in a process of its own, within limits of memory, time and room.
+
+A library may not come back from a damaged file, a few bytes may unpack to gigabytes, and nothing in a process can end
+that, no signal either. So a file is read where it can be ended from outside (`rig.data.processes.reading_child`), and
+only what was read whole reaches the rig. Whatever this program reads from others goes this way: recordings, bags, logs,
+tables.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from itertools import islice
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
+from rig.data.processes.silence import Silence
+from rig.errors import Refused
+from rig.errors.quoting import printable
+
+Part = dict[str, Any] | NDArray[Any]
+Reader = Callable[..., Iterator[Part]]
+
+MOST_FILES = 10_000  # in a folder: a bag is split into one for every minute or gigabyte
+MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
+SPARE_BYTES = 32_000_000  # … and what a small file may come to
+MEMORY_BYTES, MEMORY_TIMES_STORED = 320 << 20, 2  # address space: half of the first are the libraries
+PROCESSOR_S, PROCESSOR_S_PER_BYTE = 8.0, 1e-6  # a slow computer reads 3 MB of readings a second, packed 1 MB
+IDLE_TIMES_PROCESSOR = 1.5  # how long it may take in all where nothing else keeps the processor busy
+TICK_S, GONE_S = 0.1, 1.0
+SPARED = 6  # at most so many times that, when the reading process gets no processor
+# A file that somebody made loads no plugin of HDF5; and threads for linear algebra reserve memory by gigabytes.
+ENVIRONMENT = {f"{each}_NUM_THREADS": "1" for each in ("OPENBLAS", "OMP", "MKL")} | {"HDF5_PLUGIN_PRELOAD": "::"}
+COMPLAINT_BYTES = 65_536
+LONGEST_REASON = 300  # characters
+OUT_OF_TIME = getattr(signal, "SIGXCPU", None)  # which the system sends to a process that has used up its time
+
+
+class Status(IntEnum):
+    """How a reading process ends."""
+
+    READ = 0
+    UNREADABLE = 1
+    NO_ROOM = 2
+    REFUSED = 3
+    NO_MEMORY = 4
+    TOO_LONG = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingLimits:
+    """What a process that reads a file may take.
+
+    `memory_bytes` of address space; `processor_s` on a processor, and `idle_s` altogether; `written_bytes` for each
+    file that it writes, of what it read and of what it unpacked.
+    """
+
+    memory_bytes: int
+    processor_s: float
+    idle_s: float
+    written_bytes: int
+
+
+class UnreadableFile(Exception):
+    """Why a file was not read, as the end of the sentence that names it."""
+
+
+class CostlyFile(UnreadableFile):
+    """A file that takes more to be read than one of its size may."""
+
+
+def limits_for(stored_bytes: int) -> ReadingLimits:
+    """Return what may be taken to read a file, or a folder of files, of that size on the disk."""
+    processor_s = PROCESSOR_S + PROCESSOR_S_PER_BYTE * stored_bytes
+    return ReadingLimits(
+        memory_bytes=MEMORY_BYTES + MEMORY_TIMES_STORED * stored_bytes,
+        processor_s=processor_s,
+        idle_s=IDLE_TIMES_PROCESSOR * processor_s,
+        written_bytes=SPARE_BYTES + MAX_UNPACKED * stored_bytes,
+    )
+
+
+def stored_bytes(path: Path) -> int:
+    """Return the size on the disk of a regular file, or of the files side by side in a folder.
+
+    Raise `UnfitFile` for a pipe, a device, a socket, a file that is mostly a hole, and a folder of too many files;
+    OSError as `open` does.
+    """
+    if not path.is_dir():
+        return _stored_in_file(path)
+    with os.scandir(path) as entries:
+        files = [entry.name for entry in islice(entries, MOST_FILES + 1) if not entry.is_dir()]
+    if len(files) > MOST_FILES:
+        raise UnfitFile(f"it holds more than {MOST_FILES} files")
+    return sum(_stored_in_file(path / name, f"{name!r:.60}") for name in files)
+
+
+def _stored_in_file(path: Path, called: str = "it") -> int:
+    try:
+        with open_regular_file(path, RECORDING_MAX_BYTES) as file:
+            size, stored = os.fstat(file.fileno()).st_size, size_without_holes(file)
+    except UnfitFile as error:
+        raise UnfitFile(str(error).replace("it ", f"{called} ", 1)) from None
+    if size > MAX_UNPACKED * stored + SPARE_BYTES:
+        raise UnfitFile(f"{called} swells {stored} bytes to {size}")
+    return stored
+
+
+def size_without_holes(file: BinaryIO) -> int:
+    """Return the size of an open file without its holes, which take no room; its size if the system does not tell."""
+    size = os.fstat(file.fileno()).st_size
+    if not hasattr(os, "SEEK_DATA"):
+        return size
+    stored = end = 0
+    while end < size:
+        try:
+            start = os.lseek(file.fileno(), end, os.SEEK_DATA)
+        except OSError:  # no more data
+            break
+        end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
+        stored += end - start
+    os.lseek(file.fileno(), 0, os.SEEK_SET)
+    return stored
+
+
+def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
+    """Return the parts that a `reader` ("module:function") yields of a file, called with its path and `arguments`.
+
+    The arguments are such as JSON has. Raise `UnreadableFile` for what cannot be read, `CostlyFile` for what goes
+    beyond the limits; Refused `temporary_folder_full`, and as the reader does.
+    """
+    request = {"reader": reader, "path": str(path), "arguments": arguments, "limits": asdict(limits)}
+    # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
+    command = [sys.executable, "-P", "-m", "rig.data.processes.reading_child"]
+    with ExitStack() as stack:
+        try:
+            told, out = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+            room = stack.enter_context(tempfile.TemporaryDirectory(prefix="rig-reads-", ignore_cleanup_errors=True))
+            told.write(json.dumps(request).encode())
+            told.seek(0)
+        except OSError as error:
+            raise _no_room(path, str(error)) from error
+        environment = {**os.environ, **ENVIRONMENT, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        environment |= dict.fromkeys(("TMPDIR", "SQLITE_TMPDIR"), room)
+        reading = subprocess.Popen(command, stdin=told, stdout=out, stderr=subprocess.PIPE, env=environment)
+        try:
+            complaint = _awaited(reading, limits.idle_s)
+        except TimeoutError:
+            raise CostlyFile(f"no end of it was found in {limits.idle_s:.0f} s") from None
+        finally:
+            _end(reading)
+        if reading.returncode == Status.NO_ROOM:
+            raise _no_room(path, complaint.decode(errors="replace").strip())
+        _raise_failure(reading.returncode, complaint, limits)
+        out.seek(0)
+        return list(_parts(out))
+
+
+def _awaited(reading: "subprocess.Popen[bytes]", idle_s: float) -> bytes:
+    """Return what the process wrote to stderr, once it has ended. Raise TimeoutError.
+
+    What a library does not come back from it may sleep in, so its time on a processor alone would not tell; a process
+    that waits for a processor, or for the disk, does not sleep.
+    """
+    silent = Silence(reading.pid, spared=SPARED)
+    while not silent.lasts_over(idle_s / TICK_S):
+        try:
+            return reading.communicate(timeout=TICK_S)[1]
+        except subprocess.TimeoutExpired:
+            silent.tick()
+    raise TimeoutError
+
+
+def _end(reading: "subprocess.Popen[bytes]") -> None:
+    """End the process, and wait until it is gone: for one that a dead disk holds no longer than a signal may take."""
+    reading.kill()
+    with suppress(subprocess.TimeoutExpired):
+        reading.wait(GONE_S)
+    if reading.stderr is not None:
+        reading.stderr.close()
+
+
+def _raise_failure(status: int, complaint: bytes, limits: ReadingLimits) -> None:
+    """Raise as `read_apart` if the status says that the file was not read."""
+    if status == Status.READ:
+        return
+    lines = complaint[-COMPLAINT_BYTES:].decode(errors="replace").strip().splitlines()
+    why = printable(lines[-1]) if lines else "reading it ended the process that read it"
+    if status == Status.REFUSED:
+        raise Refused(*json.loads(lines[-1]))
+    if status == Status.NO_MEMORY:
+        raise CostlyFile(f"it takes more than {limits.memory_bytes >> 20} MiB of memory to be read")
+    if status == Status.TOO_LONG:
+        raise CostlyFile(f"what is packed in it is longer than {limits.written_bytes // 1_000_000} MB")
+    if -status == OUT_OF_TIME:
+        raise CostlyFile(f"it takes more than {limits.processor_s:.0f} s of a processor to be read")
+    raise UnreadableFile(why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}…")
+
+
+def _no_room(path: Path, why: str) -> Refused:
+    return Refused(
+        "temporary_folder_full",
+        f"{tempfile.gettempdir()} has no room for what {path} holds ({why})",
+        "Make room there, or name another folder in the environment variable TMPDIR",
+    )
+
+
+def _parts(out: Any) -> Iterator[Part]:
+    """Yield what the process wrote: a line of JSON, or an array in NumPy's format, one after the other."""
+    while start := out.read(1):
+        out.seek(-1, os.SEEK_CUR)
+        yield json.loads(out.readline()) if start == b"{" else np.load(out)

@@ -1,0 +1,161 @@
+"""Takes a run file apart, in a process of its own (`rig.data.processes.reading_process`).
+
+What it yields: a header (schema, texts, descriptions of the sensors), then the arrays: each sensor's samples, the
+turner's states, events, and the tables of readings from elsewhere.
+Rows are of plain numbers; whether of those that the texts describe is for whoever reads them to judge, for here only
+what this takes is imported.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.processes.reading_process import MAX_UNPACKED, ReadingLimits, size_without_holes
+from rig.data.recording.schema import SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS
+
+OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
+MAX_SENSORS = 64
+MAX_COLUMNS = 40  # of states: times, joints, and 32 fields
+LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
+MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
+MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
+LIBRARIES_BYTES = 1 << 29  # of memory, and more than the libraries and the structures of any file take
+
+
+def limits_of_run(stored_bytes: int, time_s: float) -> ReadingLimits:
+    """Return what may be taken to read a run file: a packed piece need not be as long as it says."""
+    rows_bytes = MAX_UNPACKED * stored_bytes + MAX_UNWRITTEN_BYTES
+    return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
+
+
+def contents(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
+    """Yield the contents of a run file, header first. Raise ValueError with the reason, whatever h5py raises."""
+    try:
+        yield from extract(path)
+    except Exception as error:  # of whatever kind: what it is damaged into is up to chance
+        raise ValueError(reason(error)) from error
+
+
+def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
+    """The contents of a run file, header first. Raises OSError, ValueError and whatever else h5py does."""
+    import h5py
+
+    # A plain open refuses a file whose writer was killed; an SWMR reader trusts one that is cut short, and waits for
+    # torn metadata to become whole. So each where it belongs.
+    mode = {"libver": "latest", "swmr": True} if _left_open(path) else {}
+    with h5py.File(path, "r", **mode) as file:
+        schema = _text(file, "schema")
+        if schema not in TEXTS:
+            raise ValueError(f"its schema is {schema!r:.60}; this version of the rig reads {SCHEMA!r}")
+        texts = {name: _text(file, name) for name in TEXTS[schema]}
+        elsewhere = schema == SCHEMA_ELSEWHERE
+        group = {} if elsewhere else _member(file, "samples", h5py.Group)
+        if len(group) > MAX_SENSORS:
+            raise ValueError(f"it announces {len(group)} sensors")
+        samples = {name: _member(group, name, h5py.Dataset) for name in group}
+        described = {name: {key: _plain(value) for key, value in each.attrs.items()} for name, each in samples.items()}
+        named = ("states", "events", *(TABLES if elsewhere else ()))
+        rows = {f"samples/{name}": each for name, each in samples.items()}
+        rows |= {name: _member(file, name, h5py.Dataset) for name in named}
+        for name, dataset in rows.items():
+            _check(dataset, name)
+        _refuse_endless(path, sum(int(dataset.nbytes) for dataset in rows.values()))
+        yield {
+            "schema": schema,
+            "texts": texts,
+            "described": described,
+        }
+        for dataset in rows.values():
+            yield dataset[:]
+
+
+def reason(error: Exception) -> str:
+    """Why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
+    if isinstance(error, OSError) and error.filename is not None:
+        error = OSError(error.strerror)  # whoever tells it names the file
+    text = " ".join(str(error).split())
+    if cut := re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", text):
+        return f"it is cut short: {cut[1]} of its {cut[2]} bytes are there"
+    if "file signature not found" in text:
+        return "it is not an HDF5 file"
+    if "checksum" in text:
+        return f"it is damaged: {text}"
+    if isinstance(error, MemoryError) or "filter returned failure" in text or "memory allocation failed" in text:
+        return "its rows cannot be unpacked: they are damaged, or more than they are said to be"
+    if "required filter" in text or "filter plugins disabled" in text:
+        return "its rows are packed by a filter that is none of the HDF5 library's own"
+    system = re.search(r"error message = '([^']*)'", text)
+    return system[1] if system else text or type(error).__name__
+
+
+def _left_open(path: Path) -> bool:
+    """Whether somebody writes the file, or was killed while he did."""
+    with path.open("rb") as file:
+        start = file.read(12)
+    return len(start) == 12 and start[8] >= 3 and bool(start[11] & OPEN_FOR_WRITING)
+
+
+def _member(group: Any, name: str, kind: type) -> Any:
+    """A group or dataset that lies in this very file."""
+    import h5py
+
+    if (link := group.get(name, getlink=True)) is None:
+        raise ValueError(f"it has no {name}")
+    if not isinstance(link, h5py.HardLink):
+        raise ValueError(f"{name} is a link to somewhere else")
+    member = group[name]
+    if not isinstance(member, kind):
+        raise ValueError(f"{name} is not a {kind.__name__.lower()}")
+    return member
+
+
+def _check(dataset: Any, name: str) -> None:
+    """Raises ValueError unless it holds rows of numbers, for which there is room in the file."""
+    if dataset.is_virtual or dataset.external:  # first: to tell the shape of the former, the library opens the others
+        raise ValueError(f"the rows of {name} lie somewhere else")
+    columns = [dataset.dtype[each] for each in dataset.dtype.names or ()] or [dataset.dtype]
+    if dataset.ndim != 1 or len(columns) > MAX_COLUMNS or any(each.base.kind not in "iuf" for each in columns):
+        raise ValueError(f"{name} holds {dataset.dtype!s:.200} in {dataset.ndim} dimensions, not rows of numbers")
+    stored = _stored_rows(dataset)
+    if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
+        raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
+
+
+def _refuse_endless(path: Path, unpacked: int) -> None:
+    """Raises ValueError for what would not fit a computer, though it fits an e-mail: packed, or full of holes."""
+    with path.open("rb") as file:
+        stored = size_without_holes(file)
+    for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
+        if size > MAX_UNPACKED * stored + MAX_UNWRITTEN_BYTES:
+            raise ValueError(f"{what} {stored} bytes to {size}")
+
+
+def _stored_rows(dataset: Any) -> int:
+    """Number of rows that the file has room for, at most."""
+    if dataset.chunks is None:
+        return int(dataset.id.get_storage_size() // dataset.dtype.itemsize)
+    return int(dataset.id.get_num_chunks() * dataset.chunks[0])
+
+
+def _text(file: Any, name: str) -> str:
+    value = _plain(file.attrs.get(name))
+    if not isinstance(value, str):
+        raise ValueError(f"its {name} is not a text")
+    if not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
+        raise ValueError(f"its {name} is not UTF-8")
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encoded`.
+
+    Raises ValueError for one that no run file has.
+    """
+    size = getattr(value, "size", 1) or 0  # an attribute of nothing has None
+    if size > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
+        raise ValueError("an attribute of it is longer than any a run has")
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -1,0 +1,146 @@
+"""What was measured with what: recorded beside the measurement, and part of every result."""
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from firmware_host.answers import BoardIdentity, StoredCalibration
+from rig.config.load import Loaded
+from rig.data.absent import NO_ARM, NO_BOARD
+from rig.data.checked import Finite, checked
+from rig.data.entries.result_types import Utc
+from rig.data.recording.motion_file import Item
+from rig.data.result_file import FileEntry, StoredCalibrationEntry
+from rig.data.run_folder import ScriptIdentity
+from rig.data.version import VERSION
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.state import Made, Report
+
+OF_FILES = ("readings_file", "motion_file")
+OPTIONAL = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "turner_kind", "board_follows_crystal")
+SIMULATED = "(simulated)"  # so ends the version of a controller that is none
+PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
+
+    What turned the sensors is called the arm, whatever it is. `stored_calibrations` are those by which the board
+    corrected what it streamed, by sensor name. `arm_kinematics` is the geometry of the turner, None where there is
+    none. `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is
+    reckoned with; None where it was not told. `arm_maker` and `arm_model` are those of what was found,
+    `turner_kind` is the kind it is registered as. `board_follows_crystal` is the board's own word on its clock,
+    None where there is no board. `readings_file` and `motion_file` are those of readings recorded elsewhere, with
+    no arm and no board.
+    """
+
+    started_utc: Utc
+    rig_version: str
+    python_version: str
+    package_versions: Mapping[str, str]
+    configuration_sha256: str
+    arm_serial_number: str
+    arm_software: str
+    board_unique_id: str
+    firmware_version: str
+    sensor_serial_numbers: Mapping[str, str]
+    stored_calibrations: Mapping[str, StoredCalibrationEntry] = field(default_factory=dict)
+    script: str | None = None
+    script_sha256: str | None = None
+    script_installed: bool = True
+    arm_kinematics: DenavitHartenberg | None = None
+    tcp_offset: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)] | None = None
+    arm_maker: str | None = None
+    arm_model: str | None = None
+    turner_kind: str | None = None
+    board_follows_crystal: bool | None = None
+    readings_file: FileEntry | None = None
+    motion_file: FileEntry | None = None
+
+    @property
+    def script_identity(self) -> ScriptIdentity:
+        """Which script the recording was made by; one that no file is where it does not say."""
+        return ScriptIdentity(self.script or "", self.script_sha256 or "")
+
+    def document(self) -> dict[str, Any]:
+        """The provenance as it fits into JSON; nothing of what is not known."""
+        stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
+        files = {name: each.model_dump() for name in OF_FILES if (each := getattr(self, name)) is not None}
+        document = {**asdict(self), "stored_calibrations": stored, **files}
+        unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
+        unknown |= {name for name in (*OPTIONAL, *OF_FILES) if document[name] is None}
+        return {key: value for key, value in document.items() if key not in unknown}
+
+
+def calls_itself_simulated(software: str) -> bool:
+    """Whether a controller that says its version so drives no arm: its seconds are as long as it likes."""
+    return software.endswith(SIMULATED)
+
+
+def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Item, began: datetime) -> Provenance:
+    """Provenance of an item's readings recorded elsewhere, which `began` then: no arm and no board is known."""
+    return Provenance(
+        started_utc=began.astimezone(UTC).isoformat(timespec="seconds"),
+        **_program(),
+        configuration_sha256=hashlib.sha256(b"").hexdigest(),
+        arm_serial_number=NO_ARM,
+        arm_software=NO_ARM,
+        board_unique_id=NO_BOARD,
+        firmware_version=NO_BOARD,
+        sensor_serial_numbers={item.name: item.serial_number},
+        readings_file=readings,
+        motion_file=motion,
+    )
+
+
+def _program() -> dict[str, Any]:
+    """What reckons."""
+    return {
+        "rig_version": VERSION,
+        "python_version": platform.python_version(),
+        "package_versions": {name: version(name) for name in PACKAGES},
+    }
+
+
+def provenance_of(
+    loaded: Loaded,
+    board: BoardIdentity | None,
+    turner: Report,
+    made: Made,
+    *,
+    stored: Mapping[str, StoredCalibration],
+    script: ScriptIdentity,
+    script_installed: bool,
+    follows_crystal: bool | None,
+    kind: str,
+) -> Provenance:
+    """Provenance of a recording that begins now with a turner of that `kind`, `made` so; `stored` as above."""
+    return Provenance(
+        started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        **_program(),
+        configuration_sha256=hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
+        arm_serial_number=turner.serial_number,
+        arm_software=turner.software,
+        board_unique_id=NO_BOARD if board is None else board.unique_id,
+        firmware_version=NO_BOARD if board is None else board.firmware,
+        sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.all_sensors.items()},
+        stored_calibrations={
+            name: checked(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
+        },
+        script=script.name,
+        script_sha256=script.sha256,
+        script_installed=script_installed,
+        arm_kinematics=made.kinematics,
+        tcp_offset=made.tcp_offset,
+        arm_maker=made.maker,
+        arm_model=made.model,
+        turner_kind=kind,
+        board_follows_crystal=follows_crystal,
+    )

@@ -1,0 +1,85 @@
+"""What turned the sensors of a recording, as its run file describes it, and the rows its states are recorded in."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from rig.data.checked import checked, parsed
+from rig.data.recording.events import DwellFinished, DwellStarted, Recorded, SweepFinished, SweepStarted
+from rig.data.recording.settings import RunSettings
+from rig.motion.geometry import MAX_JOINTS, DenavitHartenberg
+from rig.motion.state import Joints, Made, StateField, state_dtype
+
+MAX_FIELDS = 32
+ALWAYS = ("time_s", "host_time_s", "q_rad", "qd_rad_s")
+Kind = Annotated[str, Field(pattern=r"^\w[\w.-]*$", max_length=40)]
+Told = Annotated[str, Field(max_length=200)]
+JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # becomes that of a column
+
+
+@dataclass(frozen=True)
+class RecordedTurner:
+    """A turner: its `kind`, by which it is registered, who made it and which model it is (None where not told).
+
+    `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
+    angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
+    `Made`.
+    """
+
+    kind: Kind
+    maker: Told | None
+    model: Told | None
+    joints: Annotated[tuple[JointName, ...], Field(max_length=MAX_JOINTS)]
+    geometry: DenavitHartenberg
+    fields: Annotated[tuple[StateField, ...], Field(max_length=MAX_FIELDS)] = ()
+    reading_std_rad: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+
+    @classmethod
+    def of(cls, kind: str, made: Made, joints: Sequence[str], fields: Sequence[StateField]) -> "RecordedTurner":
+        """A turner of that kind, made so, whose states tell these fields. Raises ValueError as `described`."""
+        turned = tuple(joints), made.kinematics, tuple(fields), made.reading_std_rad
+        return described(asdict(cls(kind, made.maker, made.model, *turned)))
+
+    @cached_property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the rows of its states."""
+        return state_dtype(len(self.joints), self.fields)
+
+    def to_json(self) -> str:
+        """The description as it stands in a run file."""
+        return json.dumps(asdict(self), allow_nan=False)
+
+
+def described(document: Any) -> RecordedTurner:
+    """The turner that a document describes. Raises ValueError naming what cannot be."""
+    turner = checked(RecordedTurner, document, "turner")
+    names = [each.name for each in turner.fields]
+    if len({*turner.joints}) < len(turner.joints) or len({*names, *ALWAYS}) < len(names) + len(ALWAYS):
+        raise ValueError("two joints of its turner, or two fields of its states, have one name")
+    if not all(name.isascii() and name.isidentifier() and len(name) <= 40 for name in names):
+        raise ValueError("a field of its turner's states has a name that is not allowed")
+    if turner.geometry.joints != len(turner.joints):
+        raise ValueError(f"its turner has {len(turner.joints)} joints and a geometry of {turner.geometry.joints}")
+    return turner
+
+
+def turner_of(text: str) -> RecordedTurner:
+    """What `RecordedTurner.to_json` wrote. Raises ValueError naming what is wrong."""
+    return described(parsed(text))
+
+
+def check_joints(turner: RecordedTurner, settings: RunSettings, events: Iterable[Recorded]) -> None:
+    """Raises ValueError where a pose of a recording has other joints than its turner."""
+    poses: list[Joints] = [settings.home_q_rad, *(each.q_rad for each in settings.planned_dwells)]
+    for event in (recorded.event for recorded in events):
+        if isinstance(event, SweepStarted | SweepFinished):
+            poses += [event.sweep.start_q_rad, event.sweep.end_q_rad]
+        if isinstance(event, DwellStarted | DwellFinished):
+            poses.append(event.dwell.q_rad)
+    if any(len(pose) != len(turner.joints) for pose in poses):
+        raise ValueError(f"its turner has {len(turner.joints)} joints, and one of its poses has another number")

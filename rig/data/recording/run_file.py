@@ -1,0 +1,367 @@
+"""The run file: everything a run saw, as it arrived, in HDF5.
+
+The file survives `kill -9` because it is written in HDF5's single-writer/multiple-reader (SWMR) mode: all datasets and
+attributes exist before that mode begins, afterwards rows are only appended, and the library writes every piece before
+anything that points to it. What lies where is said in `rig.data.recording.layout`.
+"""
+
+import json
+import os
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.files.regular_file import RECORDING_MAX_BYTES, UnfitFile, open_regular_file
+from rig.config.section import SensorName
+from rig.data.checked import LARGEST_NUMBER, checked, parsed
+from rig.data.processes.reading_process import UnreadableFile, read_apart, size_without_holes
+from rig.data.quantity import ACCELERATION, RATE, Quantity, Scalar
+from rig.data.recording.events import Event, Recorded, from_lines, to_line
+from rig.data.recording.extract import limits_of_run, reason
+from rig.data.recording.layout import Contents, append, check_rows, empty, lay_out, table_of
+from rig.data.recording.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
+from rig.data.recording.provenance import Provenance
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.recorded_turner import RecordedTurner, check_joints
+from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES
+from rig.data.recording.settings import RunSettings, settings_from_json
+from rig.errors import Fault, Refused
+from rig.errors.quoting import quote
+from rig.motion.state import State
+
+FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
+READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
+LARGEST_STATE = 1e12  # of a turner's states, in SI units; times are among them
+
+
+@dataclass(frozen=True, slots=True)
+class RunData:
+    """A run file in memory: `samples` (n,) by name of a sensor, `states` (n,) of its turner, events in order.
+
+    `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
+    have no turner (None); their samples are those of a sensor on a clock of its own.
+    """
+
+    config: str
+    settings: RunSettings
+    provenance: Provenance
+    turner: RecordedTurner | None
+    sensors: dict[str, RecordedSensor]
+    samples: dict[str, NDArray[Any]]
+    states: NDArray[Any]
+    events: tuple[Recorded, ...]
+    elsewhere: ReadElsewhere | None = None
+
+    def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
+        """The sensors whose samples hold that quantity, by name."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
+
+    def judged_by(self, overrides: Sequence[str]) -> "RunData":
+        """The recording under other settings: see `RunSettings.with_overrides`."""
+        return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
+
+
+class RunRecorder:
+    """Writes a run file from any number of threads; what they hand over is on its way to the disk within 0.5 s.
+
+    `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
+    not. Raises Fault `recording_failed` from the constructor, `check` and `close`.
+    The adding calls never wait for the disk and do not report its failures, so that a full disk stalls neither the
+    board's link nor the turner's: watch `check`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        config: str,
+        settings: RunSettings,
+        provenance: Provenance,
+        turner: RecordedTurner,
+        sensors: Mapping[str, RecordedSensor],
+    ) -> None:
+        import h5py
+
+        self.path = path
+        self._failure: Exception | None = None
+        self.removed = False  # whether the file is no longer in its place
+        self._controller_time_s: float | None = None
+        self._lock = threading.Lock()
+        self._pending = _Pending({name: [] for name in sensors}, [], [])
+        self._states_dtype = turner.dtype
+        self._closing = threading.Event()
+        try:
+            if path.exists():
+                raise FileExistsError(f"{path.name} is there already")
+            texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
+            texts["turner"] = turner.to_json()
+            lay_out(path, empty(SCHEMA, texts, sensors, turner.dtype), swmr=True)
+            self._file = h5py.File(path, "r+", libver="latest")
+            self._file.swmr_mode = True
+            self._descriptor: int = self._file.id.get_vfd_handle()
+        except (OSError, RuntimeError) as error:
+            raise self._fault(error) from error
+        self._thread = threading.Thread(target=self._write, name="recorder", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def add_samples(self, sensor: str, samples: NDArray[Any]) -> None:
+        """Append samples (n,) of a sensor named at the start, of its dtype. The array must not change afterwards."""
+        with self._lock:
+            self._pending.samples[sensor].append(samples)
+
+    def add_state(self, state: State) -> None:
+        """Append one state of the turner."""
+        with self._lock:
+            self._controller_time_s = state.time_s
+            self._pending.states.append(state)
+
+    def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
+        """Append an event, now; its controller time is the newest state's unless given."""
+        with self._lock:
+            known = self._controller_time_s if controller_time_s is None else controller_time_s
+            self._pending.events.append(to_line(Recorded(event, time.monotonic(), known)))
+
+    def check(self) -> None:
+        """Raise Fault `recording_failed` if the file could not be written."""
+        if self._failure is not None:
+            raise self._fault(self._failure)
+
+    def close(self) -> None:
+        """Write what is pending and close the file; afterwards any HDF5 reader opens it. Closing twice is allowed."""
+        self._closing.set()
+        self._thread.join()
+        self.check()
+
+    def _write(self) -> None:
+        """The writer thread: flush what has come, several times a second, until closed or broken."""
+        try:
+            closing = False
+            while not closing:
+                closing = self._closing.wait(FLUSH_PERIOD_S)
+                self._flush()
+                self.removed = not self.path.exists()  # asked here: a disk that hangs may hold up this thread, no other
+            self._file.close()
+        except Exception as error:  # whatever it is, the run must hear of it
+            self._failure = error
+            self._abandon()
+
+    def _abandon(self) -> None:
+        """Leave the file as the last flush left it.
+
+        HDF5 repeats a failed write whenever anything is closed, and ends the process with a segmentation fault at exit;
+        from here on it writes into nothing.
+        """
+        with Path(os.devnull).open("r+b") as nothing:
+            os.dup2(nothing.fileno(), self._descriptor)
+        self._file.close()
+
+    def _flush(self) -> None:
+        with self._lock:
+            pending = self._pending
+            self._pending = _Pending({name: [] for name in pending.samples}, [], [])
+        for name, batches in pending.samples.items():
+            if batches:
+                append(self._file["samples"][name], np.concatenate(batches))
+        if pending.states:
+            records = [state.to_record() for state in pending.states]
+            append(self._file["states"], np.array(records, self._states_dtype))
+        if pending.events:
+            append(self._file["events"], np.frombuffer(b"".join(pending.events), EVENTS_DTYPE))
+
+    def _fault(self, error: Exception) -> Fault:
+        return Fault(
+            "recording_failed",
+            f"{self.path} cannot be written ({reason(error)})",
+            "Free space on the disk or choose another output folder, then resume the run",
+        )
+
+
+def read_run(path: Path, timeout_s: float | None = None) -> RunData:
+    """Read a run file: finished, still being written, or left behind by a killed process.
+
+    Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
+    `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
+    by its size), not counting the time in which the machine is too busy to read; `temporary_folder_full`.
+    """
+    contents = _contents(path, timeout_s)
+    try:
+        checked(_Named, {"sensors": [*contents.described]}, "samples")
+        elsewhere = _elsewhere(contents) if contents.tables else None
+        sensors = contents.sensors
+        samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
+        if elsewhere is not None:
+            sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
+        settings = _settings(contents, sensors)
+        provenance = checked(Provenance, parsed(contents.texts["provenance"]), "provenance")
+        events = tuple(from_lines(contents.events.tobytes()))
+        turner = None
+        if elsewhere is None:
+            turner = _turner(contents, provenance)
+            check_joints(turner, settings, events)
+        states = _whole_rows(contents.states)
+        _check_numbers("states", states, LARGEST_STATE)
+        for name, rows in samples.items():
+            _check_numbers(name, rows, LARGEST_NUMBER)
+        return RunData(
+            config=contents.texts["config"],
+            settings=settings,
+            provenance=provenance,
+            turner=turner,
+            sensors=sensors,
+            samples=samples,
+            states=states,
+            events=events,
+            elsewhere=elsewhere,
+        )
+    except (ValueError, RecursionError) as error:
+        raise _not_a_run_file(path, str(error)) from None
+
+
+def write_elsewhere(path: Path, run: RunData) -> None:
+    """A new run file of readings from elsewhere. Raises OSError."""
+    read = run.elsewhere
+    assert read is not None, "of readings from elsewhere"
+    provenance = json.dumps(run.provenance.document())
+    texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
+    texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells, read.origin_s, read.other_rows)))
+    tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
+    lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
+
+
+def make_plain(path: Path) -> None:
+    """Rewrite the file of a killed run, which only SWMR readers open, so that any HDF5 tool does. The content stays.
+
+    Call it only when nobody writes the file any more. Raises Refused as `read_run` does; OSError.
+    """
+    contents = _contents(path, None)
+    samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
+    lay_out(path, replace(contents, samples=samples, states=_whole_rows(contents.states)), swmr=False)
+
+
+def _contents(path: Path, timeout_s: float | None) -> Contents:
+    """What the file holds, read by a process that can be ended: see `rig.data.recording.extract`."""
+    stored = _stored_bytes(path)
+    if timeout_s is None:
+        timeout_s = READ_TIMEOUT_S + stored / READ_BYTES_PER_S
+    try:
+        header, *arrays = read_apart("rig.data.recording.extract:contents", path, {}, limits_of_run(stored, timeout_s))
+    except UnreadableFile as error:
+        raise _not_a_run_file(path, str(error)) from error
+    told, rows = cast("dict[str, Any]", header), iter(cast("list[NDArray[Any]]", arrays))
+    contents = Contents(
+        **told,
+        samples={name: next(rows) for name in told["described"]},
+        states=next(rows),
+        events=next(rows),
+        tables={name: next(rows) for name in (TABLES if told["schema"] == SCHEMA_ELSEWHERE else ())},
+    )
+    try:
+        check_rows(contents)
+    except (ValueError, RecursionError) as error:
+        raise _not_a_run_file(path, str(error)) from None
+    return contents
+
+
+def _stored_bytes(path: Path) -> int:
+    try:
+        with open_regular_file(path, RECORDING_MAX_BYTES) as file:
+            return size_without_holes(file)
+    except FileNotFoundError:
+        why = f"there is no file {path}"
+    except UnfitFile as error:
+        why = f"{path} cannot be read: {error}"
+    except OSError as error:
+        why = f"{path} cannot be read: {error.strerror}"
+    raise Refused("no_run_file", why, "Give the path of a run.h5 that you may read")
+
+
+def _not_a_run_file(path: Path, why: str) -> Refused:
+    return Refused(
+        "not_a_run_file",
+        f"{path} cannot be read as a run ({why})",
+        "Give the path of a run.h5 that the rig has written and that was not damaged since",
+    )
+
+
+def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunSettings:
+    settings = settings_from_json(contents.texts["settings"])
+    if (settings.elsewhere is None) != (contents.schema != SCHEMA_ELSEWHERE):
+        raise ValueError("its settings are those of other readings")
+    if settings.elsewhere is not None:
+        return settings
+    named = (*settings.to_calibrate, *([settings.reference.name] if settings.reference else []))
+    if missing := [name for name in named if name not in sensors or not sensors[name].measures(RATE)]:
+        raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
+    for name, sensor in sensors.items():
+        moved = sensor.measures(RATE) or sensor.measures(ACCELERATION)
+        if moved and not settings.stated_uncertainty.knows(name):
+            raise ValueError(f"its settings state no uncertainty of its sensor {quote(name)}")
+    return settings
+
+
+def _turner(contents: Contents, provenance: Provenance) -> RecordedTurner:
+    turner = contents.turner
+    assert turner is not None, "its schema has the text of one"
+    if provenance.arm_kinematics not in (None, turner.geometry):
+        raise ValueError("its provenance has another geometry than its turner")
+    return turner
+
+
+def _elsewhere(contents: Contents) -> ReadElsewhere:
+    tables = [contents.tables[each] for each in TABLES]
+    readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
+    told = checked(ToldElsewhere, parsed(contents.texts["elsewhere"]), "elsewhere")
+    samples_header().check(readings)
+    MOTIONS[told.tells].check(motion)
+    return ReadElsewhere(told.item, readings, told.tells, motion, told.origin_s, told.other_rows)
+
+
+def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
+    """The rows without the end that never reached the disk: such are zeros, and a host time is never zero."""
+    written = np.flatnonzero(rows["host_time_s"])
+    count = int(written[-1]) + 1 if len(written) else 0
+    return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
+
+
+def _check_numbers(name: str, rows: NDArray[Any], most: float) -> None:
+    """Raises ValueError for numbers that overflow where they are reckoned with, and for a host time that is none.
+
+    Readings and angles that are no numbers are found where they are read, for some may never be.
+    """
+    if not np.isfinite(rows["host_time_s"]).all():
+        raise ValueError(f"a host time of {name} is not a number")
+    for column in rows.dtype.names or ():
+        values = rows[column]
+        if values.dtype.kind == "f" and (np.abs(values[np.isfinite(values)]) > most).any():
+            raise ValueError(f"a value in {column} of {name} cannot have been measured")
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """The names of the sensors: they become those of files, so what a configuration does not take is none."""
+
+    sensors: tuple[SensorName, ...]
+
+
+@dataclass(slots=True)
+class _Pending:
+    """What waits for the writer thread."""
+
+    samples: dict[str, list[NDArray[Any]]]
+    states: list[State]
+    events: list[bytes]

@@ -1,0 +1,1 @@
+"""How much a design tells before anything is measured: bounds and optimality."""

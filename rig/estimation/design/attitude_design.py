@@ -1,0 +1,159 @@
+"""How much a set of attitudes tells of an accelerometer at rest in them, before anything is measured.
+
+The model is that of `rig.estimation.reference.reference_model` with v̄ = 0 and ‖v_ref‖ known, TRIAX, Eqs. (10), (11),
+about an ideal sensor: F = 1, b = 0, φ = 0. Of an attitude error δ the readings' covariance is V = σ² 1 + δ² E Eᵀ
+(`rig.estimation.reference.attitude_error`).
+
+Attitudes R (N, 3, 3) take body to table coordinates, `up` (3,) is a unit vector of the table. `order` 1 is the model
+with 14 free numbers, F, b and the direction of v_ref; order 2 has φ as well, 17.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.reference.attitude_error import effects, whitening_with
+from rig.estimation.reference.reference_model import (
+    BIAS,
+    REFERENCE,
+    SECOND,
+    covariance_bound,
+    free_directions,
+    weighted_jacobian,
+    whitening,
+)
+from rig.estimation.refusals import conditioning
+
+Order = Literal[1, 2]
+PARAMETER_COUNT = {1: 14, 2: 17}
+FOUND = 1e-6  # of a unit vector: less of it in the undetermined directions is rounding
+PARTS = (  # what each number of θ belongs to
+    *("scale of x", "angle x y", "angle x z", "angle x y", "scale of y"),
+    *("angle y z", "angle x z", "angle y z", "scale of z"),
+    *("the vertical",) * 3,
+    *("bias of x", "bias of y", "bias of z"),
+    *("second order of x", "second order of y", "second order of z"),
+)
+ORIENTATIONS = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """What the attitudes alone decide: `rank` of the `needed` numbers, condition number, which parts are undetermined.
+
+    `condition` is infinite below full rank. It is that of the equations in g.
+    """
+
+    rank: int
+    needed: int
+    condition: float
+    undetermined: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Standard deviations by Cramér–Rao, the root-mean-square of three: scale (parts), angle between axes, bias, φ."""
+
+    scale_std: float
+    non_orthogonality_std_rad: float
+    bias_std_m_s2: float
+    second_order_std_s2_m: float | None
+
+
+def telling(attitudes: Array, up: Array, order: Order = 1) -> Telling:
+    """Rank and condition of the attitudes, and what they leave undetermined."""
+    rows = _equations(attitudes, up, order)
+    needed = PARAMETER_COUNT[order]
+    found = conditioning(rows, needed)
+    if found.rank == needed:
+        return Telling(needed, needed, found.condition, ())
+    _, _, directions = np.linalg.svd(rows)
+    loose = free_directions(_ideal(up, order), norm_known=True) @ directions[found.rank :].T
+    undetermined = np.linalg.norm(loose, axis=1) > FOUND
+    parts = dict.fromkeys(part for part, is_loose in zip(PARTS, undetermined, strict=False) if is_loose)
+    return Telling(found.rank, needed, float("inf"), tuple(parts))
+
+
+def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
+    """The model's parameters over the worst variance of what it predicts in any orientation: 1 is the best there is.
+
+    Of exact attitudes and equal noise. The variance is the trace over the three axes, times N, in units of one
+    reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz). 0 where the
+    attitudes leave something undetermined.
+    """
+    from scipy.optimize import minimize
+    from scipy.spatial.transform import Rotation
+
+    rows = _equations(attitudes, up, order)
+    if telling(attitudes, up, order).undetermined:
+        return 0.0
+    covariance = np.linalg.inv(rows.T @ rows)
+    orientations = Rotation.from_quat(_spiral(ORIENTATIONS))
+
+    def variances(bodies: Array) -> Array:
+        predicted = _equations(bodies, up, order).reshape(len(bodies), 3, -1)
+        return np.asarray(len(attitudes) * np.einsum("nip,pq,niq->n", predicted, covariance, predicted))
+
+    values = variances(orientations.as_matrix())
+    start = orientations[int(np.argmax(values))]
+
+    def lost(turn: Array) -> float:
+        return -float(variances((start * Rotation.from_rotvec(turn)).as_matrix()[None])[0])
+
+    climbed = minimize(lost, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    return PARAMETER_COUNT[order] / max(float(values.max()), -float(climbed.fun))
+
+
+def expected(
+    attitudes: Array, reference_m_s2: Array, noise_m_s2: Array, attitude_std_rad: float, order: Order = 1
+) -> Expected:
+    """What a weighted fit can reach of mean readings with white noise of `noise_m_s2` (N,) in attitudes known to δ.
+
+    `reference_m_s2` (3,): what an accelerometer feels at rest, in table coordinates. The attitudes must tell
+    everything, see `telling`.
+    """
+    theta, count = _ideal(reference_m_s2, order), len(attitudes)
+    v_bar = np.zeros((count, 3))
+    variances = np.repeat(noise_m_s2[:, None] ** 2, 3, axis=1)
+    white = whitening_with(variances, effects(theta, attitudes, v_bar), np.full(count, attitude_std_rad))
+    bound = covariance_bound(theta, attitudes, v_bar, white, norm_known=True)
+    between = np.zeros((3, len(theta)))  # about F = 1 the cosine between two axes is the sum of their two elements
+    for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+        between[row, [3 * i + j, 3 * j + i]] = 1.0
+    variance = np.diag(bound)
+    return Expected(
+        scale_std=_rms(variance[[0, 4, 8]]),
+        non_orthogonality_std_rad=_rms(np.diag(between @ bound @ between.T)),
+        bias_std_m_s2=_rms(variance[BIAS]),
+        second_order_std_s2_m=_rms(variance[SECOND]) if order == 2 else None,
+    )
+
+
+def _rms(variances: Array) -> float:
+    return float(np.sqrt(np.mean(variances)))
+
+
+def _ideal(reference: Array, order: Order) -> Array:
+    """θ of an ideal sensor."""
+    theta = np.zeros(18 if order == 2 else 15)
+    theta[[0, 4, 8]] = 1.0
+    theta[REFERENCE] = reference
+    return theta
+
+
+def _equations(attitudes: Array, up: Array, order: Order) -> Array:
+    """(3 N, 14 or 17) what readings in g say of each free number, all alike."""
+    theta, v_bar = _ideal(up, order), np.zeros((len(attitudes), 3))
+    return weighted_jacobian(theta, attitudes, v_bar, whitening(np.ones((len(attitudes), 3))), norm_known=True)
+
+
+def _spiral(count: int) -> Array:
+    """(count, 4) quaternions spread evenly over all rotations (Alexa, Super-Fibonacci spirals, CVPR 2022)."""
+    place = np.arange(count) + 0.5
+    inner, outer = np.sqrt(place / count), np.sqrt(1 - place / count)
+    first, second = 2 * np.pi * place / np.sqrt(2), 2 * np.pi * place / 1.533751168755204288118041
+    return np.stack(
+        [inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)], axis=1
+    )

@@ -1,0 +1,81 @@
+"""Cramér–Rao bounds: the smallest covariance any unbiased estimator of a model can have with a given design.
+
+The noise is Gaussian with known variances, so the Fisher information is Σ Jᵀ V⁻¹ J; what the model does not ask for but
+has to leave open (directions of turning, mounting) is in it as a nuisance. `efficiency` compares an estimator with it.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation.arrays import Array, scale_of
+from rig.estimation.gyroscope.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
+from rig.estimation.reference.reference_model import covariance_bound, whitening
+from rig.estimation.sensor_axes import parameter_jacobian
+
+
+def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
+    """(6, 6) bound for kx ky kz bx by bz of g = K (m + b) when only ‖g‖ is known of each sweep: SIX, Eqs. (1)–(4).
+
+    `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
+    two unknown numbers of each sweep's direction use up two of its three readings; what is left tells ‖g‖², with the
+    variance Σ 4 k⁴ (m + b)² v. The bias does not matter. Raises LinAlgError for a design that leaves something open.
+    """
+    k, rates, variances = (np.asarray(a, dtype=np.float64) for a in (scale, rates_rad_s, variances_rad2_s2))
+    theta = np.concatenate([k, np.zeros(3)])
+    means = rates / k
+    jacobian = squared_rate_jacobian(theta, means)
+    return _inverse(jacobian / np.sqrt(squared_rate_variance(theta, means, variances))[:, None])
+
+
+def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
+    """(12, 12) bound for the rows of F, then c, of the vector model m = F ω + c; rates (N, 3) may be zero (rests)."""
+    rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
+    design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
+    bound = np.zeros((12, 12))
+    for axis in range(3):
+        own = np.array([3 * axis, 3 * axis + 1, 3 * axis + 2, 9 + axis])
+        bound[np.ix_(own, own)] = _inverse(design / np.sqrt(variances[:, axis])[:, None])
+    return bound
+
+
+def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
+    """(6, 6) bound for kx ky kz bx by bz when the rate is known as a vector; `matrix` (3, 3) is the true F."""
+    f = np.asarray(matrix, dtype=np.float64)
+    jacobian = parameter_jacobian(f, scale_of(f))
+    return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T
+
+
+def triaxial_bound(
+    matrix: ArrayLike,
+    reference: ArrayLike,
+    bias: ArrayLike,
+    attitudes: ArrayLike,
+    variances: ArrayLike,
+    *,
+    known: ArrayLike | None = None,
+    second_order: ArrayLike | None = None,
+) -> Array:
+    """Bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX, Eqs. (3), (10).
+
+    Shapes as in `solve_triaxial`, true values. Without `known` the size of `reference` is given to the estimator.
+    """
+    parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
+    if second_order is not None:
+        parts.append(np.asarray(second_order))
+    theta = np.concatenate(parts).astype(np.float64)
+    r, v = np.asarray(attitudes, dtype=np.float64), np.asarray(variances, dtype=np.float64)
+    v_bar = np.zeros((len(r), 3)) if known is None else np.asarray(known, dtype=np.float64)
+    return covariance_bound(theta, r, v_bar, whitening(v), norm_known=known is None)
+
+
+def efficiency(errors: ArrayLike, bound: Array) -> Array:
+    """(p,) mean squared error of R runs (R, p) over the bound's diagonal: 1 for an efficient estimator."""
+    return np.asarray(np.mean(np.asarray(errors) ** 2, axis=0) / np.diag(bound), dtype=np.float64)
+
+
+def _inverse(weighted: Array) -> Array:
+    """(JᵀJ)⁻¹, with columns brought to unit length first."""
+    size = np.linalg.norm(weighted, axis=0)
+    scaled = weighted / size
+    inverse: Array = np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(size, size), dtype=np.float64)
+    return inverse

@@ -1,0 +1,110 @@
+"""How good a set of sweep directions is: G-optimality, SIX section II-B, and c-optimality of what is wanted.
+
+The variance of what the fitted model predicts at a point x, N f(x)ᵀ (XᵀX)⁻¹ f(x) in units of one observation's
+variance, is never below p, the number of parameters, at its worst point: the mean over the design's own points is
+exactly p. A design whose worst point on the sphere has p is G-optimal, and then also D-optimal (Kiefer and Wolfowitz).
+
+Two models: "squared" is Eq. (4), f = [x² y² z² x y z], p = 6, with β0 given by the others; "vector" is f = [x y z 1],
+p = 4, for each axis. Directions are unit vectors; a zero row is a rest, which only the vector model can use.
+"""
+
+from collections.abc import Mapping
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.six_observation import design
+
+Model = Literal["squared", "vector"]
+
+PARAMETER_COUNT: Mapping[Model, int] = {"squared": 6, "vector": 4}
+
+
+def prediction_variance(directions: ArrayLike, at: ArrayLike, model: Model = "squared") -> Array:
+    """(M,) N f(x)ᵀ (XᵀX)⁻¹ f(x) at points `at` (M, 3) for a design `directions` (N, 3); infinite if it is singular."""
+    x, f = _features(directions, model), _features(at, model)
+    if np.linalg.matrix_rank(x) < x.shape[1]:
+        return np.full(len(f), np.inf)
+    information = x.T @ x / len(x)
+    return np.asarray(np.einsum("mi,mi->m", f, np.linalg.solve(information, f.T).T), dtype=np.float64)
+
+
+def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared") -> float:
+    """The largest `prediction_variance` over the unit sphere; the G-criterion. At least `PARAMETER_COUNT[model]`.
+
+    The variance is a smooth quartic, so the best of a fine grid and a climb from there find its maximum.
+    """
+    from scipy.optimize import minimize
+
+    grid = _sphere(20000)
+    values = prediction_variance(directions, grid, model)
+    best = int(np.argmax(values))
+    if not np.isfinite(values[best]):
+        return float("inf")
+
+    def lost(point: Array) -> float:
+        return -float(prediction_variance(directions, (point / np.linalg.norm(point))[None], model)[0])
+
+    climbed = minimize(lost, grid[best], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
+    return max(float(values[best]), -float(climbed.fun))
+
+
+def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
+    """p / worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
+    return PARAMETER_COUNT[model] / maximum_prediction_variance(directions, model)
+
+
+def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale") -> float:
+    """How good sweeps are for the scale factors, or for the biases: 1 where none of as many is better, 0 if singular.
+
+    c-optimality (Elfving): the variance of a combination cᵀβ of the vector model's parameters, N cᵀ(XᵀX)⁻¹c, here of
+    the axis that it is worst of. The squares of a direction's parts add up to 1, so that the least of the worst slope
+    is 3; that of an offset is 1.
+    """
+    features = _features(directions, "vector")
+    if np.linalg.matrix_rank(features) < PARAMETER_COUNT["vector"]:
+        return 0.0
+    variances = len(features) * np.diag(np.linalg.inv(features.T @ features))
+    return float(3 / variances[:3].max() if what == "scale" else 1 / variances[3])
+
+
+def named_designs() -> dict[str, Array]:
+    """Sets of sweep directions (N, 3) to compare with the six of SIX, section II-B."""
+    axes = np.eye(3)
+    six = np.concatenate([axes, -axes])
+    corners = np.array(list(product((1.0, -1.0), repeat=3))) / np.sqrt(3)
+    edges = np.array([[s, t, 0.0] for s, t in product((1.0, -1.0), repeat=2)]) / np.sqrt(2)
+    edges = np.concatenate([edges, np.roll(edges, 1, axis=1), np.roll(edges, 2, axis=1)])
+    golden = (1 + np.sqrt(5)) / 2
+    icosahedron = np.array([[0.0, s, t * golden] for s, t in product((1.0, -1.0), repeat=2)]) / np.hypot(1, golden)
+    icosahedron = np.concatenate([icosahedron, np.roll(icosahedron, 1, axis=1), np.roll(icosahedron, 2, axis=1)])
+    return {
+        "six": six,
+        "six and six rests": np.concatenate([six, np.zeros((6, 3))]),
+        "six, one direction twice": np.concatenate([six, axes[:1]]),
+        "tetrahedron": corners[[0, 3, 5, 6]],
+        "eight corners": corners,
+        "twelve edges": edges,
+        "icosahedron": icosahedron,
+        "six and eight": np.concatenate([six, corners]),
+        "one direction missing": six[:5],
+    }
+
+
+def _features(points: ArrayLike, model: Model) -> Array:
+    x = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    if model == "squared":
+        return design(x)
+    return np.concatenate([x, np.ones((len(x), 1))], axis=1)
+
+
+def _sphere(count: int) -> Array:
+    """(count, 3) points spread evenly over the unit sphere, on a spiral."""
+    place = np.arange(count) + 0.5
+    z = 1 - 2 * place / count
+    turn = np.pi * (1 + np.sqrt(5)) * place
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)

@@ -1,0 +1,138 @@
+"""Scale factors and biases of a triaxial gyroscope from averaged revolutions: the equations of the paper SIX.
+
+Model: g = K (m + b), K = diag(k), b in rad/s of the reading. SIX prints g = K m + b as Eq. (1), but Eqs. (3), (4)
+and Algorithm 1 are this one. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
+
+    ω² = β0 + x β,   x = [mx² my² mz² mx my mz],   β = [k² …, 2 k² b …],   β0 = Σ k² b² = Σ β_l² / (4 β_s)
+
+with s the three squares and l the three linear terms. The columns of X stand squares first, in the order of β;
+Eq. (7) prints them the other way round. m is the mean reading of the revolution, squared afterwards: averaging m²,
+as Eq. (8) reads, adds the noise's variance to every square and shrinks the scale.
+
+β depends on the unknown β0 = γ through one scalar only: β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: least
+squares). Both solvers look for the γ that reproduces itself: `by_newton`, and `by_algorithm_1` as SIX publishes it.
+`rig.estimation.gyroscope.accumulator` brings them p and q from any number of revolutions.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+
+MODEL = "g = K (m + b)"
+PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
+
+ALGORITHM_1_TOLERANCE = 1e-6  # SIX, Algorithm 1
+ALGORITHM_1_LIMIT = 1000
+NEWTON_LIMIT = 20
+
+
+def design(means_rad_s: ArrayLike) -> Array:
+    """X (…, 6) = [mx² my² mz² mx my mz] of mean readings (…, 3) in rad/s: SIX, Eq. (7), with the squares first."""
+    means = np.asarray(means_rad_s, dtype=np.float64)
+    return np.concatenate([means * means, means], axis=-1)
+
+
+def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
+    """Scale (3,) and bias (3,) from exactly six mean readings (6, 3) at one speed: one linear solve, no iteration.
+
+    At one speed p = ω² q, hence γ = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). This is the bare core, for a design
+    known to be good: the gates stand in `Accumulator.solve`. Raises Fault `rank_deficient`, `negative_square`.
+    """
+    square = speed_rad_s * speed_rad_s
+    q = solve_linear(design(means_rad_s), np.ones(6))
+    return parameters((square - _gamma_at_one_speed(q.tolist(), square)) * q)
+
+
+def by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
+    """β (6,) and the number of Newton steps on γ = Γ(p − γ q).
+
+    Starts at the closed form for the mean squared speed (rad²/s²), which is exact when all speeds are equal.
+    Converges whatever the size of the bias. Raises Fault `negative_square`.
+    """
+    ps, qs = p.tolist(), q.tolist()
+    gamma = _gamma_at_one_speed(qs, square_rad2_s2)
+    steps = 0
+    step = np.inf
+    while abs(step) > 1e-13 * square_rad2_s2 and steps < NEWTON_LIMIT:
+        value, slope = -gamma, -1.0
+        for s in range(3):
+            beta_s, beta_l = ps[s] - gamma * qs[s], ps[s + 3] - gamma * qs[s + 3]
+            if not beta_s > 0:
+                raise negative_square(s)
+            bias = beta_l / (2 * beta_s)
+            value += beta_s * bias * bias
+            slope += bias * (bias * qs[s] - qs[s + 3])
+        step = value / slope
+        gamma -= step
+        steps += 1
+    return p - gamma * q, steps
+
+
+def by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
+    """β (6,) and the number of passes by SIX, Algorithm 1, as published.
+
+    β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is
+    pass 1. Each pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (the paper's "β0 < 0.5"
+    is that at 1 rad/s). Raises Fault `algorithm_1_diverged` as soon as a step grows.
+    """
+    beta, last_change = p, np.inf
+    for passes in range(2, ALGORITHM_1_LIMIT):
+        gamma = float(np.sum(beta[3:] ** 2 / (4 * beta[:3]))) if beta[:3].all() else np.inf
+        improved = p - gamma * q
+        change = float(np.sum(np.abs(improved - beta)))
+        if change <= ALGORITHM_1_TOLERANCE:
+            return improved, passes
+        if not change < last_change:
+            break
+        beta, last_change = improved, change
+    raise Fault(
+        "algorithm_1_diverged",
+        "Algorithm 1 does not converge: the bias is too large for the turn rate (Σ k² b² against ω²/2)",
+        "Use the estimator newton, or sweep faster",
+    )
+
+
+def parameters(beta: Array) -> tuple[Array, Array]:
+    """k = √β_s and b = β_l / (2 β_s), each (3,): the last lines of Algorithm 1. Raises Fault `negative_square`."""
+    squares = beta[:3]
+    for s, square in enumerate(squares.tolist()):
+        if not square > 0:
+            raise negative_square(s)
+    return np.sqrt(squares), beta[3:] / (2 * squares)
+
+
+def solve_linear(matrix: Array, right: Array) -> Array:
+    """The solution of a square system. Raises Fault `rank_deficient`."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise rank_deficient("an axis") from None
+
+
+def rank_deficient(axis: str) -> Fault:
+    """The error for a design that leaves something undetermined."""
+    return Fault(
+        "rank_deficient",
+        f"the sweeps cannot separate scale and bias: {axis} was not swept in both directions",
+        "Sweep every wrist in both directions; a second sweep in one direction cannot replace the other direction",
+    )
+
+
+def _gamma_at_one_speed(q: list[float], square: float) -> float:
+    total = 0.0
+    for s in range(3):
+        if q[s] == 0:
+            raise negative_square(s)
+        total += q[s + 3] ** 2 / (4 * q[s])
+    return square * total / (1 + total)
+
+
+def negative_square(axis: int) -> Fault:
+    """The error for readings that no scale factor of axis 0, 1 or 2 explains."""
+    return Fault(
+        "negative_square",
+        f"the squared scale factor of {'xyz'[axis]} is zero, negative or not a number",
+        "The readings do not fit the speeds: check axes, units, and that all six directions were swept",
+    )

@@ -1,0 +1,1 @@
+"""Noise, means, coverage and variance components: statistics that any estimator may use."""

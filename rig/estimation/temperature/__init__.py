@@ -1,0 +1,1 @@
+"""Scale and bias as functions of temperature and of time."""

@@ -1,0 +1,1 @@
+"""Every recording of a history solved again, and what that changes."""

@@ -1,0 +1,80 @@
+"""The rows of a run, within somebody's transaction."""
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from sqlalchemy import Connection, insert, select
+
+from rig.history.entered.finished import Finished
+from rig.history.storage import journal, schema
+from rig.history.storage.numbers import next_number
+
+if TYPE_CHECKING:
+    from rig.report.findings.followed import Followed
+
+
+def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
+    """Add a run with all that belongs to it; its number."""
+    from rig.history.entered.index import run_row
+    from rig.report.kinds.registry import followed
+
+    run_id = next_number(connection, schema.run)
+    row = {
+        **run_row(finished.document),
+        "id": run_id,
+        "content_sha256": content_sha256,
+        "entered_utc": now_utc(),
+        "rig": finished.rig,
+        "simulated": finished.simulated,
+        "result": finished.text,
+        "operator": finished.operator,
+        "note": finished.note,
+    }
+    connection.execute(insert(schema.run).values(row))
+    if finished.recordings:
+        rows = [{"run_id": run_id, "name": r.name, "bytes": r.size, "sha256": r.sha256} for r in finished.recordings]
+        connection.execute(insert(schema.recording), rows)
+    if finished.documents:
+        rows = [{"run_id": run_id, "name": name, "sha256": sha256} for name, sha256 in finished.documents]
+        connection.execute(insert(schema.document), rows)
+    for each in followed(finished.document):
+        _enter_calibration(connection, run_id, each, check_standard=each.serial_number in finished.check_standards)
+    journal.note(connection, schema.run, run_id)
+    return run_id
+
+
+def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
+    """Where the run's folder was seen, unless that is known."""
+    places = schema.location.c
+    same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
+    if connection.scalar(select(places.id).where(*same)) is None:
+        number = next_number(connection, schema.location)
+        where = {"id": number, "run_id": run_id, "computer": finished.computer, "path": finished.path}
+        connection.execute(insert(schema.location).values(**where, noted_utc=now_utc()))
+        journal.note(connection, schema.location, number)
+
+
+def now_utc() -> str:
+    """The time now, UTC to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def _enter_calibration(connection: Connection, run_id: int, calibration: "Followed", *, check_standard: bool) -> None:
+    number = next_number(connection, schema.calibration)
+    row = {
+        "id": number,
+        "run_id": run_id,
+        "sensor": calibration.sensor,
+        "quantity": calibration.quantity,
+        "part": calibration.part,
+        "serial_number": calibration.serial_number,
+        "full_scale": calibration.full_scale,
+        "estimator": calibration.estimator,
+        "temperature_c": calibration.temperature_c,
+        "check_standard": check_standard,
+    }
+    connection.execute(insert(schema.calibration).values(row))
+    columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
+    rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in calibration.parameters]
+    if rows:
+        connection.execute(insert(schema.parameter), rows)

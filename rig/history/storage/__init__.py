@@ -1,0 +1,1 @@
+"""The database of a history: engines, tables, triggers, journal."""

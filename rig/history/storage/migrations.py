@@ -1,0 +1,87 @@
+"""A history's tables are made when it is opened, or migrated if an older program made them; others are refused.
+
+A migration is a function from a connection to the next version. All of them run in one transaction. They only add: what
+was entered stays as it was.
+"""
+
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+
+from sqlalchemy import Connection, insert, inspect, select, text, update
+
+from rig.errors import Refused
+from rig.history.storage import journal, schema
+from rig.history.storage.triggers import create_triggers
+
+VERSION_KEY = "schema_version"
+DEVELOPMENT_KEY = "version"  # of the tables before 0.1.0, which nobody migrates
+
+# From each version to the next one: version 1 is the first that is released.
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
+
+
+def version_of(connection: Connection, label: str) -> int:
+    """Return the version of the tables, 0 if there are none.
+
+    Raises Refused `not_a_history`, `history_too_old`, `history_too_new`.
+    """
+    tables = inspect(connection).get_table_names()
+    if not tables:
+        return 0
+    entries = _meta(connection) if schema.meta.name in tables else {}
+    if VERSION_KEY not in entries and DEVELOPMENT_KEY in entries:
+        raise too_old(label)
+    version = entries.get(VERSION_KEY) or ""
+    if not version.isdecimal():
+        raise Refused(
+            "not_a_history",
+            f"{label} holds {', '.join(sorted(tables)[:5])}, which do not belong to a history",
+            "Give a history, or a file or database that is new",
+        )
+    if int(version) > schema.VERSION:
+        raise Refused(
+            "history_too_new",
+            f"{label} is of version {version}, made by a newer program; this one knows version {schema.VERSION}",
+            "Install the newer program here as well; the history was not changed",
+        )
+    return int(version)
+
+
+def bring_up_to_date(connection: Connection, label: str) -> None:
+    """Make the tables or migrate them, in the connection's transaction. Raises Refused as `version_of`."""
+    journal.alone(connection)
+    version = version_of(connection, label)
+    if version == 0:
+        _make(connection)
+        return
+    for number in range(version, schema.VERSION):
+        MIGRATIONS[number](connection)
+    if version < schema.VERSION:
+        newest = update(schema.meta).where(schema.meta.c.key == VERSION_KEY).values(value=str(schema.VERSION))
+        connection.execute(newest)
+
+
+def too_old(label: str) -> Refused:
+    """Return the refusal of a history that a program before 0.1.0 made."""
+    return Refused(
+        "history_too_old",
+        f"{label} was made by a program before 0.1.0, and this one does not read its tables; it was not changed",
+        "Move it away, or name a new history with --history or RIG_HISTORY; then enter the run folders there with "
+        "`rig history import DIR`",
+    )
+
+
+def _make(connection: Connection) -> None:
+    if connection.dialect.name == "sqlite":
+        connection.execute(text(f"PRAGMA application_id = {schema.APPLICATION_ID}"))
+    schema.metadata.create_all(connection)
+    create_triggers(connection)
+    created = {"key": "created_utc", "value": datetime.now(UTC).isoformat(timespec="microseconds")}
+    connection.execute(insert(schema.meta), [created, {"key": VERSION_KEY, "value": str(schema.VERSION)}])
+
+
+def _meta(connection: Connection) -> dict[str, str | None]:
+    """Return what `meta` says, or nothing if a table of that name has other columns."""
+    if {column["name"] for column in inspect(connection).get_columns(schema.meta.name)} != {"key", "value"}:
+        return {}
+    return {row.key: row.value for row in connection.execute(select(schema.meta))}

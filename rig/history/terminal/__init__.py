@@ -1,0 +1,1 @@
+"""A history in words and tables for a terminal."""

@@ -1,0 +1,1 @@
+"""A body that a hand moves: when it lay still, and the moves in between."""

@@ -1,0 +1,1 @@
+"""What checks compare within a recording: segments, transfers, halves of dwells, readings as they were recorded."""

@@ -1,0 +1,42 @@
+"""Which samples belong to which part of a recorded movement. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.recording.run_file import RunData
+from rig.estimation.arrays import Array
+from rig.observation.arm_rests import REST_SETTLING_S
+from rig.observation.windows import Window, rested, swept
+
+
+@dataclass(frozen=True, slots=True)
+class MovementMasks:
+    """Masks (n,) of samples: from the first sweep to the end, in sweeps, in rests, in the middle of each rest."""
+
+    moving: NDArray[np.bool_]
+    sweeping: NDArray[np.bool_]
+    resting: NDArray[np.bool_]
+    still: tuple[NDArray[np.bool_], ...]
+
+
+def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
+    """Return the masks of samples at times (n,) of the controller's clock, in a recording that holds a sweep."""
+    sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
+    return MovementMasks(
+        moving=_within(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),
+        sweeping=_within(time_s, *sweeps),
+        resting=_within(time_s, *rests),
+        still=tuple(
+            _within(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)) for rest in rests
+        ),
+    )
+
+
+def _within(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
+    """Return which times (n,) lie in any of the windows."""
+    inside = np.zeros(len(time_s), dtype=np.bool_)
+    for window in windows:
+        inside |= (time_s >= window.start_s) & (time_s <= window.end_s)
+    return inside

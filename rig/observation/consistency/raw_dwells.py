@@ -1,0 +1,89 @@
+"""The readings of accelerometers and magnetometers in dwells and sweeps, as they were recorded. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import ACCELERATION
+from rig.estimation.arrays import Array
+from rig.observation.average import between
+from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
+from rig.observation.field import dwelt_field
+from rig.observation.observed_run import ObservedRun
+from rig.observation.reference.acceleration import DwellReading, gravity_beside
+from rig.observation.windows import Window
+
+
+@dataclass(frozen=True, slots=True)
+class RawDwell:
+    """The readings of one dwell: counts (n, 3) at times (n,) of the controller's, within the `window`.
+
+    The arm stood at `q_rad` (6,); `clock_offset_s` takes those times to the clock of the first recording. By
+    `swing_counts` (n, 3) readings differ from their mean because the arm swings, as its encoders tell.
+    """
+
+    index: int
+    counts: NDArray[np.int64]
+    time_s: Array
+    window: Window
+    q_rad: Array
+    clock_offset_s: float
+    swing_counts: Array | float = 0.0
+
+    @property
+    def still_counts(self) -> Array:
+        """(n, 3) the counts of an arm that does not swing."""
+        return np.subtract(self.counts, self.swing_counts, dtype=np.float64)
+
+    @property
+    def middle_s(self) -> float:
+        """Middle of the window by the controller's time, s."""
+        return (self.window.start_s + self.window.end_s) / 2
+
+
+def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) -> list[RawDwell]:
+    """Return what a sensor's accelerometer, of that F (3, 3), read in each of its dwells."""
+    stream, site = recording.stream(name), recording.run.settings.site
+    per_count = matrix / stream.sensor.channel(ACCELERATION).unit_per_count
+    dwells = []
+    for dwell in recording.sensors[name].dwells:
+        inside = between(stream, dwell.window.start_s, dwell.window.end_s)
+        counts = counts_of(stream, ACCELERATION, inside)
+        attitudes = recording.motion.attitudes(stream.time_s[inside])
+        swing = gravity_beside(attitudes, attitudes.mean(axis=0), stream.sensor, site) @ per_count.T
+        dwells.append(replace(_raw_dwell(dwell, counts, stream.time_s[inside], recording), swing_counts=swing))
+    return dwells
+
+
+def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadings]:
+    """Return what a sensor's accelerometer read in its revolutions, each with its index among the recording's."""
+    stream, sweeps = recording.stream(name), []
+    for index, turn in enumerate(recording.sensors[name].revolutions):
+        if turn.acceleration is not None:
+            lsb = stream.sensor.channel(ACCELERATION).unit_per_count
+            inside, wave = between(stream, turn.average.start_s, turn.average.end_s), turn.acceleration.harmonic
+            counts = counts_of(stream, ACCELERATION, inside)
+            sweeps.append(RawReadings(index, counts, wave.residuals_m_s2 / lsb, wave.vibration_m_s2 / lsb))
+    return sweeps
+
+
+def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
+    """Return what a magnetometer read in each of its dwells."""
+    return [
+        _raw_dwell(dwell, counts.astype(np.int64), time_s, recording)
+        for dwell, counts, time_s in dwelt_field(recording, name)
+    ]
+
+
+def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
+    """Return the dwells as rests: what of a reading its dwell's mean does not explain."""
+    residuals = [dwell.still_counts - dwell.still_counts.mean(axis=0) for dwell in dwells]
+    return [RawReadings(REST, dwell.counts, left, np.zeros(3)) for dwell, left in zip(dwells, residuals, strict=True)]
+
+
+def _raw_dwell(dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun) -> RawDwell:
+    window = dwell.window
+    q_rad = recording.motion.angles((window.start_s + window.end_s) / 2)
+    return RawDwell(dwell.index, counts, time_s, window, q_rad, recording.clock_offset_s)

@@ -1,0 +1,56 @@
+"""The readings of a revolution, a rest or a dwell as they were recorded, with their residuals. Pure."""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import Quantity
+from rig.estimation.arrays import Array
+from rig.observation.average import Stream
+from rig.observation.statistics.coloured_noise import innovations
+
+REST = -1  # in the place of the index of a revolution
+MEMORY = 12  # readings before one, by which it is predicted
+NORMAL = 1.4826  # standard deviation over median deviation
+
+
+@dataclass(frozen=True, slots=True)
+class RawReadings:
+    """Readings of one revolution, rest or dwell.
+
+    sweep: the index of the revolution among all of the sensor's, −1 of a rest.
+    counts (n, 3): the readings as recorded.
+    residual_counts (m, 3): readings less the mean of their segment and less the arm's vibration; in a rest less what
+    vibrates, too. Of a revolution there are none where the arm's motion is not known.
+    vibration_counts (3,): RMS of the arm's vibration.
+    swing_rad2 (3,): mean square by which the angle of what vibrates in a rest differs between two moments.
+    """
+
+    sweep: int
+    counts: NDArray[np.int64]
+    residual_counts: Array
+    vibration_counts: Array
+    swing_rad2: Array = field(default_factory=partial(np.zeros, 3))
+
+
+def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.int64]:
+    """Return the counts (n, 3) of a quantity in the samples inside, as recorded."""
+    counts: NDArray[np.int64] = stream.sensor.channel(quantity).counts(stream.raw)[inside].astype(np.int64)
+    return counts
+
+
+def innovation_std(counts: NDArray[np.int64]) -> Array:
+    """Return the standard deviation (3,) of what the readings before a reading do not predict of it, in counts.
+
+    Drift and vibration do not count: they carry a reading across counts together with its neighbours.
+    """
+    return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
+
+
+def _innovation_std(readings: Array) -> float:
+    """Return that of readings (n,): the error of the best linear prediction from the `MEMORY` readings before."""
+    if len(readings) < 4 * MEMORY:
+        return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
+    return float(NORMAL * np.median(np.abs(innovations(readings, MEMORY))))

@@ -1,0 +1,251 @@
+"""Revolutions and rests in segments of equal length: each is averaged as the whole is, by weights of its own.
+
+The lines that were taken out of a revolution's mean are taken out of its segments' means, and the weights that make the
+means of their readings make those of the arm's rate. Both are `weighted_means`: a whole window is one group of
+readings, its segments are several.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.mean_weights import even_groups, mean_weights
+from rig.estimation.statistics.rounding import Steps
+from rig.observation.average import Average, Stream, between
+from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
+from rig.observation.motion.arm_motion import ArmMotion
+from rig.observation.observe import Observation, response_of
+from rig.observation.observed_run import ObservedRun
+from rig.observation.statistics.coloured_noise import widening
+from rig.observation.statistics.lines import LineSearch, find_lines, fitted, swings, waves
+from rig.observation.statistics.mean import Mean, Noise, weighted_means
+from rig.observation.statistics.tapered_weights import noise_at_zero
+
+# Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.
+OF_REVOLUTION, OF_REST, MOST = 6, 3, 72  # segments; of a rest as many times fewer; of all revolutions
+FEWEST_SAMPLES = 20  # of a segment
+FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
+PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
+AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise one bin in 10⁹ does
+
+
+def segment_counts(revolutions: int) -> tuple[int, int]:
+    """Return how many segments each revolution has, of which there are so many, and each rest."""
+    segments = max(1, min(OF_REVOLUTION, MOST // max(revolutions, 1)))
+    return segments, max(1, segments // OF_REST)
+
+
+@dataclass(frozen=True, slots=True)
+class MotionInterval:
+    """An interval of time in which the arm made a motion, on the clock of its states.
+
+    `unseen_rad` is what samples may miss of where the motion begins or ends.
+    """
+
+    motion: ArmMotion
+    start_s: float
+    end_s: float
+    unseen_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A part of a revolution or rest, averaged.
+
+    position: from −1 in the first segment to 1 in the last.
+    mean: of the readings, rad/s.
+    rate_rad_s (3,): mean rate of the flange against the base, in its frame, by the weights of that mean.
+    attitude (3, 3): mean rotation from the base into the flange's frame.
+    """
+
+    position: float
+    mean: Mean
+    rate_rad_s: Array
+    attitude: Array
+    interval: MotionInterval
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentedAverage:
+    """A revolution or rest: its `average` as a whole, its segments, its readings as recorded.
+
+    `speed_std` is the standard deviation of the mean speed, relative to it; zero of a rest.
+    """
+
+    average: Average
+    segments: tuple[Segment, ...]
+    readings: RawReadings
+    speed_std: float = 0.0
+
+
+def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[SegmentedAverage, ...]:
+    """Return all revolutions of a gyroscope in segments, then all its rests, in the order of the recordings.
+
+    A rest of too few samples to tell its noise has no segments.
+    """
+    streams = [(recording, recording.stream(name)) for recording in recordings]
+    turns = [(*streamed, turn) for streamed in streams for turn in streamed[0].sensors[name].revolutions]
+    rests = [(*streamed, rest) for streamed in streams for rest in streamed[0].sensors[name].rests]
+    of_turn, of_rest = segment_counts(len(turns))
+    return (
+        *(
+            _segment_revolution(stream, recording.motion, turn, of_turn, sweep)
+            for sweep, (recording, stream, turn) in enumerate(turns)
+        ),
+        *(
+            _segment_rest(
+                stream, recording.motion, rest, of_rest, response_of(stream, recording.sensors[name].revolutions)
+            )
+            for recording, stream, rest in rests
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Division:
+    """Samples of a window that lie in segments.
+
+    inside: all samples of the window. used (n,): which of them lie in a segment with `enough`.
+    time_s (m,), readings_rad_s (m, 3): those. groups (m, p): segments they belong to. ends_s (p + 1,): of the segments.
+    """
+
+    inside: slice
+    used: NDArray[np.bool_]
+    time_s: Array
+    readings_rad_s: Array
+    groups: Array
+    ends_s: Array
+    enough: tuple[int, ...]
+    steps: Steps
+
+    @property
+    def averages(self) -> Array:
+        """(p, m) weights of the even means of the segments."""
+        return mean_weights(self.groups, self.groups[:, :0])
+
+    def without_means(self, values: Array, weights: Array) -> Array:
+        """Return values (m, k) less their segments' means by weights (p, m)."""
+        residuals: Array = values - self.groups @ (weights @ values)
+        return residuals
+
+
+def _divide(stream: Stream, average: Average, known: NDArray[np.bool_], count: int) -> _Division:
+    """Divide the samples of an average that are `known` (n,) into so many segments, or into fewer of few samples."""
+    inside = between(stream, average.start_s, average.end_s)
+    time_s = stream.time_s[inside]
+    count = max(1, min(count, int(known.sum()) // FEWEST_SAMPLES))
+    ends_s = np.linspace(average.start_s, average.end_s, count + 1)
+    index = np.where(known, np.clip(np.searchsorted(ends_s, time_s, side="right") - 1, 0, count - 1), -1)
+    enough = tuple(segment for segment in range(count) if np.sum(index == segment) >= FEWEST_SAMPLES / 2)
+    used = np.isin(index, enough)
+    readings = stream.readings_rad_s[inside][used]
+    groups = even_groups(index[used], count)
+    return _Division(inside, used, time_s[used], readings, groups, ends_s, enough, stream.steps)
+
+
+def _segment_revolution(
+    stream: Stream, motion: ArmMotion, turn: Observation, count: int, sweep: int
+) -> SegmentedAverage:
+    """Average a revolution or an arc in segments beside the lines that were found when it was averaged as a whole.
+
+    The encoders do not see all that vibrates, and what they miss of a ripple is no noise of a segment's.
+    """
+    average, axis = turn.average, turn.axis_flange
+    times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
+    division = _divide(stream, average, motion.covered(times_s), count)
+    rates = motion.sampled_rates(times_s)[division.used]
+    share = (division.time_s - average.start_s) / average.duration_s
+    lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
+    vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
+    residual, vibration = (
+        division.without_means(values, division.averages) for values in (division.readings_rad_s, vibration)
+    )
+    shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
+    unshaken = residual - shaken
+    noise = Noise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.freedom)
+    segments = _average(
+        division,
+        motion,
+        weights=mean_weights(division.groups, lines),
+        residuals=unshaken - lines @ fitted(lines, unshaken),
+        rates=rates,
+        noise=noise,
+    )
+    lsb = stream.sensor.channel(RATE).unit_per_count
+    readings = RawReadings(
+        sweep=sweep,
+        counts=counts_of(stream, RATE, division.inside),
+        residual_counts=unshaken / lsb,
+        vibration_counts=np.sqrt(np.mean(shaken**2, axis=0)) / lsb,
+    )
+    return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
+
+
+def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
+    """Average a rest in segments beside what vibrates in it, of an arm that does not swing: see `rests_of`."""
+    inside = between(stream, average.start_s, average.end_s)
+    division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
+    readings = division.readings_rad_s - motion.swing_rates(division.time_s) @ response.T
+    division = replace(division, readings_rad_s=readings)
+    share = (division.time_s - average.start_s) / average.duration_s
+    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share)
+    lines = waves(cycles, share, AT_REST.beats)
+    weights = mean_weights(division.groups, lines)
+    beside_lines = division.without_means(readings, weights)
+    residuals = beside_lines - lines @ fitted(lines, beside_lines)
+    segments = _average(
+        division,
+        motion,
+        weights=weights,
+        residuals=residuals,
+        rates=np.zeros((len(readings), 3)),
+        noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
+    )
+    lsb = stream.sensor.channel(RATE).unit_per_count
+    vibrating = division.without_means(readings, division.averages)
+    raw = RawReadings(
+        sweep=REST,
+        counts=counts_of(stream, RATE, division.inside),
+        residual_counts=residuals / lsb,
+        vibration_counts=np.zeros(3),
+        swing_rad2=swings(vibrating, lines, cycles / average.duration_s),
+    )
+    return SegmentedAverage(average, segments if average.samples >= FEWEST_AT_REST else (), raw)
+
+
+def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> Noise:
+    """Return the noise of readings whose residuals (n, 3) so many segments and columns of lines leave."""
+    dof = max(len(residuals) - segments - columns, 1)
+    scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
+    in_a_mean = scatter * np.array([widening(axis) for axis in residuals.T])
+    if columns:
+        at_zero = np.maximum(noise_at_zero(residuals), steps.variance)
+        in_a_mean = np.where(at_zero < PREVAILS * scatter, at_zero, in_a_mean)
+    return Noise(scatter, in_a_mean, float(dof))
+
+
+def _average(
+    division: _Division, motion: ArmMotion, *, weights: Array, residuals: Array, rates: Array, noise: Noise
+) -> tuple[Segment, ...]:
+    """Return the segments with enough samples: readings and the flange's rates (m, 3) by the same weights (p, m)."""
+    readings = division.readings_rad_s
+    own, rows = division.groups[:, division.enough], weights[list(division.enough)]
+    smooth = readings - residuals
+    means = weighted_means(readings, own, rows, smooth=smooth, noise=noise, steps=division.steps)
+    last, segments = len(weights) - 1, list[Segment]()
+    for index, mean, rate_rad_s in zip(division.enough, means, rows @ rates, strict=True):
+        start_s, end_s = division.ends_s[index : index + 2].tolist()
+        segments.append(
+            Segment(
+                position=2 * index / last - 1 if last else 0.0,
+                mean=mean,
+                rate_rad_s=rate_rad_s,
+                attitude=motion.attitude(start_s, end_s),
+                interval=MotionInterval(motion, start_s, end_s),
+            )
+        )
+    return tuple(segments)

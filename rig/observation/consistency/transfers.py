@@ -1,0 +1,175 @@
+"""Transfers between sweeps and rests, each averaged whole: the only rotation about some axes at another time.
+
+Each axis is swept in one interval of time, so that the sweeps alone do not show that its scale factor changed before or
+after. In the transfers the wrists turn by half a turn, from standing to standing, two of them at a time: so the
+sensor's mean reading is as well known by the arm as in a sweep, about axes that are not being swept.
+
+No lines are sought in a transfer: it is short, and the servo's own vibration grows faster and slower in it. Where that
+passes the data rate it stands still in the samples, and their mean is off by more than their scatter tells: see
+`rig.analysis.consistency.consistency`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rig.data.quantity import RATE
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.statistics.rounding import rounding_left
+from rig.motion.geometry import flange_attitude, flange_pose
+from rig.observation.average import Stream, between
+from rig.observation.consistency.segments import MotionInterval
+from rig.observation.motion.arm_motion import ArmMotion
+from rig.observation.motion.known_motion import MIN_RATE_RAD_S
+from rig.observation.observed_run import ObservedRun
+from rig.observation.statistics.lines import unit_columns
+from rig.observation.statistics.tapered_weights import noise_at_zero
+from rig.observation.windows import rested, swept
+
+BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
+SHORTEST_S, LONGEST_S = 0.5, 30.0
+SPARSE_S = 0.0105  # samples that are farther apart miss what the servo's vibration does while it grows faster
+# Samples add up to a transfer but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, by the
+# place x in an interval (Euler and Maclaurin). B₂, Bernoulli's second polynomial, is √(1/180) RMS; either end has two.
+CORNERS = (2 / 180) ** 0.5 / 2
+LOST = 0.01  # of the samples, at most, by a rate that a board keeps so well
+GAP = 1.5  # of the interval between samples: one is missing, and with it so much of the transfer
+STEPS = 48
+FILTERED = range(-2, 3)  # samples, from which to which a filter makes one reading of the arm's rates
+WRISTS = 3  # whose transfers count, the last joints
+STANDS_RAD = 1e-3  # what a joint that does not turn seems to
+LOW = 0.0  # of the data rate: no more low frequencies than the fewest, for a servo's vibration is near
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
+
+    clock_offset_s: takes its times to the clock of the first recording.
+    mean_rad_s (3,): mean of the readings.
+    scatter_rad2_s2 (3,): variance of that by what neither the arm nor gravity explains of the readings.
+    rounding_rad2_s2 (3,): variance of that by rounding.
+    rate_rad_s (3,): mean rate of the flange against the base, in its frame.
+    gravity_m_s2 (3,): as it is sensed where the sensors sit, in that frame.
+    attitude (3, 3): from the base into that frame.
+    """
+
+    clock_offset_s: float
+    mean_rad_s: Array
+    scatter_rad2_s2: Array
+    rounding_rad2_s2: Array
+    rate_rad_s: Array
+    gravity_m_s2: Array
+    attitude: Array
+    interval: MotionInterval
+
+
+def average_transfers(
+    name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
+) -> list[Transfer]:
+    """Average all transfers of a gyroscope of F (3, 3) that sits at `extension_m` (3,) from the flange, in its frame.
+
+    In none of them a sample is missing or out of range.
+    """
+    transfers = list[Transfer]()
+    for recording in recordings:
+        stream = recording.stream(name)
+        for interval in _find_transfers(recording.run, stream, recording.motion):
+            inside = between(stream, interval.start_s, interval.end_s)
+            readings, time_s = stream.readings_rad_s[inside], stream.time_s[inside]
+            moving = interval.motion.rate(time_s) @ matrix.T
+            transfers.append(
+                Transfer(
+                    clock_offset_s=recording.clock_offset_s,
+                    mean_rad_s=readings.mean(axis=0),
+                    scatter_rad2_s2=_scatter(readings, time_s, interval.motion, site.down_m_s2),
+                    rounding_rad2_s2=rounding_left(readings, stream.steps, moving, stream.steps.variance),
+                    rate_rad_s=interval.motion.mean_rate(interval.start_s, interval.end_s),
+                    gravity_m_s2=sensed_gravity_m_s2(interval, site.down_m_s2, extension_m),
+                    attitude=interval.motion.attitude(interval.start_s, interval.end_s),
+                    interval=interval,
+                )
+            )
+    return transfers
+
+
+def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
+    """Return the interval from before the arm moves to when it stands; None if it does not move in this time."""
+    inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
+    moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
+    if not len(moving):
+        return None
+    return MotionInterval(motion, max(start_s, float(moving[0]) - BEYOND_S), min(end_s, float(moving[-1]) + BEYOND_S))
+
+
+def is_by_wrists(interval: MotionInterval) -> bool:
+    """Return whether a transfer counts: it is neither too short nor too long, and only wrists turn."""
+    before = max(interval.motion.kinematics.joints - WRISTS, 0)  # of any chain the last three joints are its wrists
+    others = interval.motion.angles(np.linspace(interval.start_s, interval.end_s, STEPS))[:, :before]
+    rotated_rad = np.ptp(others, axis=0).max(initial=0.0)
+    return bool(SHORTEST_S < interval.end_s - interval.start_s < LONGEST_S and rotated_rad < STANDS_RAD)
+
+
+def sensed_gravity_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
+    """Return the mean (3,) of gravity less the acceleration of where the sensors sit, in the flange's frame."""
+    time_s, step_s = np.linspace(interval.start_s, interval.end_s, STEPS, retstep=True)
+    pose = flange_pose(interval.motion.angles(time_s), interval.motion.kinematics)
+    position_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
+    acceleration = np.diff(position_m, n=2, axis=0) / step_s**2
+    sensed = np.einsum("nji,nj->ni", pose[1:-1, :3, :3], down_m_s2 - acceleration)
+    return np.asarray(interval.motion.mount @ sensed.mean(axis=0), dtype=np.float64)
+
+
+def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
+    """Return (3,) the variance of the mean of readings (n, 3) by what neither the arm nor gravity explains.
+
+    A sensor's filter, whatever it is, makes of the arm's rates those of the samples around. A ripple that is faster
+    than readings and states come looks like noise, at low frequencies too.
+    """
+    step_s = float(np.median(np.diff(time_s)))
+    rates = [motion.sampled_rates(time_s + late * step_s) for late in FILTERED]
+    gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
+    columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))
+    left = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
+    variance: Array = noise_at_zero(left, LOW) / len(readings)
+    return variance
+
+
+def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
+    """Return those from before the arm moves to when it stands, in which nothing is missing.
+
+    There is none of a shaft whose encoder is known over whole turns alone: a transfer is a part of one.
+    """
+    if not motion.tells_parts_of_turns:
+        return
+    windows = sorted([*(sweep.window for sweep in swept(run)), *rested(run)], key=lambda window: window.start_s)
+    for before, after in pairwise(windows):
+        yield from _whole_transfer(before.end_s, after.start_s, stream, motion)
+    if windows:
+        yield from _whole_transfer(float(motion.time_s[0]), windows[0].start_s, stream, motion)
+        yield from _whole_transfer(windows[-1].end_s, float(motion.time_s[-1]), stream, motion)
+
+
+def _whole_transfer(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
+    transfer = find_transfer(motion, start_s, end_s)
+    if transfer is None:
+        return
+    samples = between(stream, transfer.start_s, transfer.end_s)
+    time_s = stream.time_s[samples]
+    if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
+        return
+    step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    turning = motion.time_s[(motion.time_s >= transfer.start_s) & (motion.time_s <= transfer.end_s)]
+    unseen_rad = float(np.linalg.norm(motion.rate(turning, 1), axis=1).max() * CORNERS * step_s**2)
+    transfer = MotionInterval(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
+    complete = len(time_s) >= (1 - LOST) * (transfer.end_s - transfer.start_s) * stream.sensor.rate_hz
+    complete &= bool(np.diff(time_s).max() < GAP * step_s)
+    ends = np.linalg.norm(motion.rate(np.array([transfer.start_s, transfer.end_s])), axis=1)
+    in_range = not stream.sensor.channel(RATE).saturated(stream.raw[samples]).any()
+    stands = ends.max() < 2 * MIN_RATE_RAD_S
+    if is_by_wrists(transfer) and complete and in_range and stands and motion.covered(time_s).all():
+        yield transfer

@@ -1,0 +1,1 @@
+"""Recordings made elsewhere: from columns of samples, sweeps and attitudes to observations."""

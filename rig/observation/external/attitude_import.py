@@ -1,0 +1,265 @@
+"""Data recorded elsewhere in known attitudes: a CSV file of samples and one of attitudes, as TRIAX uses them.
+
+samples: as `rig.observation.external.csv_samples` says.
+
+attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
+coordinates; where the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; where it is
+known how good the attitude is, `attitude_std_rad` about each axis. While the table turns, a row holds for its middle
+and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model. Only a
+gyroscope is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
+(`rig.observation.external.placements`).
+
+Columns may stand in any order; the first row holds their names.
+
+Where the table wrote its attitudes by a clock of its own, the samples' is found by the turning that both saw, as a
+board's is on the arm (`rig.observation.timebase`).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import RATE, Quantity
+from rig.data.recording.motion_file import MOTIONS
+from rig.errors import Fault, Refused, or_fault
+from rig.estimation.arrays import Array
+from rig.observation.external.csv_samples import Samples
+from rig.observation.external.csv_windows import (
+    MIN_SAMPLES,
+    check_complete,
+    check_overlap,
+    check_scattered,
+    clocks_apart,
+    is_complete,
+    overlapping,
+    scatter_of,
+)
+from rig.observation.external.fixes import Turning
+from rig.observation.external.omitted import Omitted
+from rig.observation.external.placement_account import AttitudeRows
+from rig.observation.external.placements import MOSTLY, Placements, find_placements
+from rig.observation.external.table_motion import TableMotion
+from rig.observation.formats.csv_table import Mapped, read_columns
+from rig.observation.formats.sample_files import attitudes_in
+from rig.observation.sampling import find_sampling
+from rig.observation.timebase import TimeBase, estimate_time_base
+from rig.observation.windows import Window, inside
+
+RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
+STD_COLUMN = "attitude_std_rad"
+ATTITUDES_MB = 32  # an hour's table at 50 Hz
+NORM_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """What a gyroscope read in N rows: `means` (N, 3), the `variances` (N, 3) of these, known with `freedom` (N, 3).
+
+    No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
+    table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
+    """
+
+    means: Array
+    variances: Array | None
+    freedom: Array | None
+    samples: Array
+    attitudes: Array
+    rates_rad_s: Array | None
+    attitude_std_rad: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedReadings:
+    """What the two files tell of the `quantities` that were recorded.
+
+    A gyroscope's `rows`, and in `turning` its own readings and all rows, for what is solved from how far the body
+    turned; for the other sensors `placements`, or why there are none. `clock` where it had to be found. `omitted` are
+    rows that the recording does not cover, `incomplete` those that tell no mean rate, `unsampled` those that tell no
+    placement, for samples are missing in them.
+    """
+
+    quantities: tuple[Quantity, ...]
+    rows: Rows | None
+    turning: Turning | None
+    placements: Placements | Fault | None
+    clock: TimeBase | None = None
+    omitted: tuple[Omitted, ...] = ()
+    incomplete: tuple[Omitted, ...] = ()
+    unsampled: tuple[Omitted, ...] = ()
+
+
+def read_attitudes(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
+    """The columns (N,) of a file of attitudes, in whichever format it is; `mapped` where its columns are others'.
+
+    Times of a table of text count from `origin_s`.
+    Raises as `attitudes_in`; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    """
+    found = attitudes_in(path)
+    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB, mapped, origin_s) if found is None else dict(found)
+
+
+def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
+    """Samples averaged in attitudes, given by the columns of their file.
+
+    With `find_clock` each has its own clock; rows that no sample covers are left out. Raises Refused `bad_quaternion`,
+    `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`, `too_few_observations`, and with
+    `find_clock` as `TableMotion` and `estimate_time_base`.
+    """
+    time_s, readings = samples.time_s, samples.readings
+    rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
+    windows = _windows(table)
+    given = said = _Said(windows, _rotations(table), rates, _stated(table), np.arange(1, len(windows) + 1))
+    clock = None
+    if find_clock:
+        _check_has_rates(readings)
+        clock = estimate_time_base(time_s, readings[RATE], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates))
+        time_s = clock.controller_time_s(time_s)
+        said = said.of(np.flatnonzero(_within(said.rows_s, time_s)))
+    if not said.windows:
+        raise clocks_apart(time_s, windows)
+    check_overlap(time_s, said.windows)
+    sampling = find_sampling(time_s)
+    check_scattered(sampling)
+    expected = sampling.expected(time_s, said.rows_s)
+    counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
+    mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
+    sampled = said.of(np.flatnonzero(mostly))
+    covered = said.of(np.flatnonzero(mostly | _within(said.rows_s, time_s)))
+    whole = said.of(_whole(said, counts, expected))
+    rate = readings.get(RATE)
+    rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
+    place = partial(find_placements, time_s, readings, rows)
+    return PlacedReadings(
+        tuple(readings),
+        None if rate is None else _rows(time_s, rate, whole),
+        None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
+        None if set(readings) == {RATE} else or_fault(place),  # a gyroscope needs none
+        clock,
+        tuple(_omitted(given, covered, "not covered by the recording")),
+        tuple(_omitted(covered, whole, "lost_samples: samples are missing in them")),
+        tuple(_omitted(covered, sampled, "lost_samples: half of their samples or more are missing")),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given.
+
+    `numbers` (N,) are theirs in the file, from 1.
+    """
+
+    windows: list[Window]
+    attitudes: Array
+    rates_rad_s: Array | None
+    std_rad: Array | None
+    numbers: NDArray[np.intp]
+
+    @property
+    def rows_s(self) -> Array:
+        return np.array([(window.start_s, window.end_s) for window in self.windows])
+
+    def of(self, rows: NDArray[np.intp]) -> "_Said":
+        rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
+        return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+
+
+def _within(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
+    """Return which of the rows (N, 2) lie within a recording at `time_s` (n,)."""
+    within: NDArray[np.bool_] = (rows_s[:, 0] >= time_s[0]) & (rows_s[:, 1] <= time_s[-1])
+    return within
+
+
+def _omitted(given: _Said, kept: _Said, reason: str) -> Iterator[Omitted]:
+    """The rows that were given and not kept, if there are any."""
+    if lost := np.setdiff1d(given.numbers, kept.numbers).tolist():
+        window = given.windows[given.numbers.tolist().index(lost[0])]
+        yield Omitted("rows", len(lost), len(given.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")
+
+
+def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
+    cuts = [rate[inside(time_s, window)] for window in fixes.windows]
+    counts = np.array([len(cut) for cut in cuts])
+    told = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
+    return Rows(
+        np.array([cut.mean(axis=0) for cut in cuts]),
+        None if told is None else told[:, 0],
+        None if told is None else told[:, 1],
+        counts.astype(np.float64),
+        fixes.attitudes,
+        fixes.rates_rad_s,
+        fixes.std_rad,
+    )
+
+
+def _whole(rows: _Said, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
+    """The rows whose samples are there.
+
+    Raises Fault `lost_samples` where there is none, or where more of the long ones lack samples than have them all: a
+    short row among many may fall into a gap.
+    """
+    whole = np.array([is_complete(*each, least=1) for each in zip(counts.tolist(), expected.tolist(), strict=True)])
+    long = expected >= MIN_SAMPLES
+    if not whole.any() or 2 * int((long & ~whole).sum()) > int(long.sum()):
+        row = int(np.argmin(whole))
+        where = f"attitude {rows.numbers[row]}"
+        check_complete(int(counts[row]), float(expected[row]), rows.windows[row], where, least=1)
+    return np.flatnonzero(whole)
+
+
+def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:
+    if RATE not in readings:
+        raise Refused(
+            "wrong_columns",
+            "the samples contain no turn rate, which is needed to find their clock",
+            f"Give {', '.join(RATE.columns)} with them, or write both files by one clock",
+        )
+
+
+def _windows(rows: Mapping[str, Array]) -> list[Window]:
+    if not len(rows["start_s"]):
+        raise Fault("too_few_observations", "there is no attitude", "Give a row for every attitude")
+    windows = [Window(start_s, end_s) for start_s, end_s in zip(rows["start_s"], rows["end_s"], strict=True)]
+    for row, window in enumerate(windows, start=1):
+        if window.end_s <= window.start_s:
+            raise Refused(
+                "bad_attitude_row",
+                f"attitude {row} ends before it starts",
+                "Give start_s before end_s, on the samples' clock",
+            )
+    if shared := overlapping(windows):
+        raise Refused(
+            "overlapping_attitudes",
+            f"attitudes {shared[0]} and {shared[1]} share samples",
+            "Give every attitude its own start and end",
+        )
+    return windows
+
+
+def _rotations(rows: Mapping[str, Array]) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    quaternions = np.column_stack([rows[name] for name in ("qw", "qx", "qy", "qz")])
+    norms = np.linalg.norm(quaternions, axis=1)
+    worst = int(np.argmax(np.abs(norms - 1)))
+    if abs(norms[worst] - 1) > NORM_TOLERANCE:
+        raise Refused(
+            "bad_quaternion",
+            f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}",
+            "Give unit quaternions qw qx qy qz that take body to table coordinates",
+        )
+    return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix(), dtype=np.float64)
+
+
+def _stated(rows: Mapping[str, Array]) -> Array | None:
+    stated = rows.get(STD_COLUMN)
+    if stated is not None and (stated < 0).any():
+        raise Refused(
+            "bad_attitude_row",
+            f"attitude {int(np.argmin(stated)) + 1} has a negative {STD_COLUMN}",
+            "Give the standard deviation of the attitude about each axis in rad, 0 if it is exact",
+        )
+    return stated

@@ -1,0 +1,200 @@
+"""Data recorded elsewhere: a CSV file of samples and one of sweeps, solved as the rig solves its own recordings.
+
+samples: as `rig.observation.external.csv_samples` says, a gyroscope's among them; other sensors' are left alone.
+
+sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
+the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
+end). A row of speed or angle 0 is a rest; its axis means nothing. Where the table or servo vibrates, let the sweep be a
+whole turn: over that its mean speed is 2π/T all the same. It may say how well it is known: `angle_std_rad`, how far the
+body may have ended off where it was said to, and `axis_std_rad`, how far the axis may have leaned.
+
+A row with an angle at both ends of which the body lay still is solved by how far the gyroscope turned meanwhile
+(`rig.estimation.gyroscope.known_turns`): that is how a hand turns, or a servo that starts and stops.
+
+Columns may stand in any order; the first row holds their names.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rig.data.quantity import RATE
+from rig.data.recording.motion_file import MOTIONS
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.estimation.refusals import check_reading_ratio
+from rig.observation.average import Average
+from rig.observation.external.csv_samples import Samples
+from rig.observation.external.csv_windows import (
+    average_of,
+    check_complete,
+    check_overlap,
+    check_scattered,
+    check_times,
+    overlapping,
+)
+from rig.observation.external.omitted import Omitted
+from rig.observation.external.turns import Known, TurnedData, turned
+from rig.observation.formats.csv_table import Mapped, read_columns
+from rig.observation.observe import Observation, nearest_axis
+from rig.observation.sampling import Sampling, find_sampling
+from rig.observation.stuck_check import check_reads
+from rig.observation.windows import Window, inside
+
+AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
+STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
+MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
+LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
+SWEEPS_MB = 1  # some ten thousand sweeps
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalData:
+    """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was.
+
+    `at_reference`: taken to one temperature by polynomials, which count what repeats contradict each other by.
+    `by_mean`: the numbers of the rows with an angle whose mean speed is all that counts, for the body did not lie still
+    before or after. `omitted`: the readings that are missing in the rows.
+    """
+
+    sweeps: tuple[Observation, ...]
+    rests: tuple[Average, ...]
+    turned: TurnedData | None = None
+    at_reference: bool = False
+    by_mean: tuple[int, ...] = ()
+    omitted: tuple[Omitted, ...] = ()
+
+
+def read_sweeps(path: Path, mapped: Mapped | None = None, origin_s: int = 0) -> dict[str, Array]:
+    """The columns (k,) of a file of sweeps, times from `origin_s` on.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    """
+    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB, mapped, origin_s)
+
+
+def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
+    """Samples, a gyroscope's among them, averaged over sweeps, given by the columns of their file.
+
+    Raises Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does, `stuck_sensor`.
+    """
+    check_reads(samples.readings[RATE], RATE)
+    found = average(
+        np.column_stack([samples.time_s, samples.readings[RATE]]),
+        np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
+        np.column_stack([sweeps[name] for name in AXIS_COLUMNS]),
+        samples.temperature_c,
+    )
+    if "angle_rad" not in sweeps:
+        return found
+    known = Known(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
+    by_angle = turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests)
+    solved = () if by_angle is None else by_angle.rows
+    by_mean = tuple(each.sweep for each in found.sweeps if each.sweep not in solved)
+    return replace(found, turned=by_angle, by_mean=by_mean)
+
+
+def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
+    """Samples (n, 4) = [time_s, x, y, z] averaged over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
+
+    `temperature_c` (n,) is how warm it was at each sample, None where nothing tells that.
+    Raises Refused `time_not_increasing`, `overlapping_sweeps`; Fault `too_few_observations`, `clocks_apart`,
+    `lost_samples`, `wrong_unit`.
+    """
+    time_s, readings = samples[:, 0], samples[:, 1:]
+    check_times(time_s)
+    if not len(sweeps):
+        raise Fault("too_few_observations", "there is no sweep", "Give a row for every sweep and every rest")
+    windows = [Window(start_s, end_s) for start_s, end_s in sweeps[:, :2].tolist()]
+    if shared := overlapping(windows):
+        raise Refused(
+            "overlapping_sweeps",
+            f"sweeps {shared[0]} and {shared[1]} share samples",
+            "Give every sweep once, with its own start and end",
+        )
+    check_overlap(time_s, windows)
+    sampling = find_sampling(time_s)
+    check_scattered(sampling)
+    expected = sampling.expected(time_s, sweeps[:, :2]).tolist()
+    turns, rests = [], []
+    for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
+        within = inside(time_s, window)
+        cut = readings[within]
+        check_complete(len(cut), expected[row - 1], window, f"sweep {row}")
+        mean = average_of(cut, window)
+        if temperature_c is not None:
+            mean = replace(mean, temperature_c=float(temperature_c[within].mean()))
+        if speed == 0:
+            rests.append(mean)
+        else:
+            turns.append(_observation(row, mean, speed, axes[row - 1]))
+    _check_unit(turns)
+    return ExternalData(tuple(turns), tuple(rests), omitted=tuple(_missing(time_s, sampling, windows)))
+
+
+def _missing(time_s: Array, sampling: Sampling, windows: Sequence[Window]) -> Iterator[Omitted]:
+    """The readings that are missing between those of the rows, if there are any."""
+    cuts = [inside(time_s, window) for window in windows]
+    gaps = [cut.start + np.flatnonzero(sampling.missing[cut.start : max(cut.stop - 1, cut.start)]) for cut in cuts]
+    if lost := int(sum(sampling.missing[each].sum() for each in gaps)):
+        row = next(row for row, each in enumerate(gaps) if len(each))
+        where = f"after {time_s[gaps[row][0]]:.10g} s, in row {row + 1}"
+        total = lost + sum(cut.stop - cut.start for cut in cuts)
+        yield Omitted("readings", lost, total, "lost_samples: they are missing", where)
+
+
+def _speeds(sweeps: Mapping[str, Array]) -> Array:
+    """Mean speeds (k,), from whichever of the two columns there is. Raises Refused `bad_sweep`."""
+    durations = sweeps["end_s"] - sweeps["start_s"]
+    by_angle = "angle_rad" in sweeps
+    motion = sweeps["angle_rad" if by_angle else "speed_rad_s"]
+    norms = np.linalg.norm(np.column_stack([sweeps[name] for name in AXIS_COLUMNS]), axis=1)
+    for row, (duration, moved, norm) in enumerate(zip(durations, motion, norms, strict=True), start=1):
+        what = None
+        if duration <= 0:
+            what = "ends before it starts"
+        elif duration < MIN_DURATION_S:
+            what = f"lasts {duration:g} s, which is no time to sweep"
+        elif moved < 0:
+            what = "turns by less than nothing"
+        elif 0 < moved < LEAST_MOTION:
+            what = f"turns by {moved:.0e}, which is nothing, and a rest has 0"
+        elif moved > 0 and abs(norm - 1) > 1e-3:
+            what = f"has an axis of length {norm:.3g}"
+        elif any(sweeps[name][row - 1] <= 0 for name in STD_COLUMNS if name in sweeps and moved > 0):
+            what = "is said to be known exactly"
+        if what:
+            raise Refused(
+                "bad_sweep",
+                f"sweep {row} {what}",
+                "Give start before end, a positive speed or angle, and the direction of the turn as a unit vector; "
+                "standard deviations above zero",
+            )
+    return np.asarray(motion / durations if by_angle else motion, dtype=np.float64)
+
+
+def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Observation:
+    name, sign = nearest_axis(axis)
+    return Observation(
+        sweep=row,
+        joint_name=None,
+        direction=None,
+        axis=name,
+        sign=sign,
+        axis_flange=axis,
+        speed_rad_s=speed_rad_s,
+        speed_std_rad_s=0.0,
+        lost=0,
+        average=mean,
+    )
+
+
+def _check_unit(turns: Sequence[Observation]) -> None:
+    """Readings counted from their mean, which takes the bias out, must be about as large as the speeds."""
+    if len(turns) < 2:
+        return
+    means = np.array([turn.average.mean_rad_s for turn in turns])
+    turned = np.sqrt(np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=1)))
+    check_reading_ratio(float(turned / np.sqrt(np.mean([turn.speed_rad_s**2 for turn in turns]))), "the sweeps")

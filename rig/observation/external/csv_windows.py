@@ -1,0 +1,116 @@
+"""What CSV files recorded elsewhere have in common: samples in the order of time, rows from one moment to another."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.observation.average import Average
+from rig.observation.sampling import Sampling
+from rig.observation.statistics.coloured_noise import left_of, widening
+from rig.observation.windows import Window
+
+MIN_SAMPLES = 20
+MAX_LOST_FRACTION = 0.01
+
+
+def check_times(time_s: Array, where: str = "the samples") -> None:
+    """Raises Refused `time_not_increasing`, which says `where`."""
+    what = f"{where} has {len(time_s)} samples, {MIN_SAMPLES} are the least" if len(time_s) < MIN_SAMPLES else None
+    back = np.flatnonzero(~(np.diff(time_s) > 0))
+    if len(back):
+        first = int(back[0])
+        what = (
+            f"{where} has time_s {time_s[first + 1]:.9g} after {time_s[first]:.9g}, in sample {first + 2}, and "
+            f"{len(back)} such steps in all: time_s must increase from row to row"
+        )
+    if what is not None:
+        raise Refused(
+            "time_not_increasing",
+            what,
+            "Give every sample once, in the order of time, on one clock, with all digits of its time",
+        )
+
+
+def overlapping(windows: Sequence[Window]) -> tuple[int, int] | None:
+    """Numbers, from 1, of two windows that share samples."""
+    order = np.argsort([window.start_s for window in windows]).tolist()
+    for first, second in pairwise(order):
+        if windows[second].start_s < windows[first].end_s:
+            return first + 1, second + 1
+    return None
+
+
+def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
+    """Variance of the mean of readings (n, 3), its degrees of freedom, and the standard deviation of one, (3,) each.
+
+    From the scatter about the mean; vibration counts as noise here, for no arm reports it.
+    """
+    variance = readings.var(axis=0, ddof=1)
+    left = (readings - readings.mean(axis=0)).T
+    wider, freedom = np.array([widening(each) for each in left]), np.array([left_of(each).freedom for each in left])
+    return variance * wider / len(readings), freedom, np.sqrt(variance)
+
+
+def average_of(readings: Array, window: Window) -> Average:
+    """The average of the readings (n, 3) that a window has; nothing tells their temperature."""
+    variance, freedom, noise = scatter_of(readings)
+    return Average(
+        mean_rad_s=readings.mean(axis=0),
+        variance_rad2_s2=variance,
+        noise_rad_s=noise,
+        samples=len(readings),
+        start_s=window.start_s,
+        end_s=window.end_s,
+        temperature_c=float("nan"),
+        freedom=freedom,
+    )
+
+
+ONE_CLOCK = "Check that both files use one clock in seconds, and that no samples are missing"
+
+
+def check_complete(count: int, expected: float, window: Window, where: str, least: int = MIN_SAMPLES) -> None:
+    """Raises Fault `lost_samples` where fewer samples are in a window than are `expected` there."""
+    if is_complete(count, expected, least):
+        return
+    lasts_s = window.end_s - window.start_s
+    wanted = f"{expected:.0f} are expected from {window.start_s:.10g} to {window.end_s:.10g} s"
+    if expected < least:
+        wanted = f"{least} are the least; it lasts {lasts_s:.3g} s at {expected / lasts_s:.3g} Hz"
+    raise Fault("lost_samples", f"{where} has {count} samples, but {wanted}", ONE_CLOCK)
+
+
+def is_complete(count: int, expected: float, least: int = MIN_SAMPLES) -> bool:
+    """Return whether a window holds the samples that are expected in it."""
+    return count >= max(least, (1 - MAX_LOST_FRACTION) * expected - 1)
+
+
+def check_scattered(sampling: Sampling) -> None:
+    """Raises Fault `lost_samples` where many readings are missing, and stamps are too bad to say which."""
+    if sampling.scattered > MAX_LOST_FRACTION:
+        raise Fault(
+            "lost_samples",
+            f"about {100 * sampling.scattered:.2g} % of the samples are missing all over the recording: their stamps "
+            "advance in steps that no even clock explains, and do not say where",
+            "See that the sensor's link loses nothing; stamp every reading when it is taken",
+        )
+
+
+def check_overlap(time_s: Array, windows: Sequence[Window]) -> None:
+    """Raises Fault `clocks_apart` where no window holds any of the samples at times (n,)."""
+    if all(each.end_s < time_s[0] or each.start_s > time_s[-1] for each in windows):
+        raise clocks_apart(time_s, windows)
+
+
+def clocks_apart(time_s: Array, windows: Sequence[Window]) -> Fault:
+    """The error for windows of which none holds a sample."""
+    start_s, end_s = min(each.start_s for each in windows), max(each.end_s for each in windows)
+    return Fault(
+        "clocks_apart",
+        f"the rows reach from {start_s:.10g} to {end_s:.10g} s, the samples from {time_s[0]:.10g} to "
+        f"{time_s[-1]:.10g} s: no row holds a sample",
+        "Write both files by one clock, in seconds; with --attitudes, --estimate-clock-offset finds their offset",
+    )

@@ -1,0 +1,68 @@
+"""What a gyroscope reads while readings and a reference's attitudes both say that the body lies still."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array, rotation_vectors
+from rig.observation.by_hand.rests import find_rests
+from rig.observation.external.fixes import Turning
+from rig.observation.external.still_attitudes import STILL_RAD_S, still_windows
+from rig.observation.windows import Window, inside
+
+FEWEST, FEWEST_S = 2, 1.0  # rests, which tell by their scatter how well each is known, and seconds of them in all
+
+
+@dataclass(frozen=True, slots=True)
+class MeansAtRest:
+    """The gyroscope's mean `readings_rad_s` (k, 3) of k rests, and how fast the body turned by the reference (k, 3)."""
+
+    readings_rad_s: Array
+    rates_rad_s: Array
+
+
+def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
+    """Return what both say of the rests, in the body's coordinates; None if the rests are too short in all.
+
+    `clock_s` takes the times of the rows to the clock of the readings.
+    """
+    rows_s = turning.rows_s.mean(axis=1) + clock_s
+    lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
+    readings, rates, lasting_s = [], [], 0.0
+    for rest in _several(find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)):
+        rows = np.flatnonzero((rows_s >= rest.start_s) & (rows_s <= rest.end_s))
+        if not len(rows):
+            continue
+        rows = rows[np.argsort(rows_s[rows])]
+        rate = _rate_rad_s(rows_s[rows], turning.attitudes[rows])
+        if np.linalg.norm(rate) <= STILL_RAD_S:
+            readings.append(turning.readings_rad_s[inside(turning.time_s, rest)].mean(axis=0))
+            rates.append(rate)
+            lasting_s += rest.end_s - rest.start_s
+    if len(rates) < FEWEST or lasting_s < FEWEST_S:
+        return None
+    return MeansAtRest(np.array(readings), np.array(rates))
+
+
+def _several(windows: Sequence[Window]) -> Sequence[Window]:
+    """The windows, of a single one its halves."""
+    if len(windows) != 1:
+        return windows
+    window = windows[0]
+    middle_s = (window.start_s + window.end_s) / 2
+    return (Window(window.start_s, middle_s), Window(middle_s, window.end_s))
+
+
+def _rate_rad_s(times_s: Array, attitudes: Array) -> Array:
+    """How fast the body turned (3,) by rows in the order of time: none by a single one, which says that it lay still.
+
+    The median of the rates from each row to the one half of them later (Theil's incomplete method, 1950): rows at an
+    end in which it moved already do not count.
+    """
+    half = len(times_s) // 2
+    if not half:
+        return np.zeros(3)
+    turned = rotation_vectors(np.swapaxes(attitudes[:half], -1, -2) @ attitudes[-half:])
+    return np.asarray(np.median(turned / (times_s[-half:] - times_s[:half])[:, None], axis=0), dtype=np.float64)

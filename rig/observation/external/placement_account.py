@@ -1,0 +1,116 @@
+"""What of a reference's rows and of their readings is no placement: counted, with reason, row and time."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.by_hand.rests import BLOCK_S
+from rig.observation.external.omitted import Omitted
+from rig.observation.sampling import find_sampling
+from rig.observation.windows import Window, inside
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeRows:
+    """Rows (N,) of a reference: their `windows`, `attitudes` (N, 3, 3), body to table, and `numbers` (N,) in its file.
+
+    `std_rad` (N,) of the attitudes as stated, None where nothing is.
+    """
+
+    windows: Sequence[Window]
+    attitudes: Array
+    numbers: NDArray[np.intp]
+    std_rad: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Which `rows` (N,) of a reference are placements of readings at `time_s` (n,): in which `rest` (N,), −1 in none.
+
+    `cuts` (N,) are the samples of each that are at rest. `dwells` (N,) are the rows that are long enough to say that
+    the body lay still in them; in the others it may move.
+    """
+
+    time_s: Array
+    rows: AttitudeRows
+    rest: NDArray[np.intp]
+    cuts: Sequence[NDArray[np.intp]]
+    dwells: NDArray[np.bool_]
+
+    def check_mostly_at_rest(self) -> None:
+        """Raises Fault `not_at_rest` where the body moves in every row, or in more of the dwells than it lies in."""
+        left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
+        if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):
+            return
+        what = f"the body moves in all of {len(windows)} rows, the first from {windows[0].start_s:.10g} s"
+        if (self.rest >= 0).any():
+            what = f"more rows are left out than kept: {next(self._moving(self.dwells))}"
+        raise Fault(
+            "not_at_rest",
+            f"{what}; but only a body at rest feels gravity, or a field, and nothing else",
+            "Add attitudes in which it lies still for half a second or longer; begin a row when it lies still",
+        )
+
+    def omitted(self, knocked: NDArray[np.intp]) -> Iterator[Omitted]:
+        """Yield the rows that are left out, and of other dwells the readings: those `knocked` (k,), moved, missing."""
+        yield from self._moving(np.ones_like(self.dwells))
+        kept = [self._inside(row) for row in self._kept]
+        total = sum(map(len, kept))
+        knocks = [np.intersect1d(knocked, each) for each in kept]
+        moved = [self._moved(row) for row in self._kept]
+        for found, reason in (
+            (knocks, "knocks that the others did not feel"),
+            (moved, "not_at_rest: the body was knocked or moved"),
+        ):
+            if count := sum(map(len, found)):
+                row, samples = next((row, each) for row, each in zip(self._kept, found, strict=True) if len(each))
+                yield Omitted(
+                    "readings at rest", count, total, reason, self._where(row, float(self.time_s[samples[0]]))
+                )
+        yield from self._missing(kept)
+
+    def _missing(self, kept: Sequence[NDArray[np.intp]]) -> Iterator[Omitted]:
+        """The readings that are missing in dwells with the samples `kept`, if there are any."""
+        sampling = find_sampling(self.time_s)
+        windows_s = np.array([(each.start_s, each.end_s) for each in self.rows.windows]).reshape(-1, 2)
+        expected = np.floor(sampling.expected(self.time_s, windows_s[self._kept])).astype(int)
+        gaps = [each[:-1][sampling.missing[each[:-1]] > 0] for each in kept]
+        inside = [int(sampling.missing[each].sum()) for each in gaps]
+        lost = [max(within, wanted - len(each)) for within, wanted, each in zip(inside, expected, kept, strict=True)]
+        if not any(lost):
+            return
+        first = next(number for number, count in enumerate(lost) if count)
+        row = self._kept[first]
+        at_s = self.time_s[gaps[first][0]] if len(gaps[first]) else self.rows.windows[row].start_s
+        reason = "lost_samples: they are missing"
+        yield Omitted(
+            "readings at rest", sum(lost), sum(lost) + sum(map(len, kept)), reason, self._where(row, float(at_s))
+        )
+
+    def _where(self, row: int, time_s: float) -> str:
+        return f"at {time_s:.10g} s, in row {self.rows.numbers[row]}"
+
+    @property
+    def _kept(self) -> list[int]:
+        return [int(row) for row in np.flatnonzero((self.rest >= 0) & self.dwells)]
+
+    def _moving(self, rows: NDArray[np.bool_]) -> Iterator[Omitted]:
+        """Yield the rows among these in which the body moves, if there are any."""
+        left_out = np.flatnonzero((self.rest < 0) & rows)
+        if len(left_out):
+            first = int(left_out[0])
+            where = f"row {self.rows.numbers[first]}, from {self.rows.windows[first].start_s:.10g} s"
+            yield Omitted("rows", len(left_out), int(rows.sum()), "not_at_rest: the body moves in them", where)
+
+    def _inside(self, row: int) -> NDArray[np.intp]:
+        return np.arange(*inside(self.time_s, self.rows.windows[row]).indices(len(self.time_s)))
+
+    def _moved(self, row: int) -> NDArray[np.intp]:
+        """The samples of a dwell that are not at rest; a rest is known to a block at either end."""
+        window, left_out = self.rows.windows[row], np.setdiff1d(self._inside(row), self.cuts[row])
+        near = (self.time_s[left_out] < window.start_s + BLOCK_S) | (self.time_s[left_out] > window.end_s - BLOCK_S)
+        return left_out[~near]

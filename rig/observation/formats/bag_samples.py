@@ -1,0 +1,195 @@
+"""Readings and attitudes from a ROS 2 bag, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
+
+A reading has the time of its message's header, so readings and poses stand on the clock of whoever stamped them. A pose
+(`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in the room. What reads a bag runs in a process of its
+own (`rig.observation.formats.sample_files`) and keeps no more of the bag than a piece.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rig.data.processes.reading_process import Part
+from rig.data.quantity import ACCELERATION, FIELD, RATE
+from rig.data.recording.motion_file import TIME
+from rig.errors import Refused
+from rig.errors.extras import missing_extra
+from rig.errors.quoting import listing, quote, shorten
+from rig.observation.formats.table_parts import LEFT_OUT, in_blocks
+
+IMU, MAGNETIC = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
+POSES = (
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+)
+QUATERNION = ("qw", "qx", "qy", "qz")
+NOT_PROVIDED = -1.0  # sensor_msgs/Imu: first element of a covariance of what a message does not hold
+SUFFIXES = (".mcap", ".db3")
+METADATA = "metadata.yaml"
+METADATA_BYTES = 4_000_000  # of two thousand topics, with all that is said of how each was sent
+DEFINITION_CHARACTERS = 100_000  # ten times what ROS 2 writes of a message, with all comments
+NANO = 10**9
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a bag, a folder with its metadata or one of its files."""
+    return (path / METADATA).exists() if path.is_dir() else path.suffix in SUFFIXES
+
+
+def bag_of(path: Path) -> Path:
+    """Return the folder of a bag, of which `path` may be one of the files; a file without metadata beside it is one."""
+    return path if path.is_dir() or not (path.parent / METADATA).exists() else path.parent
+
+
+def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
+    """Yield, `in_blocks`, the readings of the topic `inside` a bag, or of the only one with an Imu.
+
+    The columns are those of a CSV file, times are from the beginning of the bag on, and rows in the order of the bag.
+    Messages that hold no rate are left out and counted, and accelerations are left out if some of the others hold none.
+    Raise Refused `missing_extra`, `bag_topic`, and of a damaged bag whatever its parser ends in.
+    """
+    with _opened(path) as reader:
+        chosen = _chosen(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")
+        if chosen[0].msgtype == MAGNETIC:
+            fields = ((time_s, *_xyz(message.magnetic_field)) for time_s, message in _stamped(reader, chosen))
+            yield from in_blocks(fields, [TIME, *FIELD.columns])
+            return
+        columns: list[str | None] = [TIME, *RATE.columns, *ACCELERATION.columns]
+        counts = {LEFT_OUT: 0}
+        yield from in_blocks(_inertial(_stamped(reader, chosen), columns, counts), columns, counts)
+
+
+def bag_attitudes(path: Path, inside: str | None) -> Iterator[Part]:
+    """Yield, `in_blocks`, the poses in a bag: a time and a quaternion each. Raise as `bag_readings`."""
+    with _opened(path) as reader:
+        poses = _stamped(reader, _chosen(reader, POSES, inside, "attitudes"))
+        turned = ((time_s, _orientation(message)) for time_s, message in poses)
+        yield from in_blocks(((time_s, q.w, q.x, q.y, q.z) for time_s, q in turned), [TIME, *QUATERNION])
+
+
+def _inertial(
+    messages: Iterator[tuple[float, Any]], columns: list[str | None], counts: dict[str, int]
+) -> Iterator[tuple[float, ...]]:
+    """Yield the time, rate and acceleration of `sensor_msgs/Imu`; name None in `columns` what they do not hold.
+
+    Count in `counts` the messages that are left out. Those without a rate are kept until one with a rate comes. Raise
+    Refused `bag_topic` if none holds anything.
+    """
+    forces: list[tuple[float, ...]] = []
+    has_rates, all_forces = False, True
+    for time_s, message in messages:
+        row = (time_s, *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration))
+        has_force = float(message.linear_acceleration_covariance[0]) != NOT_PROVIDED
+        if float(message.angular_velocity_covariance[0]) != NOT_PROVIDED:
+            has_rates, all_forces = True, all_forces and has_force
+            counts[LEFT_OUT] += len(forces)
+            forces.clear()
+            yield row
+        elif has_force and not has_rates:
+            forces.append(row)
+        else:
+            counts[LEFT_OUT] += 1
+    if not has_rates and not forces:
+        raise Refused(
+            "bag_topic",
+            "the messages hold neither rates nor accelerations: the first element of their covariances is -1 in all",
+            "Name the topic of a sensor that measures behind the bag: BAG::/topic",
+        )
+    if not has_rates:
+        columns[1:4] = [None] * 3
+    elif not all_forces:
+        columns[4:] = [None] * 3
+    yield from forces
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open the bag's reader. Raise Refused `missing_extra`."""
+    try:
+        from rosbags.rosbag2 import Reader
+    except ImportError as error:
+        raise missing_extra(error, "ros2") from error
+    if path.is_dir() and (size := (path / METADATA).stat().st_size) > METADATA_BYTES:
+        raise ValueError(f"its {METADATA} is {size} bytes long, {METADATA_BYTES} at most")
+    with Reader(path) as reader:
+        yield reader
+
+
+def _chosen(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
+    """Return the connections of a topic; without a name, of the only one there is."""
+    there = [each for each in reader.connections if each.msgtype in types]
+    if topic is not None:
+        there = [each for each in there if each.topic == topic]
+    names = {each.topic for each in there}
+    if len(names) != 1:
+        known = listing(f"{shorten(topic)} ({shorten(of)})" for topic, of in _offered(reader, types))
+        asked = "" if topic is None else f" called {quote(topic)}"
+        raise Refused(
+            "bag_topic",
+            f"the bag has {len(names)} topics{asked} with {what} ({', '.join(types)}); its topics are {known}",
+            "Name one behind the bag: BAG::/topic",
+        )
+    return there
+
+
+def _offered(reader: Any, types: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the topics and their types, first those that could have been meant."""
+    there = {(each.topic, each.msgtype) for each in reader.connections}
+    return sorted(there, key=lambda each: (each[1] not in types, each))
+
+
+def _stamped(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]:
+    """Yield the messages with the seconds from the beginning of the bag to the stamps in their headers.
+
+    One beginning for every topic: seconds since 1970 leave a float no microseconds to spare.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    _check_layout(store, connections)
+    began_ns, count = int(reader.start_time), 0
+    for connection, _, data in reader.messages(connections=connections):
+        message: Any = store.deserialize_cdr(data, connection.msgtype)
+        stamp = message.header.stamp
+        yield (int(stamp.sec) * NANO + int(stamp.nanosec) - began_ns) / NANO, message
+        count += 1
+    if not count:
+        raise Refused(
+            "bag_topic", f"{quote(connections[0].topic)} has no message in the bag", "Name another topic: BAG::/topic"
+        )
+
+
+def _check_layout(store: Any, connections: Any) -> None:
+    """Raise ValueError if messages are laid out otherwise than ROS 2 does, by the definition that comes with them.
+
+    The definition is compared and nothing more: rosbags would write a program by it and run that.
+    """
+    from rosbags.interfaces import MessageDefinitionFormat
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+    for kind, definition in {(each.msgtype, each.msgdef) for each in connections}:
+        if len(definition.data) > DEFINITION_CHARACTERS:
+            raise ValueError(f"its definition of {kind} is {len(definition.data)} characters long")
+        if definition.format == MessageDefinitionFormat.MSG:
+            found = get_types_from_msg(definition.data, kind)
+        elif definition.format == MessageDefinitionFormat.IDL:
+            found = {}
+            for text in definition.data.split("=" * 80 + "\n"):
+                found |= get_types_from_idl(text.partition("\n")[2] if text.startswith("IDL: ") else text)
+        else:
+            continue
+        if other := sorted(name for name in found if name in store.fielddefs and found[name] != store.fielddefs[name]):
+            raise ValueError(f"its {listing(map(shorten, other))} is none of ROS 2")
+
+
+def _orientation(message: Any) -> Any:
+    if hasattr(message, "transform"):
+        return message.transform.rotation
+    pose = message.pose
+    return pose.orientation if hasattr(pose, "orientation") else pose.pose.orientation
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z

@@ -1,0 +1,88 @@
+"""The rows of cells in a text file that somebody else wrote: packed or not, in whichever encoding, within bounds."""
+
+import codecs
+import csv
+import os
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from gzip import GzipFile
+from io import TextIOWrapper
+from itertools import chain, islice
+from pathlib import Path
+from typing import BinaryIO
+
+from rig.config.files.regular_file import UnfitFile, open_regular_file
+from rig.errors import Refused
+
+HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which come to four times that in memory
+LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
+GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+MARKS = ";\t"
+
+
+def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
+    """Yield the rows of a regular file that is not too large, after so many lines of it. Raises Refused `no_file`."""
+    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file, _text(file) as text:
+        lines = _lines(text, largest_mb * 1_000_000)
+        first = next(islice(lines, skipped, None), "")
+        second = next(lines, "")
+        delimiter = next((mark for mark in MARKS if mark in first and (mark in second or "," not in first)), None)
+        rows = csv.reader(chain([first, second], lines), delimiter=delimiter or ",")
+        yield from islice(rows, 1)
+        for row in rows:
+            yield row if delimiter is None else [cell.replace(",", ".") for cell in row]
+
+
+def is_harmless(path: Path, largest_mb: int) -> bool:
+    """Return whether a file is short, and not packed: then it cannot come to much.
+
+    Raises Refused `no_file`, also for one that is too large.
+    """
+    with _refused(path), open_regular_file(path, largest_mb * 1_000_000) as file:
+        return os.fstat(file.fileno()).st_size <= HARMLESS_BYTES and not _beginning(file).startswith(GZIP)
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """Raise Refused `no_file` for a file that cannot be read, whatever its reader ends in."""
+    try:
+        yield
+    except (UnfitFile, OSError, EOFError, zlib.error, ValueError, csv.Error) as error:
+        raise Refused("no_file", f"{path} cannot be read: {error}", "Give a CSV file") from error
+
+
+def _text(file: BinaryIO) -> TextIOWrapper:
+    """What stands in a file, packed or not, in the encoding its beginning shows. Raises UnfitFile where it is no text.
+
+    Windows' own encoding is that of most loggers' headings that are not in UTF-8: "°/s", "µT".
+    """
+    if _beginning(file).startswith(GZIP):
+        file = GzipFile(fileobj=file)  # type: ignore[assignment]
+    begin = _beginning(file)
+    if begin.startswith(UTF_16):
+        return TextIOWrapper(file, encoding="utf-16", newline="")
+    if b"\0" in begin:
+        raise UnfitFile("it is no text, but a spreadsheet, an archive or another program's own file")
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(begin)
+    except UnicodeDecodeError:
+        return TextIOWrapper(file, encoding="cp1252", errors="replace", newline="")
+    return TextIOWrapper(file, encoding="utf-8-sig", newline="")
+
+
+def _beginning(file: BinaryIO) -> bytes:
+    begin = file.read(LONGEST_LINE)
+    file.seek(0)
+    return begin
+
+
+def _lines(text: TextIOWrapper, most: int) -> Iterator[str]:
+    """The lines, none of which is endless, nor all of them: a packed file may hold a thousand times its size."""
+    while line := text.readline(LONGEST_LINE):
+        most -= len(line)
+        if len(line) == LONGEST_LINE:
+            raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
+        if most < 0:
+            raise UnfitFile("what is packed in it is too long")
+        yield line

@@ -1,0 +1,68 @@
+"""Columns of numbers on their way out of a reading process: rows in blocks, and in the end what the columns are."""
+
+from array import array
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from rig.config.files.regular_file import UnfitFile
+from rig.data.processes.reading_process import CostlyFile, Part, UnreadableFile, limits_for, read_apart, stored_bytes
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+
+BLOCK_ROWS = 16_384
+
+
+LEFT_OUT = "left_out"  # how many more rows of the file hold none of the columns
+
+
+def in_blocks(
+    rows: Iterable[Sequence[float]], columns: Sequence[str | None], counts: Mapping[str, int] | None = None
+) -> Iterator[Part]:
+    """Yield the rows, a number for each of the columns, in blocks (n, columns), then the names of the columns.
+
+    The names are looked at when all rows are through: None is a column that is left out. So are `counts`, which may
+    say how many rows were `LEFT_OUT`.
+    """
+    values, width = array("d"), len(columns)
+    for row in rows:
+        values.extend(row)
+        if len(values) >= BLOCK_ROWS * width:
+            yield np.array(values).reshape(-1, width)
+            del values[:]
+    yield np.array(values).reshape(-1, width)
+    yield {"columns": list(columns), **(counts or {})}
+
+
+def columns_of(parts: Iterable[Part]) -> dict[str, Array]:
+    """Return the columns (n,) by name that such parts hold."""
+    *blocks, last = parts
+    arrays, names = cast("list[Array]", blocks), cast("dict[str, Any]", last)["columns"]
+    return {
+        name: np.concatenate([block[:, place] for block in arrays])
+        for place, name in enumerate(names)
+        if name is not None
+    }
+
+
+def left_out_of(parts: Sequence[Part]) -> int:
+    """Return how many rows of the file such parts leave out."""
+    return int(cast("dict[str, Any]", parts[-1]).get(LEFT_OUT, 0))
+
+
+def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
+    """Return what a `reader` ("module:function") yields of a file, in a process of its own.
+
+    Raise Refused as the reader does, `temporary_folder_full`, and where the file "`else_`: why" `no_file` and
+    `file_too_costly`.
+    """
+    try:
+        return read_apart(reader, path, arguments, limits_for(stored_bytes(path)))
+    except CostlyFile as error:
+        raise Refused("file_too_costly", f"{path} {else_}: {error}", remedy) from error
+    except (UnreadableFile, UnfitFile) as error:
+        raise Refused("no_file", f"{path} {else_}: {error}", remedy) from error
+    except OSError as error:
+        raise Refused("no_file", f"{path} {else_}: {error.strerror or error}", remedy) from error

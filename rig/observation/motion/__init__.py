@@ -1,0 +1,1 @@
+"""What turned, as a function of time: joints, revolutions, speeds."""

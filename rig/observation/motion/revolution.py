@@ -1,0 +1,209 @@
+"""The arm's side of an observation: when a joint turned through exactly its revolution or arc, and whether properly."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.recording.settings import ObservationThresholds
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.motion.steps import TURN_RAD, Sweep, closes, turn_words
+from rig.observation.statistics.lines import BEATS
+
+MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
+SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
+MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
+MAX_OTHER_TRAVEL_RAD = 0.01
+MIN_SPEED_FRACTION = 0.995
+
+
+@dataclass(frozen=True, slots=True)
+class Revolution:
+    """A turn of `angle_rad` between two controller times: exactly 2π, or an arc as far as the encoders tell.
+
+    `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
+    the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
+    radian (`rig.motion.geometry.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
+    into the flange's; `arm_m` (3,) is a way from the joint's axis to the flange's origin, in the flange's frame;
+    `station` names the joint, from 0 at the base, and the pose it turned in. A turn is `uneven` where its readings are
+    even: an encoder that errs by a degree closes the loop. So the shaft is known over whole turns alone.
+    """
+
+    start_s: float
+    end_s: float
+    duration_std_s: float
+    axis_flange: Array
+    attitude: Array
+    axis_errors: Array
+    arm_m: Array
+    station: tuple[float, ...]
+    angle_rad: float = TURN_RAD
+    uneven: bool = False
+
+    @property
+    def beats(self) -> int:
+        """How often in a turn, at most, the shaft is ahead and behind: each of its lines has others as far beside it.
+
+        Such an encoder errs once and twice a turn; what that makes of itself comes up to four times.
+        """
+        return 2 if self.uneven else BEATS
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is whole turns: over these an encoder errs by nothing, and gravity's share averages out."""
+        return closes(self.angle_rad)
+
+    @property
+    def duration_s(self) -> float:
+        """Duration T of the turn."""
+        return self.end_s - self.start_s
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Δθ/T, of a revolution 2π/T: the mean speed, whatever the vibration."""
+        return float(self.angle_rad / self.duration_s)
+
+    @property
+    def speed_std_rad_s(self) -> float:
+        """Standard deviation of the mean speed."""
+        return self.speed_rad_s * self.duration_std_s / self.duration_s
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """When a revolution began and ended, how uncertain the time between is, and the times (k,) of the states in it."""
+
+    start_s: float
+    end_s: float
+    duration_std_s: float
+    time_s: Array
+
+
+def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
+    """The revolution of one sweep, of which `states` (n,) of the turner tell, in the order of their times.
+
+    Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
+    `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_limited`, `speed_not_constant`,
+    `other_joint_moved`.
+    """
+    where, (low, high) = describe(sweep), sweep.revolution_rad
+    time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
+    travelled = angle - low if sweep.direction == "ccw" else high - angle
+    first, last = _inside(travelled, high - low, sweep)
+    turning = states[first : last + 1]
+    gap = float(np.diff(time_s[first - 1 : last + 2]).max())
+    if gap > MAX_STATE_GAP_S:
+        raise arm_states_lost(where, f"for {gap:.2f} s")
+    _check_slider(turning, where)
+    _check_speed(time_s[first : last + 1], travelled[first : last + 1], where, settings)
+    _check_other_joints(turning, sweep.joint, where)
+    return Ends(*_ends(time_s, travelled, first, last, high - low), turning["time_s"])
+
+
+def describe(sweep: Sweep) -> str:
+    """How messages name a sweep."""
+    return f"sweep {sweep.index} ({sweep.joint_name} {sweep.direction})"
+
+
+def arm_states_lost(where: str, extent: str) -> Fault:
+    """The error for a sweep whose motion is not known well enough."""
+    return Fault(
+        "arm_states_lost",
+        f"in {where} the arm's states are missing {extent}",
+        "Check the network to the robot and the load of this computer, then repeat the sweep",
+    )
+
+
+def _inside(travelled: Array, turn_rad: float, sweep: Sweep) -> tuple[int, int]:
+    """Indices of the first and the last state within the revolution, which has states before and after it."""
+    entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
+    exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
+    if len(entries) and len(exits) and exits[0] > entries[0]:
+        return int(entries[0]), int(exits[0])
+    turned = float(np.ptp(travelled)) if len(travelled) else 0.0
+    raise Fault(
+        "incomplete_revolution",
+        f"in {describe(sweep)} the joint turned {np.degrees(turned):.0f}° and not {_extent(sweep)}",
+        "Repeat the sweep; resume the run if it was interrupted",
+    )
+
+
+def _extent(sweep: Sweep) -> str:
+    return "the whole revolution" if sweep.angle_rad == TURN_RAD else turn_words(sweep.angle_rad)
+
+
+def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
+    """When the revolution begins and ends, and the standard deviation of the time between, s.
+
+    Between two neighbouring states the angle is interpolated. Where states are missing it might already be in a ramp,
+    so there the straight line through the whole revolution says when, but for the ripple about it.
+    """
+    t, angle = time_s[first : last + 1], travelled[first : last + 1]
+    speed, offset = np.polyfit(t - t[0], angle, 1)
+    ripple = float(np.std(angle - offset - speed * (t - t[0])))
+    unsteady = float(np.sqrt(np.mean((np.diff(angle) / np.diff(t) - speed) ** 2)))
+    ends, missed = [], []
+    for before, level in ((first - 1, 0.0), (last, turn_rad)):
+        step_s = time_s[before + 1] - time_s[before]
+        if step_s <= MAX_STATE_STEP_S:
+            share = (level - travelled[before]) / (travelled[before + 1] - travelled[before])
+            ends.append(time_s[before] + share * step_s)
+            # A ripple of RMS r whose rate has RMS v accelerates by about v²/r; a chord misses h²/8 times that.
+            missed.append(min(ripple, step_s**2 / 8 * unsteady**2 / ripple) if ripple > 0 else 0.0)
+        else:
+            ends.append(t[0] + (level - offset) / speed)
+            missed.append(ripple)
+    return float(ends[0]), float(ends[1]), float(np.linalg.norm(missed) / speed)
+
+
+def _check_slider(turning: NDArray[Any], where: str) -> None:
+    """An arm tells of its speed slider, and of how much slower its controller goes; other turners have none."""
+    if not {"target_speed_fraction", "speed_scaling"} <= {*(turning.dtype.names or ())}:
+        return
+    slider, scaling = (float(turning[name].min()) for name in ("target_speed_fraction", "speed_scaling"))
+    if slider < MIN_SPEED_FRACTION:
+        raise Fault(
+            "speed_slider",
+            f"in {where} the speed slider was at {100 * slider:.0f} %",
+            "Set the speed slider on the pendant to 100 %, then repeat the sweep",
+        )
+    if scaling < MIN_SPEED_FRACTION:
+        raise Fault(
+            "speed_limited",
+            f"in {where} the controller ran at {100 * scaling:.0f} % of the programmed speed with the slider at 100 %, "
+            "as where a limit of the safety settings slows it down",
+            "Widen that limit in the arm's safety settings, or lower procedure.speed_deg_s, then repeat the sweep",
+        )
+
+
+def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
+    """The joint's rate, smoothed, must stay near its mean: vibration passes, a halt on the way does not."""
+    middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
+    ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
+    behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
+    mean = (travelled[-1] - travelled[0]) / (time_s[-1] - time_s[0])
+    deviation = float(np.max(np.abs((ahead - behind) / SMOOTHING_S / mean - 1), initial=0.0))
+    if deviation > settings.max_speed_deviation:
+        raise not_constant(where, deviation, settings)
+
+
+def not_constant(where: str, deviation: float, settings: ObservationThresholds) -> Fault:
+    """The error for a sweep whose speed strayed by a fraction from its mean."""
+    return Fault(
+        "speed_not_constant",
+        f"in {where} the joint's speed differed by {100 * deviation:.0f} % from its mean, "
+        f"{100 * settings.max_speed_deviation:.0f} % is allowed",
+        "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
+    )
+
+
+def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:
+    others = np.delete(np.ptp(turning["q_rad"], axis=0), joint)
+    if others.max(initial=0.0) > MAX_OTHER_TRAVEL_RAD:
+        raise Fault(
+            "other_joint_moved",
+            f"in {where} another joint moved by {np.degrees(others.max()):.1f}°",
+            "Make sure that nothing else moves the arm during a sweep, then repeat it",
+        )

@@ -1,0 +1,83 @@
+"""What an accelerometer read in sweeps: the first harmonic of each revolution over the measured joint angle."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.data.recording.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
+from rig.estimation.sensor_axes import nearest_rotation
+from rig.motion.steps import Sweep
+from rig.observation.average import Stream, between
+from rig.observation.motion.arm_motion import ArmMotion
+from rig.observation.motion.revolution import Revolution, describe
+from rig.observation.reference.acceleration import accelerations, check_acceleration, gravity_beside
+from rig.observation.statistics.beside_lines import colour_left, swinging
+
+
+@dataclass(frozen=True, slots=True)
+class SweptAcceleration:
+    """Sweep `sweep` of the plan. The joint's angle is counted from where the revolution began.
+
+    There `attitude` (3, 3) takes a vector of the arm's base frame into the flange's. `axis_flange` (3,) is the unit
+    vector of a growing angle, `arm_m` (3,) a way from the axis to the flange's origin, in the flange's frame.
+    `station` names the `joint`, from 0 at the base, and the pose it turned in.
+    """
+
+    sweep: int
+    joint: int
+    harmonic: FirstHarmonic
+    attitude: Array
+    axis_flange: Array
+    arm_m: Array
+    station: tuple[float, ...]
+
+
+def swept_acceleration(
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, site: Site
+) -> SweptAcceleration:
+    """What one sweep's revolution tells, beside what swings in it.
+
+    The joints that stand may swing meanwhile, which is known: readings are held against one attitude, which the joint
+    alone turns, so that by which the arm's attitude differs from that is taken out of them.
+    Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
+    """
+    inside = between(stream, turn.start_s, turn.end_s)
+    check_acceleration(stream, inside, describe(sweep), turning=True)
+    time_s = stream.time_s[inside]
+    known = motion.covered(time_s)
+    time_s = time_s[known]
+    angle_rad = motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s)
+    attitudes, rotations = motion.attitudes(time_s), _rotations(-sweep.growing * turn.axis_flange, angle_rad)
+    began = nearest_rotation((rotations.swapaxes(1, 2) @ attitudes).mean(axis=0))
+    harmonic = first_harmonic(
+        time_s,
+        accelerations(stream, inside)[known] - gravity_beside(attitudes, rotations @ began, stream.sensor, site),
+        angle_rad,
+        motion.angle(sweep, time_s, 1),
+        coloured=colour_left,
+        swings=swinging,
+    )
+    return of_turn(sweep, replace(turn, attitude=began), harmonic)
+
+
+def _rotations(axis: Array, angle_rad: Array) -> Array:
+    """Return (n, 3, 3) rotations by angles (n,) about a unit vector (3,): Rodrigues' formula."""
+    across = np.cross(np.eye(3), axis)
+    sine, versine = np.sin(angle_rad)[:, None, None], (1 - np.cos(angle_rad))[:, None, None]
+    found: Array = np.eye(3) + sine * across + versine * (across @ across)
+    return found
+
+
+def of_turn(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
+    """The first harmonic of a sweep, and how the arm turned meanwhile."""
+    return SweptAcceleration(
+        sweep=sweep.index,
+        joint=sweep.joint,
+        harmonic=harmonic,
+        attitude=turn.attitude,
+        axis_flange=sweep.growing * turn.axis_flange,
+        arm_m=turn.arm_m,
+        station=turn.station,
+    )

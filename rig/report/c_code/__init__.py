@@ -1,0 +1,1 @@
+"""C functions that correct readings, of which `calibration.h` is made."""

@@ -1,0 +1,133 @@
+"""C source that corrects readings, for each kind of sensor."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rig.data.entries.accelerometer import AccelerometerEntry
+from rig.data.entries.magnetometer import MagnetometerEntry
+from rig.data.result_file import GyroscopeEntry
+from rig.errors.quoting import printable
+from rig.estimation.arrays import Array
+from rig.report.findings.finding import Finding
+
+
+def gyroscope_lines(finding: Finding[GyroscopeEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
+    """C of a gyroscope that was calibrated; none of a reference."""
+    if finding.entry.role != "calibrate":
+        return
+    prefix, sensitivity = prefix_of(finding.sensor), sensed.get(finding.sensor)
+    yield from _correction(prefix, finding.entry)
+    if sensitivity is not None:
+        yield from _without_gravity(prefix, sensitivity)
+
+
+def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of an accelerometer."""
+    entry = finding.entry
+    axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
+    left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
+    about = f"{entry.part}, serial number {entry.serial_number}{_warm(entry.temperature_c)}"
+    return _subtracting(finding, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
+        f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
+        f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
+    ))  # fmt: skip
+
+
+def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of a magnetometer, as it was mounted."""
+    entry = finding.entry
+    return _subtracting(finding, entry.bias_t, entry.correction_matrix, "field_t", (
+        f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
+        f" * In the right-angled frame of its own axes, as mounted, relative to a field of {entry.field_t:g} T. */",
+    ))  # fmt: skip
+
+
+def _warm(temperature_c: float | None) -> str:
+    return "" if temperature_c is None else f", at {temperature_c:.1f} °C"
+
+
+def prefix_of(name: str) -> str:
+    """What a sensor's names in C begin with."""
+    return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
+
+
+def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
+    about = f"{sensor.part}, serial number {sensor.serial_number}{_warm(sensor.temperature_c)}"
+    whole = sensor.correction_matrix
+    yield from (
+        "",
+        f"/* {_comment(about)}. */",
+        f"static const float {prefix}_scale[3] = {_array(sensor.scale)};",
+        f"static const float {prefix}_bias_rad_s[3] = {_array(sensor.bias_rad_s)};",
+        f"static const float {prefix}_matrix[3][3] = {c_rows(np.diag(sensor.scale) if whole is None else whole)};",
+        "",
+        f"static inline void {prefix}_calibrate(const float reading_rad_s[3], float rate_rad_s[3])",
+        "{",
+        "    for (int i = 0; i < 3; i++) {",
+        "        rate_rad_s[i] = 0.0f;",
+        "        for (int j = 0; j < 3; j++)",
+        f"            rate_rad_s[i] += {prefix}_matrix[i][j] * (reading_rad_s[j] + {prefix}_bias_rad_s[j]);",
+        "    }",
+        "}",
+    )
+
+
+def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
+    yield from (
+        "",
+        "/* The same without what gravity adds to a reading: gravity_m_s2 points down, in the frame of the corrected",
+        " * rates; it is an accelerometer's reading at rest with the other sign. */",
+        f"static const float {prefix}_g_sensitivity_rad_s_per_m_s2[3][3] = {c_rows(sensitivity)};",
+        "",
+        f"static inline void {prefix}_calibrate_with_gravity(",
+        "    const float reading_rad_s[3], const float gravity_m_s2[3], float rate_rad_s[3])",
+        "{",
+        "    float level_rad_s[3];",
+        "    for (int i = 0; i < 3; i++) {",
+        "        level_rad_s[i] = reading_rad_s[i];",
+        "        for (int j = 0; j < 3; j++)",
+        f"            level_rad_s[i] -= {prefix}_g_sensitivity_rad_s_per_m_s2[i][j] * gravity_m_s2[j];",
+        "    }",
+        f"    {prefix}_calibrate(level_rad_s, rate_rad_s);",
+        "}",
+    )
+
+
+def _subtracting(
+    finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
+) -> Iterator[str]:
+    """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
+    of, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
+    yield from (
+        "",
+        *about,
+        f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
+        f"static const float {of}_matrix[3][3] = {c_rows(matrix)};",
+        "",
+        f"static inline void {prefix_of(finding.sensor)}_calibrate_{finding.quantity}("
+        f"const float reading_{unit}[3], float {true}[3])",
+        "{",
+        "    for (int i = 0; i < 3; i++) {",
+        f"        {true}[i] = 0.0f;",
+        "        for (int j = 0; j < 3; j++)",
+        f"            {true}[i] += {of}_matrix[i][j] * (reading_{unit}[j] - {of}_bias_{unit}[j]);",
+        "    }",
+        "}",
+    )
+
+
+def c_rows(matrix: Iterable[Iterable[float]]) -> str:
+    """The rows of a matrix as C has them."""
+    return "{" + ", ".join(_array(row) for row in matrix) + "}"
+
+
+def _array(values: Iterable[float]) -> str:
+    return "{" + ", ".join(f"{value:.9e}f" for value in values) + "}"
+
+
+def _comment(text: str) -> str:
+    """What a serial number may hold must not end the comment it stands in."""
+    return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

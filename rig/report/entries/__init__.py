@@ -1,0 +1,1 @@
+"""Entries of `result.json`, made from what the analysis found."""

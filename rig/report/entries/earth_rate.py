@@ -1,0 +1,42 @@
+"""The Earth's rate that a gyroscope has found, as an entry of `result.json` and as a person reads it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rig.data.entries.earth_rate import EarthRateEntry
+from rig.data.entries.result_types import ErrorEntry
+from rig.estimation.earth import EARTH_RATE_RAD_S
+from rig.estimation.gyroscope.earth_rate import DEG_H, EarthRate
+from rig.report.entry import entry
+from rig.report.words.expanded import expanded, factor_words
+
+
+def earth_rate_entry(earth_rate: EarthRate) -> EarthRateEntry:
+    """Return the entry of the Earth's rate; infinite degrees of freedom are null."""
+    known = earth_rate.freedom if np.isfinite(earth_rate.freedom) else None
+    return entry(EarthRateEntry, earth_rate, degrees_of_freedom=known)
+
+
+def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:
+    """The Earth's rate in words; None says nothing: it was not looked for."""
+    if earth is None:
+        return
+    if isinstance(earth, ErrorEntry):
+        yield f"Earth's rate not found: {earth.error}"
+        return
+    (k,), words = expanded([1.0], earth.freedoms(1)).factors, factor_words(earth.freedoms(1))
+    rate = " ".join(f"{each:+.3f}" for each in np.divide(earth.rate_rad_s, DEG_H))
+    std = k * np.sqrt(np.diag(earth.covariance_rad2_s2)).max() / DEG_H
+    yield (
+        f"Earth's rate found: {earth.norm_rad_s / DEG_H:.3f} deg/h (± {k * earth.norm_std_rad_s / DEG_H:.3f}), "
+        f"{EARTH_RATE_RAD_S / DEG_H:.3f} is right; in the arm's base {rate} deg/h (± {std:.3f}), {words}"
+    )
+    where = [
+        f"latitude {np.degrees(earth.latitude_rad):.2f}° (± {k * np.degrees(earth.latitude_std_rad):.2f})"
+        + (", its vertical part as given" if earth.vertical_fixed else "")
+    ]
+    if earth.heading_rad is not None and earth.heading_std_rad is not None:
+        heading, off = np.degrees(earth.heading_rad) % 360, k * np.degrees(earth.heading_std_rad)
+        where.append(f"the base's x axis points {heading:.2f}° from north over east (± {off:.2f})")
+    yield "by that rate " + ", ".join(where)

@@ -1,0 +1,142 @@
+"""One sensor's entry in `result.json`."""
+
+from typing import Any
+
+import numpy as np
+
+from rig.analysis.freedom_beside import of_angles, of_sensitivity
+from rig.analysis.gyroscope.calibration import ALGORITHM_1, EARTH_RATE, NEWTON, VECTOR, SensorResult
+from rig.analysis.gyroscope.onboard_check import Agreement
+from rig.data.entries.result_types import ErrorEntry, Role
+from rig.data.quantity import RATE
+from rig.data.result_file import (
+    AverageEntry,
+    BoardEntry,
+    BoardSolutionEntry,
+    EstimateEntry,
+    GyroscopeEntry,
+    NonlinearityEntry,
+    ObservationEntry,
+    TimeBaseEntry,
+    VectorEntry,
+)
+from rig.errors import Fault
+from rig.estimation.gyroscope import vector_model
+from rig.estimation.gyroscope.estimate import Estimate
+from rig.estimation.gyroscope.known_turns import TurnedSolution
+from rig.estimation.gyroscope.six_observation import MODEL, PARAMETERS
+from rig.estimation.residuals import residual_std_rad_s
+from rig.observation.average import Average
+from rig.report.entries.budget import bias_process_entry, budget_entry
+from rig.report.entries.by_hand import by_hand_entry
+from rig.report.entries.earth_rate import earth_rate_entry
+from rig.report.entries.error import error_entry
+from rig.report.entry import counted, entry
+
+
+def sensor_entry(
+    result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None, **more: Any
+) -> GyroscopeEntry:
+    """Scale, bias and covariance by the chosen estimator; beside them the others, or the error each ends in.
+
+    And what `more` there is to say. What a result does not have is left out.
+    """
+    solution, turns = result.solution, result.observations
+    return entry(
+        GyroscopeEntry, result.sensor, solution, result,
+        role=role,
+        model=MODEL,
+        observations_used=solution.observations,
+        covariance_order=PARAMETERS,
+        covariance_units=RATE.parameter_units,
+        observations=[
+            entry(ObservationEntry, turn, turn.average, temperature_c=_warm(turn.average))
+            for turn in turns
+        ],
+        rests=[entry(AverageEntry, each, temperature_c=_warm(each)) for each in result.rests],
+        time_bases=[entry(TimeBaseEntry, each) for each in result.time_bases],
+        vector_model=_vector_or_error(result),
+        six_observation=_estimate_or_error(result.six_observation, result.faults.get(NEWTON)),
+        algorithm_1=_estimate_or_error(result.algorithm_1, result.faults.get(ALGORITHM_1)),
+        by_hand=None if result.by_hand is None else by_hand_entry(result.by_hand),
+        **({} if agreed is None else {"board": _board(agreed)}),
+        **_uncertain(result),
+        **more,
+    )  # fmt: skip
+
+
+def _warm(average: Average) -> float | None:
+    """How warm it was; None where no thermometer was read."""
+    return None if np.isnan(average.temperature_c) else average.temperature_c
+
+
+def _uncertain(result: SensorResult) -> dict[str, Any]:
+    """What is known of it beside the solution."""
+    found: dict[str, Any] = {}
+    if result.uncertainty is not None:
+        combined = result.uncertainty.covariance
+        found |= {"covariance_combined": combined, "budget": budget_entry(result.uncertainty)}
+    if (explained := result.explained) is not None:
+        found["bias_process"] = bias_process_entry(explained)
+        found["speeds_rad_s"] = explained.seen.speeds_rad_s
+        found["axis_rate_ranges_rad_s"] = explained.loads_rad_s
+        if explained.nonlinearity is not None:
+            found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
+    if result.earth is not None:
+        found["earth_rate"] = earth_rate_entry(result.earth)
+    elif EARTH_RATE in result.faults:
+        found["earth_rate"] = error_entry(result.faults[EARTH_RATE])
+    return found
+
+
+def estimate_entry(solution: Estimate) -> EstimateEntry:
+    """What every estimator's solution has."""
+    return entry(EstimateEntry, solution)
+
+
+def _estimate_or_error(solution: Estimate | None, fault: Fault | None) -> EstimateEntry | ErrorEntry:
+    """Return the entry of a solution that stands beside another, or of the error it ended in."""
+    return ErrorEntry(error=str(fault)) if solution is None else estimate_entry(solution)
+
+
+def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
+    outcome = result.vector_model
+    if outcome is None:
+        return error_entry(result.faults[VECTOR])
+    more: dict[str, Any] = {}
+    if result.explained is not None:
+        more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
+        if (angles := counted(of_angles(result))) is not None:
+            more |= {"non_orthogonality_degrees_of_freedom": angles[:3], "mounting_degrees_of_freedom": angles[3:]}
+        if (felt := counted(of_sensitivity(result))) is not None:
+            more["g_sensitivity_degrees_of_freedom"] = felt
+    return vector_entry(outcome, **more)
+
+
+def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: Any) -> VectorEntry:
+    """The vector model's solution, how the axes lie to each other included, and what `more` is known of it."""
+    angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
+    sensitivity: dict[str, Any] = {}
+    if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:
+        std = np.sqrt(np.diag(outcome.g_sensitivity_covariance)).reshape(3, 3)
+        sensitivity = {
+            "g_sensitivity_rad_s_per_m_s2": outcome.g_sensitivity,
+            "g_sensitivity_std_rad_s_per_m_s2": std,
+        }
+    return entry(
+        VectorEntry, outcome,
+        model=vector_model.MODEL,
+        matrix_covariance_order=vector_model.MATRIX_PARAMETERS,
+        non_orthogonality_std_rad=angles[:3],
+        non_orthogonality_order=("yz", "zx", "xy"),
+        mounting_std_rad=angles[3:],
+        **sensitivity,
+        **more,
+    )  # fmt: skip
+
+
+def _board(agreed: Agreement) -> BoardEntry:
+    solutions = {
+        method: entry(BoardSolutionEntry, solved, solved.solution) for method, solved in agreed.solutions.items()
+    }
+    return entry(BoardEntry, agreed, solutions=solutions)

@@ -1,0 +1,51 @@
+"""A calibration over temperature as `result.json` has it."""
+
+import numpy as np
+
+from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntry, TemperatureContributorEntry
+from rig.data.quantity import Quantity
+from rig.data.recording.motion_file import Item
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.estimation.temperature.over_temperature import COEFFICIENTS, OverTemperature, powers_at
+from rig.report.entry import counted, entry
+
+ROWS = 17  # of the table: each fourth stands on a certificate
+
+
+def temperature_entry(
+    quantity: Quantity, polynomials: OverTemperature, sensor: RecordedSensor | Item
+) -> OverTemperatureEntry:
+    """The polynomials of that sensor, in SI units; of a gyroscope b = −c, which g = K (m + b) adds."""
+    signs = np.array(quantity.parameter_signs)
+    of_each = np.repeat(signs, COEFFICIENTS // len(signs))
+    at = powers_at(0.0)
+    return entry(
+        OverTemperatureEntry, polynomials,
+        part=sensor.part,
+        serial_number=sensor.serial_number,
+        full_scale=None if isinstance(sensor, Item) else sensor.channel(quantity).range,
+        unit=quantity.unit,
+        bias=quantity.offset * polynomials.bias,
+        covariance=np.outer(of_each, of_each) * polynomials.covariance,
+        contributors=[
+            entry(TemperatureContributorEntry, line,
+                  degrees_of_freedom=counted(np.array([line.freedom]))[0],  # type: ignore[index]  # of an array there are some
+                  std=np.sqrt(np.diag(at @ line.covariance @ at.T).clip(min=0.0)))
+            for line in polynomials.lines
+        ],
+        table=[_row(quantity, polynomials, warm_c) for warm_c in np.linspace(*polynomials.range_c, ROWS).tolist()],
+        hysteresis=None if polynomials.hysteresis is None else polynomials.hysteresis[0] * signs,
+        hysteresis_std=None if polynomials.hysteresis is None else polynomials.hysteresis[1],
+    )  # fmt: skip
+
+
+def _row(quantity: Quantity, polynomials: OverTemperature, temperature_c: float) -> AtTemperatureEntry:
+    held = polynomials.at(temperature_c)
+    return entry(
+        AtTemperatureEntry,
+        temperature_c=temperature_c,
+        scale=held.values[:3],
+        bias=quantity.offset * held.values[3:],
+        expanded_scale=held.expanded[:3],
+        expanded_bias=held.expanded[3:],
+    )

@@ -1,0 +1,75 @@
+"""Biases by repeat, drawn as in TRIAX, Figs. 4 and 6."""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.outcome import Outcome
+from rig.analysis.temperature.bias_drift import BiasDrift
+from rig.data.quantity import Quantity
+from rig.data.result_file import ResultDocument
+from rig.report.entry import counted
+from rig.report.figures.verification import Picture, write_pictures
+from rig.report.words.expanded import expanded, factor_words
+from rig.station.events import RunEvent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """`bias_drift_<sensor>` of every sensor whose bias was watched, as PNG and SVG; none without matplotlib."""
+    return write_pictures(
+        [
+            Picture(
+                f"bias_drift_{sensor}",
+                f"{sensor}: bias by repeat",
+                (5.5 * len(drifts), 4.6),
+                partial(_draw_all, drifts=drifts),
+            )
+            for sensor, drifts in outcome.drifts.items()
+        ],
+        folder,
+    )
+
+
+def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
+    panels = np.ravel(figure.subplots(1, len(drifts)))
+    for axes, (quantity, drift) in zip(panels, drifts.items(), strict=True):
+        draw_drift(axes, quantity, drift)
+
+
+def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
+    """Draw the bias by repeat: dots with scale and axes held, crosses all found anew, lines where it moved."""
+    size = quantity.drift.size
+    repeat = np.arange(1, len(drift.held.bias) + 1)
+    again = [(index + 1, anew) for index, anew in drift.anew.results.items()]
+    factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
+    for i, axis in enumerate("xyz"):
+        held, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
+        axes.errorbar(repeat, held, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
+        if again:
+            biases, stds = ([getattr(found, of)[i] / size for _, found in again] for of in ("bias", "std"))
+            axes.errorbar(
+                [number + 0.15 for number, _ in again],
+                biases,
+                factors[i] * np.array(stds),
+                fmt="x",
+                ms=4,
+                lw=0.6,
+                alpha=0.6,
+                color=f"C{i}",
+            )
+    for move in drift.held.moves:
+        axes.axvline(move.repeat + 0.5, color="0.5", ls=":", lw=0.8)
+    axes.locator_params("x", integer=True)
+    axes.set(
+        xlabel="repeat",
+        ylabel=f"bias   {quantity.drift.name}",
+        title=f"{quantity.sensor}; ± U ({factor_words(counted(drift.freedom))}), × found anew",
+    )
+    axes.legend(frameon=False, ncols=3, fontsize=8)

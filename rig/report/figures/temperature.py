@@ -1,0 +1,54 @@
+"""Scale and bias over temperature, with their uncertainty as a band."""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.outcome import Outcome
+from rig.data.entries.temperature import OverTemperatureEntry
+from rig.data.installed_kinds import quantities
+from rig.data.result_file import ResultDocument
+from rig.report.figures.verification import Picture, write_pictures
+from rig.station.events import RunEvent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """`over_temperature_<sensor>` of every sensor calibrated so, as PNG and SVG; none without matplotlib."""
+    return write_pictures(
+        [
+            Picture(
+                f"over_temperature_{sensor}",
+                f"{sensor}: change from {next(iter(entries.values())).reference_c:g} °C",
+                (11.0, 4.2 * len(entries)),
+                partial(_draw, entries=entries),
+            )
+            for sensor, entries in document.over_temperature.items()
+        ],
+        folder,
+    )
+
+
+def _draw(figure: "Figure", entries: Mapping[str, OverTemperatureEntry]) -> None:
+    panels = figure.subplots(len(entries), 2, squeeze=False)
+    for (left, right), (name, entry) in zip(panels, entries.items(), strict=True):
+        unit = quantities()[name].drift
+        warm = np.array([row.temperature_c for row in entry.table])
+        scales = np.array([row.scale for row in entry.table]) / np.array(entry.scale[0]) - 1
+        biases = np.array([row.bias for row in entry.table]) - np.array(entry.bias[0])
+        widths = [np.array([getattr(row, of) for row in entry.table]) for of in ("expanded_scale", "expanded_bias")]
+        for axes, values, width, size, label in (
+            (left, scales, widths[0], 1e-6, "scale factor   ppm"),
+            (right, biases, widths[1], unit.size, f"bias   {unit.name}"),
+        ):
+            for i, axis in enumerate("xyz"):
+                axes.plot(warm, values[:, i] / size, color=f"C{i}", lw=1.0, label=axis)
+                low, high = ((values[:, i] + sign * width[:, i]) / size for sign in (-1, 1))
+                axes.fill_between(warm, low, high, color=f"C{i}", alpha=0.25, lw=0)
+            axes.set(xlabel="°C", ylabel=label, title=f"{quantities()[name].sensor}; band: ± U")
+        left.legend(frameon=False, ncols=3, fontsize=8)

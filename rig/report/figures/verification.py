@@ -1,0 +1,113 @@
+"""A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rig.analysis.gyroscope.comparison import Comparison
+from rig.analysis.gyroscope.verification import Verification
+from rig.analysis.outcome import Outcome
+from rig.config.files.written_file import new_file
+from rig.data.result_file import ResultDocument
+from rig.estimation.arrays import Array
+from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COLUMNS = 600  # about as many as a panel has pixels across
+# Of the figure's width and height. Letting the layout find them takes as long as drawing does.
+MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace": 0.16, "hspace": 0.14}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure for a run folder: its file's name, its heading, its width and height in inches, and what draws it."""
+
+    name: str
+    title: str
+    size: tuple[float, float]
+    draw: Callable[["Figure"], None]
+    layout: Literal["constrained"] | None = "constrained"
+
+
+def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
+    """Draw each as PNG and SVG into `folder`, and say so; without matplotlib, which an extra brings, draw nothing."""
+    if not pictures:
+        return ()
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return (NotPlotted(),)
+    from matplotlib.figure import Figure
+
+    for picture in pictures:
+        with style():
+            figure = Figure(figsize=picture.size, layout=picture.layout)
+            picture.draw(figure)
+            figure.suptitle(picture.title)
+            save(figure, folder, picture.name)
+    return (Plotted(tuple(picture.name for picture in pictures)),)
+
+
+def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """Draw `verification_<sensor>_before` (where there is one) and `…_after` of every verification of a run."""
+    return draw_verifications(outcome.verifications.values(), folder)
+
+
+def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
+    """Draw those of these verifications, each as PNG and SVG, into `folder`."""
+    pictures = [
+        Picture(
+            f"verification_{each.sensor}_{when}",
+            f"{each.sensor} {when} calibration, beside {each.reference.name}; RMS of sweeps and rests",
+            (10.0, 7.5),
+            partial(draw_comparison, comparison=comparison, sensor=each.sensor, reference=each.reference.name),
+            None,
+        )
+        for each in verifications
+        for when, comparison in (("before", each.before), ("after", each.after))
+        if comparison is not None
+    ]
+    return write_pictures(pictures, folder)
+
+
+def save(figure: "Figure", folder: Path, name: str) -> None:
+    """Save a figure as PNG and as SVG."""
+    with new_file(folder / f"{name}.png") as png, new_file(folder / f"{name}.svg") as svg:
+        figure.savefig(png, format="png", dpi=110)
+        figure.savefig(svg, format="svg", dpi=110, metadata={"Date": None})
+
+
+def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
+    """Draw in rows x, y, z readings on the left, their difference on the right, enlarged."""
+    rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
+    since_s = comparison.time_s - comparison.time_s[0]
+    error = comparison.reading_rad_s - comparison.reference_rad_s
+    for i, (readings, difference) in enumerate(rows):
+        readings.plot(*envelope(since_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
+        readings.plot(*envelope(since_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
+        readings.set_ylabel(f"{'xyz'[i]}   rad/s")
+        difference.plot(*envelope(since_s, error[:, i]), lw=0.5, color="C3")
+        difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
+    reach = 1.05 * float(np.abs(error).max())
+    rows[0, 1].set_ylim(-reach, reach)
+    rows[0, 0].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=2, frameon=False)
+    rows[0, 0].set_title("readings", loc="left", fontsize=9)
+    rows[0, 1].set_title("reading − reference", loc="left", fontsize=9)
+    for axes in rows[2]:
+        axes.set_xlabel("time s")
+
+
+def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """The curve (n,) by its lowest and highest value in each column of the panel: it looks the same, and is light."""
+    if len(values) <= 2 * COLUMNS:
+        return time_s, values
+    starts = np.linspace(0, len(values), COLUMNS, endpoint=False).astype(np.intp)
+    ends = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+    return np.repeat(time_s[starts], 2), np.stack(ends, axis=1).ravel()

@@ -1,0 +1,1 @@
+"""What any kind of result can say to every outlet, and the characteristics that it states."""

@@ -1,0 +1,142 @@
+"""The numbers of a certificate as they are printed: rounded, with their signs and units."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.entries.earth_rate import EarthRateEntry
+from rig.data.recording.motion_file import NOT_STATED
+from rig.data.result_file import CheckEntry, GyroscopeEntry, VerificationEntry
+from rig.report.findings.characteristic import Term
+from rig.report.words.expanded import expanded
+from rig.report.words.rounding import percent, rounded
+
+AXES = ("x", "y", "z")
+JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %
+DEG = math.degrees(1)
+FINE_DEG_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A value and its uncertainty, as texts."""
+
+    value: str
+    uncertainty: str
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRow:
+    """One axis: scale factor and bias, the latter in two units where there is another."""
+
+    axis: str
+    scale: Pair
+    bias: Pair
+    bias_too: Pair | None
+
+
+@dataclass(frozen=True, slots=True)
+class CheckRow:
+    """One limit, and what was found."""
+
+    name: str
+    value: str
+    uncertainty: str
+    limit: str
+    false_acceptance: str
+    passed: bool
+    unit: str
+
+
+def kind(part: str) -> str:
+    """What the maker calls it."""
+    return part if part == NOT_STATED else part.removesuffix("_magnetometer").upper()
+
+
+def pair(value: float, uncertainty: float) -> Pair:
+    """Rounded together; a value that has no uncertainty at all is printed with nine digits."""
+    if not uncertainty > 0:
+        return Pair(f"{value:.9g}".replace("-", "−"), "0")
+    found = rounded(value, uncertainty)
+    return Pair(found.value_text, found.uncertainty_text)
+
+
+def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
+    """A gyroscope's axes with U of the budget; without one, with the noise's deviation, as the page then says."""
+    return rows_of(sensor.scale, sensor.bias_rad_s, _spread(sensor), too=degrees_of(sensor)[1])
+
+
+def rows_of(
+    scale: Sequence[float],
+    bias: Sequence[float],
+    spread: Sequence[float],
+    *,
+    size: float = 1.0,
+    too: float | None = None,
+) -> list[AxisRow]:
+    """Each axis with U, the `spread` of scale factors and biases; the bias times `size`, and times `too`."""
+
+    def bias_in(unit: float, i: int) -> Pair:
+        return pair(unit * bias[i], unit * spread[3 + i])
+
+    return [
+        AxisRow(axis, pair(scale[i], spread[i]), bias_in(size, i), None if too is None else bias_in(too, i))
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
+    """The unit that biases are printed in beside rad/s, and what takes rad/s there: hours where it is a fine one."""
+    return ("°/s", DEG) if DEG * max(_spread(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
+
+
+def _spread(sensor: GyroscopeEntry) -> Sequence[float]:
+    if sensor.budget is None:
+        return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    return sensor.budget.expanded
+
+
+def check_row(check: CheckEntry) -> CheckRow:
+    """What was not measured or not limited reads so."""
+    value, uncertainty = ("not measured" if check.value is None else f"{check.value:.4g}"), "not stated"
+    if check.value is not None and check.uncertainty:
+        found = pair(check.value, check.uncertainty)
+        value, uncertainty = found.value, found.uncertainty
+    limit = "not set" if check.limit is None else f"{check.limit:g}"
+    risk = "–" if check.false_acceptance_probability is None else percent(check.false_acceptance_probability)
+    return CheckRow(check.name, value, uncertainty, limit, risk, check.passed, check.unit)
+
+
+def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
+    """A verification's axes: RMS as found and as left; largest mean over a revolution as found and as left; rad/s."""
+    for i, axis in enumerate(AXES):
+        yield (
+            axis,
+            "–" if entry.before is None else f"{entry.before.movement.rms_rad_s[i]:.5f}",
+            f"{entry.after.movement.rms_rad_s[i]:.5f}",
+            "–" if entry.before is None else _largest_turn([t.error_rad_s for t in entry.before.revolutions], i),
+            _largest_turn([turn.error_rad_s for turn in entry.after.revolutions], i),
+        )
+
+
+def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
+    return f"{max(abs(error[axis]) for error in errors):.5f}" if errors else "–"
+
+
+def pairs(term: Term) -> list[tuple[str, Pair]]:
+    """A characteristic's numbers by their labels, in the unit that they are shown in, with U."""
+    return [(label, pair(value, width)) for label, value, width in term.printed]
+
+
+def earth_rate_rows(entry: EarthRateEntry) -> list[tuple[str, str, Pair]]:
+    """Name, unit, and value with U."""
+    (k,) = expanded([1.0], entry.freedoms(1)).factors
+    std = np.sqrt(np.diag(entry.covariance_rad2_s2))
+    rows = [("size", "rad/s", pair(entry.norm_rad_s, k * entry.norm_std_rad_s))]
+    rows += [(axis, "rad/s", pair(entry.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]
+    rows.append(("latitude", "°", pair(DEG * entry.latitude_rad, k * DEG * entry.latitude_std_rad)))
+    if entry.heading_rad is not None and entry.heading_std_rad is not None:
+        rows.append(("heading", "°", pair(DEG * entry.heading_rad % 360, k * DEG * entry.heading_std_rad)))
+    return rows

@@ -1,0 +1,63 @@
+"""What a certificate says of coverage: k beside the values, and the sentence of EA-4/02 below them."""
+
+import math
+from collections.abc import Sequence
+
+from rig.data.entries.budget import BudgetEntry
+from rig.estimation.statistics.coverage import PROBABILITY
+from rig.report.tables.certificate import AXES
+from rig.report.words.printed_budget import freedom_text
+
+QUANTITIES = ("scale factors", "biases")
+
+
+def factor_note(budget: BudgetEntry) -> str:
+    """What stands beside ± U: k where it is one number for all values, as it is printed."""
+    printed = {f"{each:.2f}" for each in budget.factors}
+    return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
+
+
+def coverage_sentence(budget: BudgetEntry) -> str:
+    """What k stands for: the sentence of EA-4/02 M:2022, 6.4, or that of its annex E where freedom is scarce."""
+    begins = (
+        "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
+        "coverage factor k"
+    )
+    factors = [f"{each:.2f}" for each in budget.factors]
+    covers = min(budget.probabilities)
+    if len(set(factors)) > 1:
+        groups = [_group(budget, factors, 3 * i, name) for i, name in enumerate(QUANTITIES)]
+        return (
+            f"{begins}, which for a t-distribution with ν_eff effective degrees of freedom corresponds to a coverage "
+            f"probability of approximately {_percent(covers)}: {'; '.join(groups)}."
+        )
+    k, fewest = _short(factors[0]), min(budget.known)
+    if k == "2" and round(100 * covers) == round(100 * PROBABILITY):
+        return (
+            f"{begins}\u00a0=\u00a0{k}, which for a normal distribution corresponds to a coverage probability of "
+            f"approximately {_percent(covers)}."
+        )
+    return (
+        f"{begins}\u00a0=\u00a0{k}, which for a t-distribution with ν_eff\u00a0=\u00a0{freedom_text(fewest)} effective "
+        f"degrees of freedom, the fewest of any value here, corresponds to a coverage probability of approximately "
+        f"{_percent(covers)}."
+    )
+
+
+def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -> str:
+    """k of the three axes, once where it is the same."""
+    own, known = factors[first : first + 3], budget.known[first : first + 3]
+    if len(set(own)) == 1:
+        return f"{name} k\u00a0=\u00a0{own[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(known))})"
+    each = (f"{axis} {k} ({freedom_text(freedom)})" for axis, k, freedom in zip(AXES, own, known, strict=True))
+    return f"{name} k (ν_eff): {', '.join(each)}"
+
+
+def _percent(probability: float) -> str:
+    """Whole, and in full where it is what the coverage factor was chosen for."""
+    full = f" ({100 * PROBABILITY:.2f} %)" if math.isclose(probability, PROBABILITY, abs_tol=5e-5) else ""
+    return f"{100 * probability:.0f} %{full}"
+
+
+def _short(factor: str) -> str:
+    return "2" if factor == "2.00" else factor

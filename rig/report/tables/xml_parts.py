@@ -1,0 +1,131 @@
+"""The pieces of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
+
+from collections.abc import Iterable, Sequence
+from datetime import date
+from xml.etree.ElementTree import Element, register_namespace
+
+from rig.errors.quoting import printable
+from rig.report.words.expanded import Expanded
+
+DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
+XSI = "http://www.w3.org/2001/XMLSchema-instance"
+JOINT_PROBABILITY = 0.95  # of an ellipsoid
+DIGITS = 4  # of a probability
+UNSAID = "not stated"
+for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
+    register_namespace(_prefix, _name)
+
+Part = Element | None
+
+
+def dcc(name: str, *parts: Part, **attributes: str) -> Element:
+    """An element of the certificate with what is there of its parts."""
+    return _with(Element(f"{{{DCC}}}{name}", attributes), parts)
+
+
+def si(name: str, *parts: Part) -> Element:
+    """An element of a quantity."""
+    return _with(Element(f"{{{SI}}}{name}"), parts)
+
+
+def _with(element: Element, parts: Iterable[Part]) -> Element:
+    element.extend([part for part in parts if part is not None])
+    return element
+
+
+def words(name: str, text: str | date | None) -> Element:
+    """An element that holds a text; what is not known reads "not stated"."""
+    element = dcc(name)
+    element.text = _plain(text)
+    return element
+
+
+def text(name: str, statement: str | None) -> Element:
+    """An element with a text, where the schema wants it in a language."""
+    content = dcc("content", lang="en")
+    content.text = _plain(statement)
+    return dcc(name, content)
+
+
+def _plain(statement: str | date | None) -> str:
+    """Printable, since XML knows no control characters; with one blank for any, those that do not break among them."""
+    return UNSAID if statement is None else printable(" ".join(str(statement).split())) or UNSAID
+
+
+def values(name: str, numbers: Iterable[object]) -> Element:
+    """A list of numbers or units; floating-point numbers in full."""
+    element = si(name)
+    element.text = " ".join(str(number) for number in numbers)
+    return element
+
+
+def real(value: float, unit: str) -> Element:
+    """One value without an uncertainty."""
+    return si("real", values("value", [value]), values("unit", [unit]))
+
+
+def real_list(
+    labels: Sequence[str],
+    numbers: Sequence[float],
+    units: Sequence[str],
+    *,
+    expanded: Expanded | None = None,
+    region: tuple[Sequence[Sequence[float]], float] | None = None,
+) -> Element:
+    """Values with U and its coverage, or with a covariance matrix and the factor of their joint region.
+
+    One unit stands for all values if there is but one.
+    """
+    uncertainty = covered = None
+    if expanded is not None:
+        uncertainty = si(
+            "expandedUncXMLList",
+            values("uncertaintyXMLList", expanded.widths),
+            values("coverageFactorXMLList", _shortest(expanded.factors)),
+            values("coverageProbabilityXMLList", _shortest([round(each, DIGITS) for each in expanded.probabilities])),
+        )
+    if region is not None:
+        covariance, factor = region
+        covered = si(
+            "ellipsoidalRegionXMLList",
+            _covariance(covariance, units if len(units) > 1 else [*units] * len(covariance)),
+            values("coverageFactor", [factor]),
+            values("coverageProbability", [JOINT_PROBABILITY]),
+        )
+    return si(
+        "realListXMLList",
+        values("labelXMLList", labels),
+        values("valueXMLList", numbers),
+        values("unitXMLList", units),
+        uncertainty,
+        covered,
+    )
+
+
+def _shortest(numbers: Sequence[float]) -> Sequence[float]:
+    """One number stands for as many that are the same."""
+    return numbers[:1] if len(set(numbers)) == 1 else numbers
+
+
+def _covariance(matrix: Sequence[Sequence[float]], units: Sequence[str]) -> Element:
+    columns = [
+        si("column", *(si("covariance", values("value", [row[j]]), values("unit", [product(units[i], units[j])]))
+                       for i, row in enumerate(matrix)))
+        for j in range(len(matrix))
+    ]  # fmt: skip
+    return si("covarianceMatrix", *columns)
+
+
+def product(first: str, second: str) -> str:
+    """The product of two units as D-SI writes them, `\\one` among them."""
+    if r"\one" in (first, second):
+        return second if first == r"\one" else first
+    if first != second:
+        return first + second
+    parts: list[tuple[str, int]] = []
+    for name in first.split("\\")[1:]:
+        if name.startswith("tothe{"):
+            parts[-1] = (parts[-1][0], int(name[6:-1]))
+        else:
+            parts.append((name, 1))
+    return "".join(rf"\{name}\tothe{{{2 * power}}}" for name, power in parts)

@@ -1,0 +1,125 @@
+"""The result as a person reads it in the terminal: whole, or what of it is asked for."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from rig.data.result_file import CheckEntry, ResultDocument
+from rig.report.certificate.writer import PAGE
+from rig.report.entries.omitted import omitted_lines
+from rig.report.findings.characteristic import Term, terms
+from rig.report.findings.kind import said
+from rig.report.kinds.registry import kinds
+from rig.report.terminal.ending import ending
+from rig.report.words.expanded import factor_words
+from rig.report.words.mounts import mount_lines
+from rig.report.words.rounding import plus_minus
+from rig.station.plain_text import plain, say
+
+ROUNDING = 1e-12
+ALL_OF_IT = "the same command with --all"
+
+
+def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
+    """Print what was solved and is not kept: the document for machines, else its ending or, as a `whole`, all tables.
+
+    `folder` is that of the run it was recorded in, which what to do is said of.
+    """
+    console = Console(highlight=False)
+    if as_json:
+        print(document.text())
+    elif whole:
+        print_result(document, console)
+    else:
+        lines = ending(document, folder=folder, everything=ALL_OF_IT, certificate=None, since=(), width=console.width)
+        _print_ending([*lines], document, console)
+
+
+def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
+    """Print what the finished run in a `folder` amounts to; `since` says how it compares with the last calibrations."""
+    if as_json:
+        print(document.text())
+        for line in since:  # which no ending says then
+            say(line.replace("`", ""), sys.stderr)
+        return
+    console, certificate = Console(highlight=False), folder / PAGE
+    lines = ending(
+        document,
+        folder=folder,
+        everything=f"rig show {shlex.quote(str(folder))} --all",
+        certificate=certificate if certificate.is_file() else None,
+        since=since,
+        width=console.width,
+    )
+    _print_ending([*lines], document, console)
+
+
+def _print_ending(lines: Sequence[str], document: ResultDocument, console: Console) -> None:
+    for line in lines[:-1]:
+        console.print(plain(line), soft_wrap=True)
+    print_verdict(document, console)
+
+
+def print_result(result: ResultDocument, console: Console) -> None:
+    """Print what was found of each sensor with its uncertainty, kind by kind, then checks and verdict."""
+    print_values(result, console)
+    print_checks(result, console)
+    print_verdict(result, console)
+
+
+def print_values(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
+    """Print what was found, of one sensor alone if one is named: values, budgets, and what stands beside."""
+    for kind in kinds():
+        for found in kind.found(result):
+            if sensor not in (None, found.sensor):
+                continue
+            for each in (*said(kind.printed, found), *map(_beside, terms(kind.characteristics, found, "terminal"))):
+                console.print(plain(each) if isinstance(each, str) else each)
+        for line in kind.unsolved(result):
+            console.print(plain(line))
+    for line in (*mount_lines(result), *omitted_lines(result, sensor)):
+        console.print(plain(line))
+
+
+def _beside(term: Term) -> str:
+    """A characteristic in a line: each of its numbers ± U."""
+    unit = "" if term.units.shown.name == "1" else f" {term.units.shown.name}"
+    numbers = "  ".join(f"{label} {plus_minus(value, u)}".lstrip() for label, value, u in term.printed)
+    return f"{term.name}: {numbers}{unit} (U, {factor_words(term.known.freedom)})"
+
+
+def print_checks(result: ResultDocument, console: Console, sensor: str | None = None) -> None:
+    """Print the checks sensor by sensor, those that failed first; of one sensor alone if one is named."""
+    by_sensor: dict[str | None, list[CheckEntry]] = {}
+    for check in result.checks:
+        by_sensor.setdefault(check.means.sensor, []).append(check)
+    for name, checks in by_sensor.items():
+        if sensor in (None, name):
+            console.print(_checks(name, checks))
+
+
+def print_verdict(result: ResultDocument, console: Console) -> None:
+    """Print the verdict, which is the last line of whatever ends with it."""
+    console.print(f"verdict: {result.verdict.upper()}", style="bold green" if result.verdict == "pass" else "bold red")
+
+
+def _checks(sensor: str | None, checks: Sequence[CheckEntry]) -> Table:
+    table = Table(title=plain("checks" if sensor is None else f"checks of {sensor}"), title_justify="left")
+    for heading in ("check", "value", "limit", "unit", "result"):
+        table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+    for check in sorted(checks, key=lambda each: each.passed):
+        name = check.name if sensor is None else check.name.removeprefix(f"{sensor}.")
+        value = "not measured" if check.value is None else _number(check.value, check.limit)
+        limit = "not set" if check.limit is None else f"{check.limit:.4g}"
+        unit = "" if check.unit == "1" else check.unit
+        table.add_row(plain(name), value, limit, plain(unit), "ok" if check.passed else "FAILED")
+    return table
+
+
+def _number(value: float, limit: float | None) -> str:
+    """The value in print: what is below all digits of its limit is rounding, and none."""
+    return "0" if limit is not None and abs(value) < ROUNDING * limit else f"{value:.4g}"

@@ -1,0 +1,37 @@
+"""Prints the words for people, docs/glossary.md: `python -m rig.report.words.glossary_page > docs/glossary.md`."""
+
+from collections.abc import Iterator
+
+from rig.report.words.glossary import glossary
+
+SECTIONS = {
+    "field": ("Words of the field", "what it means"),
+    "machine": ("Words of the arm, the board and computers", "what it means"),
+    "project": ("Words of this project", "what it means here"),
+}
+
+
+def page_text() -> str:
+    """The table as Markdown, in three sections."""
+    lines = [
+        "# Glossary",
+        "",
+        "Generated from [`rig/report/words/glossary.txt`](../rig/report/words/glossary.txt) by",
+        "`python -m rig.report.words.glossary_page > docs/glossary.md`: change the table, not this page.",
+        "",
+        "Words that the pages, the terminal and the certificate use. For people of other fields, and for readers whose",
+        "second language is English. `rig explain WORD` says what stands here.",
+    ]
+    for whose, (title, heading) in SECTIONS.items():
+        lines += ["", f"## {title}", "", f"| word | {heading} |", "| --- | --- |", *_rows(whose)]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(whose: str) -> Iterator[str]:
+    for word in glossary():
+        if word.whose == whose:
+            yield f"| {word.names} | {word.means.replace('|', chr(92) + '|')} |"
+
+
+if __name__ == "__main__":
+    print(page_text(), end="")

@@ -1,0 +1,1 @@
+"""The board during a run: its sensors set up, its own calibration, its corrections."""

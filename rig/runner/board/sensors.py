@@ -1,0 +1,135 @@
+"""The board as a source of samples: its configured sensors set up, and described for the recording."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import radians
+
+import numpy as np
+
+from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibration
+from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
+from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
+from rig.config.models import SensorsConfig
+from rig.config.sensors.sensor_sections import MagnetometerSection, SensorSection
+from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
+from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.recorded_sensor import RecordedSensor, recorded_as
+from rig.sensors.source import OnSamples
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSensor:
+    """A sensor that is set up: its index on the board, and what a reader of its samples must know.
+
+    `stored` is the calibration its readings are corrected by, None where they come raw.
+    """
+
+    index: int
+    described: RecordedSensor
+    stored: StoredCalibration | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSource:
+    """The board with its sensors set up, by name. What it streams is handed on by the sensors' names."""
+
+    board: Board
+    set_up: Mapping[str, BoardSensor]
+
+    @property
+    def sensors(self) -> Mapping[str, RecordedSensor]:
+        """The board's sensors by name, as of `SampleSource`."""
+        return {name: sensor.described for name, sensor in self.set_up.items()}
+
+    @property
+    def stored(self) -> Mapping[str, StoredCalibration]:
+        """The calibrations by which readings are corrected, by sensor name."""
+        return {name: sensor.stored for name, sensor in self.set_up.items() if sensor.stored is not None}
+
+    def start(self) -> None:
+        """Start the board's samples, as of `SampleSource`; what is stored corrects."""
+        self.board.start([self.set_up[name].index for name in self.stored])
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Check the board, as of `SampleSource`. Raises BoardError."""
+        self.board.check(clock_s)
+
+
+@contextmanager
+def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
+    """The board for the length of the `with` block.
+
+    Raises BoardError as `Board`, Refused as `configured_board`, `refuse_other_firmware` and `set_up_sensors`.
+    """
+    section = configured_board(config)
+    names: dict[int, str] = {}
+
+    def on_batch(batch: SampleBatch) -> None:
+        on_samples(names[batch.sensor], batch.samples)
+
+    with Board(section.port, section.baud, on_batch) as board:
+        refuse_other_firmware(board.identity)
+        set_up = set_up_sensors(board, config, calibrated=calibrated)
+        names.update({sensor.index: name for name, sensor in set_up.items()})
+        yield BoardSource(board, set_up)
+
+
+def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
+    """Every configured sensor on the board by its name; those to calibrate stream corrected readings when `calibrated`.
+
+    Raises Refused as `find_sensor` and `stored_calibration`.
+    """
+    gyroscopes = {
+        name: _corrected(board, name, section)
+        if calibrated and name in config.to_calibrate
+        else _raw(board, name, section)
+        for name, section in config.on_board.items()
+    }
+    return gyroscopes | {name: _magnetometer(board, name, each) for name, each in config.magnetometers.items()}
+
+
+def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardSensor:
+    info = find_sensor(board.identity, name, section)
+    setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
+    field = of_three_axes(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
+    return BoardSensor(info.index, recorded_as(section, field, rate_hz=setup.rate_hz))
+
+
+def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    info = find_sensor(board.identity, name, section)
+    range_g = 0.0 if section.acceleration is None else section.acceleration.range_g
+    setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
+    channels = [
+        of_three_axes(RATE, setup.sensitivity_rad_s, FULL_SCALE_COUNTS, radians(setup.range_deg_s)),
+        of_thermometer(setup.temperature_scale_c, setup.temperature_offset_c),
+    ]
+    if setup.sensitivity_m_s2:
+        channels.append(of_three_axes(ACCELERATION, setup.sensitivity_m_s2, FULL_SCALE_COUNTS, setup.range_m_s2))
+    return BoardSensor(info.index, recorded_as(section, *channels, rate_hz=setup.rate_hz))
+
+
+def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    raw = _raw(board, name, section)
+    stored = stored_calibration(board, name, section)
+    return BoardSensor(raw.index, corrected(raw.described, stored.calibration, CALIBRATED_RAD_S), stored)
+
+
+def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
+    """The sensor when its rates come corrected, in counts of that size and without accelerations."""
+    raw = sensor.channel(RATE)
+    assert raw.full_scale_counts is not None, "every driver states it"
+    limit_rad_s = raw.full_scale_counts * raw.unit_per_count
+    bias_rad_s, share = np.abs(calibration.bias_rad_s), np.ones(3)
+    if calibration.polynomials is not None:  # wherever in their range it is
+        changed, moved_rad_s = calibration.polynomials.most()
+        share, bias_rad_s = 1 - changed, bias_rad_s + moved_rad_s
+    # What a saturated reading becomes, at least: the other axes may read anything beside it.
+    on_axis, beside = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
+    np.fill_diagonal(beside, 0.0)
+    lowest_rad_s = float(
+        np.min(on_axis @ (share * (limit_rad_s - bias_rad_s)) - beside @ ((2 - share) * (limit_rad_s + bias_rad_s)))
+    )
+    full_scale = int(lowest_rad_s / sensitivity_rad_s)
+    rate = replace(raw, unit_per_count=sensitivity_rad_s, full_scale_counts=full_scale)
+    return replace(sensor, mode="calibrated", channels=(rate, sensor.channel(TEMPERATURE)))

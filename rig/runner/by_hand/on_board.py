@@ -1,0 +1,197 @@
+"""The board calibrates a gyroscope by hand by itself: the host says what to do, looks on, and checks the answer.
+
+The board alone finds rests and moves and solves; it would do so without anybody. What is told to the operator follows
+from what it says of each move.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.client import Board
+from firmware_host.hand_answers import HandReport, HandSolved
+from rig.analysis.by_hand.on_board import BoardReadings, HandAgreement, hand_agreement
+from rig.board.crystal import follows_crystal
+from rig.board.identify import changing, refusing
+from rig.config.models import RigConfig
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recording.hand_events import HandAsked, HandMoveRefused, HandMoveTaken, HandRested, OfTheHand
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.errors import Fault, Refused
+from rig.motion.by_hand import Face, HandMove
+from rig.observation.by_hand.runs import MICROSECOND_S, turned_face
+from rig.plans.by_hand import ROUND, Wanted, asked_next, still_open
+from rig.runner.board.sensors import BoardSource, board_source
+from rig.runner.by_hand.session import drained
+
+LOOK_S = 0.05
+AGAIN = {  # what the board calls it: the error's name, what, what to do
+    "clipped": ("clipping", "it was turned faster than the sensor's range", "Turn more slowly"),
+    "lost": ("lost_in_move", "readings are missing", "Make the move again"),
+    "no_face": ("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go"),
+    "contradicts": (
+        "lost_in_move",
+        "the move is not what all the others say",
+        "Lay it down on the whole of a side; a turn ends where it began",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedByBoard:
+    """What the board found of a sensor of that index, and the same in double precision, None without its readings."""
+
+    index: int
+    solved: HandSolved
+    agreement: HandAgreement | None
+
+
+@dataclass(slots=True)
+class FollowedSession:
+    """A session as the host follows it by the board's reports: what was taken, on which faces it lay."""
+
+    sensor: RecordedSensor
+    moves: int
+    tell: Callable[[OfTheHand], None]
+    reports: list[HandReport] = field(default_factory=list)
+    _taken: list[HandMove] = field(default_factory=list)
+    _lay: list[Face] = field(default_factory=list)
+    _asked: bool = False
+
+    def take(self, report: HandReport) -> None:
+        """Take the board's report; what is new in it is told. Its button begins anew, and so does all of this."""
+        wrong = None
+        if self.reports and report.judged < self.reports[-1].judged:
+            self.reports, self._taken, self._lay, self._asked = [], [], [], False
+        if new := report.judged > (self.reports[-1].judged if self.reports else 0):
+            self.reports.append(report)
+            wrong = self._judged(report)
+        first = not self._lay and report.after is not None
+        if first and report.after is not None:
+            self._rested(report, report.after)
+        if report.state not in ("done", "failed") and (new or first or not self._asked):
+            self._ask(wrong)
+
+    def _judged(self, report: HandReport) -> Fault | None:
+        if report.after is not None:
+            self._rested(report, report.after)
+        if report.outcome == "nothing":
+            return None
+        if report.outcome != "taken" or report.before is None or report.after is None:
+            wrong = Fault(*AGAIN[report.outcome])
+            self.tell(HandMoveRefused(report.move_us, report.after_us, wrong.name))
+            return wrong
+        before, after = self._face(report.before), self._face(report.after)
+        kind: Literal["flip", "turn"] = "flip" if before != after else "turn"
+        turns = int(report.whole)
+        self._taken.append(HandMove(kind, before, after, turns))
+        self.tell(HandMoveTaken(report.move_us, report.after_us, kind, before, after, turns))
+        return None
+
+    def _rested(self, report: HandReport, face: str) -> None:
+        self._lay.append(self._face(face))
+        self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
+
+    def _ask(self, wrong: Fault | None) -> None:
+        """Ask for the next move of the list, which goes on until the board is content."""
+        flips = self.moves
+        while (left := still_open(Wanted(flips, 0), self._taken, self._lay)).done:
+            flips += len(ROUND)
+        instruction = asked_next(left, self._lay[-1] if self._lay else None)
+        again, why = (None, "") if wrong is None else (wrong.name, f"{wrong.what}. {wrong.remedy}.")
+        if instruction is not None:
+            self.tell(HandAsked(instruction, again, why))
+        self._asked = True
+
+    def _face(self, of_sensor: str) -> Face:
+        return turned_face(of_sensor, np.array(self.sensor.mounting).T)
+
+
+@contextmanager
+def calibrated_by_board(
+    config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[OfTheHand], None]
+) -> Iterator[tuple[Board, CalibratedByBoard]]:
+    """The calibration of one sensor by its board, which is still connected in the `with` block.
+
+    It is done after so many moves, at least, when the scale's standard uncertainty is no larger. Raises Refused
+    `clock_unknown`, `first_face_not_told`, and as `board_source`; Fault `board_unverified`, `board_disagrees`, what was
+    wrong with ten moves in a row, and as the board says.
+    """
+    arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
+    with ExitStack() as held:
+        with refusing():
+            source = held.enter_context(
+                board_source(config, lambda sensor, samples: arrived.put((sensor, samples)), calibrated=False)
+            )
+            index, described = source.set_up[name].index, source.set_up[name].described
+            _check(name, described, source.board)
+            source.start()
+            source.board.begin_by_hand(index, moves, scale_std)
+        with changing():
+            session = FollowedSession(described, moves, tell)
+            _follow(source, session)
+            source.board.stop()
+            solved = source.board.hand_solution()
+        samples = np.concatenate([samples for sensor, samples in drained(arrived) if sensor == name])
+        agreement = hand_agreement(_readings(described, samples), session.reports, solved)
+        yield source.board, CalibratedByBoard(index, solved, agreement)
+
+
+def kept_by_board(board: Board) -> CalibratedByBoard:
+    """What the board keeps of the last session by hand, which its button or a host began: no readings are left of it.
+
+    Raises Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
+    """
+    report = board.hand_report()
+    if report.state == "done":
+        return CalibratedByBoard(report.sensor, board.hand_solution(), None)
+    why = "none has been made since it was switched on or reset"
+    if report.state == "failed":
+        why = f"it was given up, for ten moves in a row were refused; the last because {AGAIN[report.outcome][1]}"
+    elif report.state != "idle":
+        why = f"it was not done after {report.taken} moves, and has ended now"
+    raise Refused(
+        "no_answer_by_hand",
+        f"the board keeps no answer of a session by hand: {why}",
+        "Press its button, make the moves until the LED flashes once a second, and leave the power on until then",
+    )
+
+
+def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
+    if not sensor.measures(ACCELERATION):
+        raise Refused(
+            "first_face_not_told",
+            f"the board reads from accelerations which side is up, and sensors.{name} asks for none",
+            f"Add acceleration: {{}} to sensors.{name}",
+        )
+    if not follows_crystal(board):
+        raise Refused(
+            "clock_unknown",
+            "the board's clock does not follow its crystal, so it may be a per cent off, and nothing in a session by "
+            "hand can show that",
+            "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
+        )
+
+
+def _follow(source: BoardSource, session: FollowedSession) -> None:
+    """Look on until it is done. Raises Fault for what was wrong with the last of ten refused moves."""
+    while True:
+        report = source.board.hand_report()
+        session.take(report)
+        if report.state == "failed":
+            raise Fault(*AGAIN[report.outcome])
+        if report.state == "done":
+            return
+        time.sleep(LOOK_S)
+        source.check()
+
+
+def _readings(sensor: RecordedSensor, samples: NDArray[Any]) -> BoardReadings:
+    times_us, sequence = samples["board_time_us"].astype(np.int64), samples["sequence"].astype(np.int64)
+    return BoardReadings(times_us, sequence, sensor.channel(RATE).values(samples), MICROSECOND_S)

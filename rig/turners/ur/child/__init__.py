@@ -1,0 +1,1 @@
+"""The supervised process in which the `ur_rtde` client lives, and the program's end of it."""

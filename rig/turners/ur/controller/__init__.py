@@ -1,0 +1,1 @@
+"""The controller's interfaces as the rig uses them: RTDE, dashboard, primary, Robot API."""

@@ -1,0 +1,85 @@
+"""The script line that ends a program, by the primary interface over plain TCP: a stop that no PolyScope is without.
+
+The controller itself reads it, not the program on its screen that serves the dashboard. It takes lines in remote
+control only, and acknowledges none; in local control it answers each by an error, C210. What it sends ten times a
+second tells whether a program runs. (The maker's client library, `PrimaryClient::commandStop`; client interface
+description: robot mode data, sub-package 0 of a robot state.)
+"""
+
+import socket
+import struct
+import time
+from collections.abc import Iterator
+
+from rig.turners.ur.controller.controller_words import READ_ONLY, ErrorCode, ProgramStopped, words_in
+from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
+
+ROBOT_MODE_DATA = 0
+# Time stamp; real robot connected, enabled, power on, emergency stop, protective stop, program runs, program is paused.
+MODE_DATA = struct.Struct(">Q7?")
+
+
+class PrimaryStop:
+    """One connection to the primary interface of the controller at `host`.
+
+    Every method raises `OSError` when the controller does not answer within `timeout_s`.
+    """
+
+    name = "primary interface"
+    tells_of_programs = True
+    acknowledged = False  # it never does
+
+    def __init__(self, host: str, timeout_s: float) -> None:
+        self.refusal: str | None = None
+        self.stopped_programs: set[str] = set()  # of which it has said that they ended, by their names
+        self._socket = socket.create_connection((host, PORT), timeout_s)
+        self._timeout_s = timeout_s
+        self._buffer = bytearray()
+        self._greeted = False
+
+    def send(self, script: str) -> None:
+        """Hand the controller a script of whole lines; it does not say whether it takes them."""
+        self._socket.settimeout(self._timeout_s)
+        self._socket.sendall(script.encode())
+
+    def stop_program(self) -> None:
+        """Stop the running program, and with it the arm."""
+        self.send("stop program\n")
+
+    def program_running(self) -> bool:
+        """Whether any program runs on the controller or is paused there, by the next state that it sends.
+
+        The first state is passed over: it may be older than what was sent to the controller.
+        """
+        deadline_s = time.monotonic() + self._timeout_s
+        while True:
+            for running in self._told():
+                if self._greeted:
+                    return running
+                self._greeted = True
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0.0:
+                raise TimeoutError("the primary interface does not tell in time whether a program runs")
+            self._socket.settimeout(left_s)
+            data = self._socket.recv(65536)
+            if not data:
+                raise ConnectionError("the primary interface closed the connection")
+            self._buffer += data
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _told(self) -> Iterator[bool]:
+        """What the states that have come say, oldest first."""
+        for kind, payload in packages(self._buffer):
+            if kind == ROBOT_MESSAGE:
+                match words_in(payload):
+                    case ErrorCode(code=code) as error if code == READ_ONLY:
+                        self.refusal = f"{error.words}: it is read-only in local control"
+                    case ProgramStopped(program):
+                        self.stopped_programs.add(program)
+            elif kind == ROBOT_STATE:
+                for part, content in packages(bytearray(payload)):
+                    if part == ROBOT_MODE_DATA and len(content) >= MODE_DATA.size:
+                        *_, runs, paused = MODE_DATA.unpack_from(content)
+                        yield runs or paused

@@ -1,0 +1,1 @@
+"""The simulated controller's interfaces: RTDE, dashboard, primary, scripts, Robot API."""

@@ -1,0 +1,156 @@
+"""The primary and secondary interfaces, ports 30001 and 30002: the robot's state ten times a second, and its messages.
+
+Client interface description of the maker for PolyScope 5: packages of a big-endian size (i32), a type (u8) and a
+payload; a robot state (16) holds sub-packages of the same form, a robot message (20) a time stamp, source and kind.
+"""
+
+import struct
+from collections.abc import Callable
+
+from rig.world.clock import TICKS_PER_SECOND
+from rig.world.ur10e.controller_messages import Message, MessageKind
+from rig.world.ur10e.interfaces.script_socket import ScriptSession
+from rig.world.ur10e.interfaces.variables import joint_modes
+from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
+from rig.world.ur10e.motion.links import Links, links
+from rig.world.ur10e.robot import Robot
+
+STATE_HZ = 10
+ROBOT_STATE, ROBOT_MESSAGE = 16, 20
+VERSION_MESSAGE = 3
+ACCELERATION_LIMIT_RAD_S2 = 40.0  # of every joint
+NOT_CALIBRATED, CALIBRATED = 0, 2  # what KinematicsInfo says of the links: those of the model, those of this arm
+PROJECT, BUILT = b"URControl", b"simulated"  # in place of a date, as the dashboard says it
+
+
+def package(kind: int, payload: bytes) -> bytes:
+    return struct.pack(">iB", 5 + len(payload), kind) + payload
+
+
+class PrimarySession:
+    """One connection: programs come in, states and messages go out."""
+
+    dialogue = True
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._script = ScriptSession(robot)
+        self._seen = robot.messages.last
+
+    def greeting(self) -> bytes:
+        major, minor, bugfix, build = self._robot.identity.polyscope
+        name = bytes([len(PROJECT)]) + PROJECT
+        version = name + struct.pack(">BBii", major, minor, bugfix, build) + BUILT
+        return _message(self._robot, VERSION_MESSAGE, version) + _state(self._robot, (*STATE, *CONFIGURATION))
+
+    @property
+    def closing(self) -> bool:
+        return self._script.closing
+
+    def receive(self, data: bytes) -> bytes:
+        return self._script.receive(data)
+
+    def tick(self) -> bytes:
+        data = b""
+        for message in self._robot.messages.after(self._seen):
+            data += _message(self._robot, message.kind, _content(message))
+            self._seen = message.number
+        if self._robot.tick % (TICKS_PER_SECOND // STATE_HZ) == 0:
+            data += _state(self._robot, STATE)
+        return data
+
+    def closed(self) -> None:
+        pass
+
+
+def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
+    return package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.reported_time_s * 1e6), -1, kind) + payload)
+
+
+def _content(message: Message) -> bytes:
+    text = message.text.encode(errors="replace")  # a program's text may hold half a character
+    if message.kind == MessageKind.KEY:
+        title = message.title.encode()
+        return struct.pack(">iiB", 0, 0, len(title)) + title + text
+    if message.kind == MessageKind.SAFETY_MODE:
+        return struct.pack(
+            ">iiBII", 0, 0, SafetyMode[message.text], 0, 0
+        )  # which cause has which code is not simulated
+    if message.error is not None:
+        return struct.pack(">iiiII", *(message.error.code, message.error.argument, message.error.level), 0, 0) + text
+    if message.kind == MessageKind.EXCEPTION:
+        return struct.pack(">ii", *message.place) + text
+    return text
+
+
+Part = tuple[int, Callable[[Robot], bytes]]
+
+
+def _state(robot: Robot, parts: tuple[Part, ...]) -> bytes:
+    return package(ROBOT_STATE, b"".join(package(kind, content(robot)) for kind, content in parts))
+
+
+def _robot_mode(robot: Robot) -> bytes:
+    playing = robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING, RuntimeState.STOPPING)
+    return struct.pack(
+        ">Q7?BB3dB",
+        int(robot.reported_time_s * 1e6),
+        True,
+        True,
+        robot.robot_mode != RobotMode.POWER_OFF,
+        robot.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP,
+        robot.safety_mode == SafetyMode.PROTECTIVE_STOP,
+        playing,
+        robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED),
+        robot.robot_mode,
+        0,  # control mode: position
+        robot.speed_slider,
+        robot.speed_scaling,
+        1.0,
+        0,
+    )
+
+
+def _joints(robot: Robot) -> bytes:
+    motion, modes = robot.motion, joint_modes(robot)
+    columns = zip(motion.actual_q_rad, motion.now.target_q_rad, motion.actual_qd_rad_s, modes, strict=True)
+    return b"".join(
+        struct.pack(">3d4fB", q, target, qd, 0.0, 48.0, 28.0, 28.0, mode) for q, target, qd, mode in columns
+    )
+
+
+def _masterboard(robot: Robot) -> bytes:
+    inputs = struct.pack(">iiBBdd", 0, robot.digital_outputs, 0, 0, 0.0, 0.0)
+    outputs = struct.pack(">bbdd", 0, 0, *robot.analog_outputs)
+    return inputs + outputs + struct.pack(">4f3BIBBB", 30.0, 48.0, 0.6, 0.0, robot.safety_mode, 0, 0, 0, 0, 0, 0)
+
+
+def _cartesian(robot: Robot) -> bytes:
+    return struct.pack(">12d", *robot.tcp_pose(robot.motion.actual_q_rad), *robot.tcp_offset)
+
+
+def _denavit_hartenberg(links: Links) -> list[float]:
+    """The Denavit–Hartenberg parameters of all six links, a, d and alpha, as both sub-packages hold them."""
+    return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
+
+
+def _kinematics(robot: Robot) -> bytes:
+    """The arm's own links, its maker's calibration included, and whether they are the maker's or the model's."""
+    angles = [link.theta_rad for link in robot.links]
+    status = CALIBRATED if robot.links != links(drawing=robot.model.drawing) else NOT_CALIBRATED
+    return struct.pack(">6I24dI", *[1] * 6, *angles, *_denavit_hartenberg(robot.links), status)
+
+
+def _configuration(robot: Robot) -> bytes:
+    """What the controller is set up for: its model as drawn, and what its safety settings leave of what that can do."""
+    model = robot.model
+    positions = [value for limit in model.limit_rad for value in (-limit, limit)]
+    speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]
+    defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
+    drawing = _denavit_hartenberg(links(drawing=model.drawing))
+    numbers = [*positions, *speeds, *defaults, *drawing, *[0.0] * 6]
+    return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, model.robot_type, 0)
+
+
+STATE: tuple[Part, ...] = ((0, _robot_mode), (1, _joints), (3, _masterboard), (4, _cartesian))
+CONFIGURATION: tuple[Part, ...] = ((5, _kinematics), (6, _configuration))

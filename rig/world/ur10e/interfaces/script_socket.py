@@ -1,0 +1,149 @@
+"""The script sockets, ports 30001 to 30003: take programs in, and recognise the one ur_rtde uploads.
+
+URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
+itself. The text of `rtde_control` is not interpreted but acted out (`ur_rtde_program`); other programs may use the
+statements listed in `urscript`. In local control they take nothing in: a connection that was opened in it stays
+read-only, and those that are open when it begins are closed (Universal Robots ROS Driver, issue 459).
+"""
+
+import re
+from collections.abc import Callable, Iterator
+
+from rig.world.ur10e.controller_messages import READ_ONLY, ProgramError
+from rig.world.ur10e.programs.program_threads import Move
+from rig.world.ur10e.programs.ur_rtde_program import ControlProgram
+from rig.world.ur10e.programs.urscript import Arguments, ScriptProgram, move
+from rig.world.ur10e.robot import Program, Robot
+
+PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
+TEXT_BYTES = 1 << 20  # a program is not longer; that of ur_rtde has some 60 000
+REGISTER_OFFSETS = (0, 24)  # the lower and the upper half of the registers: ur_rtde takes either
+BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
+
+
+class ScriptReader:
+    """Cuts what arrives into whole programs."""
+
+    def __init__(self) -> None:
+        self._partial = b""
+        self._lines: list[str] = []
+        self._depth = 0
+        self._size = 0  # bytes of what is not complete
+
+    def feed(self, data: bytes) -> Iterator[list[str]]:
+        """The programs that `data` completes, each as its lines. Raises `ProgramError` when one does not end."""
+        self._size += len(data)
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        for raw in lines:
+            line = raw.decode(errors="replace").rstrip()
+            words = line.split("#", 1)[0].strip()
+            if not words and not self._lines:
+                continue
+            self._lines.append(line)
+            if BLOCK.match(words):
+                self._depth += 1
+            elif words == "end":
+                self._depth = max(0, self._depth - 1)
+            if self._depth == 0:
+                program, self._lines, self._size = self._lines, [], len(self._partial)
+                yield program
+        if self._size > TEXT_BYTES:
+            raise ProgramError(f"a program of more than {TEXT_BYTES} bytes is none")
+
+
+def compile_program(robot: Robot, lines: list[str]) -> Program:
+    """The program to play for an uploaded text. Raises `ProgramError` for what the simulation does not know."""
+    text = "\n".join(lines)
+    if lines[0].startswith("def rtde_control()"):
+        return ControlProgram(robot, _register_offset(text), tuple(_path(lines)))
+    return ScriptProgram(robot, lines)
+
+
+def _register_offset(text: str) -> int:
+    """ur_rtde writes the offset of its integer registers on the line after this one. Raises `ProgramError`."""
+    match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
+    offset = int(match.group(1)) if match else 0
+    if offset not in REGISTER_OFFSETS:
+        raise ProgramError(f"registers from {offset} on are not those of rtde_control")
+    return offset
+
+
+def _path(lines: list[str]) -> Iterator[Move]:
+    """The moves that ur_rtde injected into `exec_move_path`."""
+    start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
+    for line in lines[start + 1 :]:
+        statement = line.strip()
+        name = statement.split("(", 1)[0]
+        if statement == "end":
+            return
+        if name in ("movej", "movel"):
+            yield move(name, Arguments(statement))
+        elif name != "signal_async_progress":
+            raise ProgramError(f"not simulated: {statement} in a path")
+
+
+ORDERS: dict[str, Callable[[Robot], object]] = {
+    "power on": Robot.power_on,
+    "power off": Robot.power_off,
+    "set robotmode run": Robot.brake_release,
+    "set unlock protective stop": Robot.unlock_protective_stop,  # at once: the maker's test_primary_client.cpp
+    "stop program": lambda robot: robot.stop_program("stopped by a client"),
+    "pause program": Robot.pause,
+    "resume program": Robot.resume,
+}
+
+
+class ScriptSession:
+    """One connection to a script socket."""
+
+    dialogue = True
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._read_only = robot.local_control  # and so for as long as it is open
+        self.closing = False
+        self._reader = ScriptReader()
+
+    def greeting(self) -> bytes:
+        return b""
+
+    def receive(self, data: bytes) -> bytes:
+        try:
+            for lines in self._reader.feed(data):
+                if self._read_only or self._robot.local_control:
+                    self._robot.messages.report(READ_ONLY)
+                else:
+                    self._obey(lines)
+        except ProgramError as error:
+            self._robot.messages.complain(error)
+            self._reader = ScriptReader()
+            self.closing = True
+        return b""
+
+    def tick(self) -> bytes:
+        return b""
+
+    def closed(self) -> None:
+        pass
+
+    def _obey(self, lines: list[str]) -> None:
+        order = ORDERS.get(lines[0].strip())
+        if order is not None:
+            order(self._robot)
+            return
+        try:
+            program = compile_program(self._robot, lines)
+            if lines[0].lstrip().startswith("sec "):
+                run_beside(program)
+            else:
+                self._robot.start_program(program)
+        except ProgramError as error:
+            self._robot.messages.complain(error)
+        except (TypeError, ValueError, ArithmeticError) as error:  # a value of a kind the statement cannot take
+            self._robot.messages.complain(ProgramError(str(error)))
+
+
+def run_beside(program: Program) -> None:
+    """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
+    if program.step():
+        raise ProgramError("a secondary program may not take time")

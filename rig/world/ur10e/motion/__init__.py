@@ -1,0 +1,1 @@
+"""How the simulated arm moves: trajectories, joints and their errors, links, flange."""

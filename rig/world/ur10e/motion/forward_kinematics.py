@@ -1,0 +1,110 @@
+"""How the simulated flange turns and where it is: the world's own few lines, independent of the rig's.
+
+Plain floats, because the sensors ask several hundred times a simulated second.
+"""
+
+from collections.abc import Iterator, Sequence
+from math import acos, cos, pi, sin, sqrt
+
+from rig.world.ur10e.motion.links import NOMINAL, Links
+
+Vector = tuple[float, float, float]
+Rotation = tuple[Vector, Vector, Vector]
+
+
+def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links = NOMINAL) -> Vector:
+    """Angular velocity of the flange in its own frame, rad/s, carried outwards joint by joint."""
+    x = y = z = 0.0
+    for link, angle, speed in zip(links, q_rad, qd_rad_s, strict=True):
+        z += speed
+        c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
+        x, y = c * x + s * y, c * y - s * x
+        c, s = link.cos_alpha, link.sin_alpha
+        y, z = c * y + s * z, c * z - s * y
+    return x, y, z
+
+
+def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rotation, Vector]]:
+    """Rotation (rows) and position (m) in the base frame of the base, then of what each link carries, flange last."""
+    rotation: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    position: Vector = (0.0, 0.0, 0.0)
+    yield rotation, position
+    for link, angle in zip(links, q_rad, strict=True):
+        c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
+        ca, sa = link.cos_alpha, link.sin_alpha
+        x, y, z = position
+        along = turned(rotation, (link.a_m * c, link.a_m * s, link.d_m))
+        position = x + along[0], y + along[1], z + along[2]
+        turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
+        rotation = _product(rotation, turn)
+        yield rotation, position
+
+
+def turned(rotation: Rotation, vector: Vector) -> Vector:
+    """The vector as it is after a rotation (rows)."""
+    x, y, z = vector
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+
+def _product(left: Rotation, right: Rotation) -> Rotation:
+    first, second, third = (turned(left, column) for column in zip(*right, strict=True))
+    (a, b, c), (d, e, f), (g, h, i) = first, second, third
+    return (a, d, g), (b, e, h), (c, f, i)
+
+
+def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
+    """Rotation (rows) and position (m) of the flange in the base frame."""
+    *_, flange = frames(q_rad, links)
+    return flange
+
+
+def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, ...]:
+    """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
+    rotation, position = flange_frame(q_rad, links)
+    return (*position, *rotation_vector(rotation))
+
+
+def turned_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
+    """The pose of a frame in the same place, turned: `turn` takes its vectors into the frame at `pose`."""
+    return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
+
+
+def placed_pose(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
+    """A pose that is told in a frame, in that in which the frame's own pose is told: `pose_trans` of URScript."""
+    rotation = rotation_from_vector(frame[3:])
+    moved = (
+        origin + sum(turn * way for turn, way in zip(row, pose[:3], strict=True))
+        for origin, row in zip(frame[:3], rotation, strict=True)
+    )
+    return (*moved, *rotation_vector(_product(rotation, rotation_from_vector(pose[3:]))))
+
+
+def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
+    """The rotation vector (rad) of a rotation matrix."""
+    cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))
+    angle = acos(cosine)
+    x, y, z = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
+    if angle < 1e-9:
+        return x / 2.0, y / 2.0, z / 2.0
+    if pi - angle < 1e-6:  # half a turn: the antisymmetric part vanishes, the diagonal still holds the axis
+        axis = [sqrt(max(0.0, (r[i][i] + 1.0) / 2.0)) for i in range(3)]
+        largest = axis.index(max(axis))
+        signs = [1.0 if i == largest or r[largest][i] >= 0.0 else -1.0 for i in range(3)]
+        return angle * signs[0] * axis[0], angle * signs[1] * axis[1], angle * signs[2] * axis[2]
+    scale = angle / (2.0 * sin(angle))
+    return scale * x, scale * y, scale * z
+
+
+def rotation_from_vector(vector: Sequence[float]) -> Rotation:
+    """Rows of the rotation matrix of a rotation vector (rad), Rodrigues' formula."""
+    angle = sqrt(sum(component * component for component in vector))
+    if angle == 0.0:
+        return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    x, y, z = (component / angle for component in vector)
+    c, s, v = cos(angle), sin(angle), 1.0 - cos(angle)
+    return (
+        (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+        (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+        (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+    )

@@ -1,0 +1,250 @@
+"""The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil, nan
+from typing import NamedTuple
+
+from rig.world.clock import TICK_S
+from rig.world.ur10e.motion.ripple import Ripple
+from rig.world.ur10e.motion.trajectory import ZERO, Joints, Trajectory, change_speed, line, rest
+from rig.world.ur10e.motion.vibration import Vibration
+
+# ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
+JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
+SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """The six joints at one time: what is asked of them, and what they do."""
+
+    target_q_rad: Joints
+    target_qd_rad_s: Joints
+    target_qdd_rad_s2: Joints
+    q_rad: Joints
+    qd_rad_s: Joints
+
+
+class _Tick(NamedTuple):
+    """How a tick was played: where on the trajectory it began, and the time scaling there and its change."""
+
+    start_s: float
+    along_s: float
+    fraction: float
+    slope_per_s: float
+    trajectory: Trajectory
+    offset: Joints
+    gain: Joints
+
+
+class Motion:
+    """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
+
+    `memory_s`: how long before the end of the last tick `at` answers as well. `lateness_s`: drawn once a tick, how much
+    later than at its end the encoders are read. `vibration`: that they see, of joints that stand or move by all else
+    that is said here; it is added where somebody looks.
+
+    Three angles are in play: `target` (what a program asked for), `smooth` (the same with the servo's static error
+    taken out, so that the joint comes to rest exactly on target) and the joint's own, with the ripple.
+    """
+
+    def __init__(
+        self,
+        start_rad: Sequence[float],
+        ripples: Sequence[Ripple],
+        encoder_step_rad: float = 0.0,
+        memory_s: float = 0.0,
+        lateness_s: Callable[[], float] | None = None,
+        *,
+        vibration: Vibration | None = None,
+        speed_limit_rad_s: Joints = JOINT_SPEED_LIMIT_RAD_S,
+    ) -> None:
+        self.speed_limit_rad_s = speed_limit_rad_s
+        self.vibration = vibration
+        self._ripples = tuple(ripples)
+        self._encoder_step_rad = encoder_step_rad
+        self._lateness_s, self._late_s = lateness_s, 0.0
+        self._trajectory = rest(tuple(start_rad))
+        self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
+        self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
+        self._scaled = True  # a stop is not stretched by the speed slider
+        self._trajectory_s = 0.0
+        self._fraction = 1.0
+        self.fraction_wanted = 1.0
+        self._ticks = deque(
+            [_Tick(0.0, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)], 1 + ceil(memory_s / TICK_S)
+        )
+        self._stirred = 0  # ticks in memory since something moved, at most
+        self._now: Instant | None = None  # worked out when somebody asks: most ticks nobody does
+
+    # -- what the joints do now ---------------------------------------------------------------------------------
+    @property
+    def fraction(self) -> float:
+        """The time scaling in force: 1 at full speed, 0 when paused."""
+        return self._fraction
+
+    @property
+    def standing(self) -> bool:
+        """No trajectory is being played (a paused one still is)."""
+        return self._trajectory.over(self._trajectory_s)
+
+    @property
+    def now(self) -> Instant:
+        """The joints at the end of the last tick."""
+        if self._now is None:
+            target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
+            fraction = self._fraction if self._scaled else 1.0
+            q, qd = self._joints(self._offset, self._gain, target, velocity, fraction)
+            self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
+        return self._now
+
+    @property
+    def still(self) -> bool:
+        """Whether nothing moved in the whole of the last tick, and of those in memory."""
+        return not self._stirred
+
+    @property
+    def q_rad(self) -> Joints:
+        return self.now.q_rad
+
+    @property
+    def qd_rad_s(self) -> Joints:
+        return self.now.qd_rad_s
+
+    @property
+    def qdd_rad_s2(self) -> Joints:
+        """Accelerations at the end of the last tick."""
+        return ZERO if self.still else self.with_accelerations(self._end_s)[2]
+
+    @property
+    def _end_s(self) -> float:
+        """When the last tick ended."""
+        return self._ticks[-1].start_s + TICK_S
+
+    @property
+    def moving(self) -> bool:
+        return any(self.now.target_qd_rad_s)
+
+    @property
+    def actual_q_rad(self) -> Joints:
+        """The joints' angles as the encoders see them, at the end of the last tick."""
+        step, (q_rad, qd_rad_s, _) = self._encoder_step_rad, self._vibrating(ZERO)
+        if self._late_s:
+            q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, qd_rad_s, strict=True))
+        return tuple(round(q / step) * step for q in q_rad) if step else q_rad
+
+    @property
+    def actual_qd_rad_s(self) -> Joints:
+        """The joints' speeds as the encoders see them."""
+        return self._vibrating(ZERO)[1]
+
+    @property
+    def actual(self) -> tuple[Joints, Joints, Joints]:
+        """Angles, speeds and accelerations as finer encoders would see them."""
+        return self._vibrating(self.qdd_rad_s2)
+
+    def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
+        joints = self.q_rad, self.qd_rad_s, qdd_rad_s2
+        return joints if self.vibration is None else self.vibration.added(self._end_s, *joints)
+
+    def at(self, time_s: float) -> tuple[Joints, Joints]:
+        """True angles and speeds of the joints at a virtual time inside the last tick, or `memory_s` before it."""
+        tick, fraction, target, velocity, _ = self._played(time_s)
+        return self._joints(tick.offset, tick.gain, target, velocity, fraction)
+
+    def with_accelerations(self, time_s: float) -> tuple[Joints, Joints, Joints]:
+        """The joints' angles, speeds and accelerations, those of the ripple included."""
+        if self.still:
+            return self.now.q_rad, ZERO, ZERO
+        tick, fraction, target, velocity, acceleration = self._played(time_s)
+        q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
+        qdd = [0.0] * 6
+        for joint in range(6):
+            v, a = velocity[joint], acceleration[joint]
+            if v or a:
+                gain, u = tick.gain[joint], self._smooth[joint]
+                ripple = self._ripples[joint]
+                speed = gain * v * fraction
+                change = gain * (a * fraction * fraction + v * tick.slope_per_s)
+                qdd[joint] = ripple.gain(u) * change + ripple.bend(u) * speed * speed
+        return q, qd, tuple(qdd)
+
+    def _played(self, time_s: float) -> tuple[_Tick, float, Joints, Joints, Joints]:
+        """The tick a time lies in, the time scaling then, and what the trajectory asks for."""
+        tick = self._ticks[-1]
+        if time_s < tick.start_s:
+            tick = next((it for it in reversed(self._ticks) if it.start_s <= time_s), self._ticks[0])
+        elapsed = min(max(time_s - tick.start_s, 0.0), TICK_S)
+        along = tick.along_s + (tick.fraction + 0.5 * tick.slope_per_s * elapsed) * elapsed
+        return tick, tick.fraction + tick.slope_per_s * elapsed, *tick.trajectory.at(along)
+
+    def _joints(
+        self, offset: Joints, gain: Joints, target: Joints, velocity: Joints, fraction: float
+    ) -> tuple[Joints, Joints]:
+        speeds = [0.0] * 6
+        for joint in range(6):
+            u = offset[joint] + gain[joint] * target[joint]
+            if self._smooth[joint] != u:  # most moves turn few joints
+                self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
+            if velocity[joint]:
+                speeds[joint] = self._ripples[joint].gain(u) * gain[joint] * velocity[joint] * fraction
+        return tuple(self._angles), tuple(speeds)
+
+    # -- one tick ------------------------------------------------------------------------------------------------
+    def step(self, end_s: float) -> None:
+        """Play one tick, ending at the virtual time `end_s`."""
+        begin_s, begin_fraction = self._trajectory_s, self._fraction
+        change = self.fraction_wanted - self._fraction
+        limit = SCALING_RATE_PER_S * TICK_S
+        self._fraction += max(-limit, min(limit, change))
+        fraction, slope = (begin_fraction, (self._fraction - begin_fraction) / TICK_S) if self._scaled else (1.0, 0.0)
+        self._ticks.append(_Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain))
+        if self.standing:
+            self._stirred = max(0, self._stirred - 1)
+        else:
+            mean = 0.5 * (begin_fraction + self._fraction) if self._scaled else 1.0
+            self._trajectory_s += mean * TICK_S
+            self._now = None
+            self._stirred = self._ticks.maxlen or 1
+        if self._lateness_s is not None:
+            self._late_s = self._lateness_s()
+
+    # -- commands ------------------------------------------------------------------------------------------------
+    def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
+        """A moveJ from standstill."""
+        # From where the joints stand: after a stop that need not be where the program wanted them.
+        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
+
+    def follow(self, trajectory: Trajectory) -> None:
+        """Any trajectory from standstill that begins where the joints are."""
+        self._offset, self._gain = self._map(self.q_rad, trajectory.end_rad)
+        self._play(trajectory, scaled=True)
+
+    def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
+        """A speedJ, from whatever the joints do now: to this velocity, and on."""
+        wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
+        velocity = self._trajectory.at(self._trajectory_s)[1]
+        self._play(change_speed(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
+
+    def stop(self, deceleration_rad_s2: float) -> None:
+        """Bring the joints to rest along their present direction."""
+        if self.moving:
+            stopping = change_speed(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
+            self._play(stopping, scaled=False)
+        else:
+            self._play(rest(self.now.target_q_rad), scaled=True)
+
+    def _play(self, trajectory: Trajectory, scaled: bool) -> None:
+        self._trajectory, self._scaled, self._trajectory_s = trajectory, scaled, 0.0
+        self._now = None
+
+    def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
+        """Offset and gain from target to smooth angle, so that the joints stand exactly on both ends of the way."""
+        first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
+        last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
+        gain = tuple(  # a way shorter than any precision asked for has none
+            (v - u) / (b - a) if abs(b - a) > 1e-9 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
+        )
+        return tuple(u - g * a for u, g, a in zip(first, gain, start, strict=True)), gain

@@ -1,0 +1,126 @@
+"""The arm as it is, beside what its controller knows: how its flange really moves, and in whose time."""
+
+from math import pi
+from random import Random
+
+from rig.config.world.laboratory import CalibrationSection, SimulatedArmSection
+from rig.world.clock import TICK_S
+from rig.world.site import Site
+from rig.world.ur10e.motion.flange_motion import Felt, base, carried, turns_of
+from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector, flange_rate, frames
+from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
+from rig.world.ur10e.motion.joint_motion import Motion
+from rig.world.ur10e.motion.links import UR10E, ZERO6, Drawing, Links, links
+from rig.world.ur10e.motion.trajectory import Joints
+
+STILL: Vector = (0.0, 0.0, 0.0)
+WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
+
+
+def known_links(
+    calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
+) -> Links:
+    """The links as the maker calibrated them; with the twists that he does not know, as they are."""
+    return links(
+        calibration.delta_theta_rad,
+        [1e-3 * length for length in calibration.delta_a_mm],
+        [1e-3 * length for length in calibration.delta_d_mm],
+        [known + rest for known, rest in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
+        drawing,
+    )
+
+
+class TrueArm:
+    """Where the joints that `motion` plays really stand. Times are the world's; the controller's clock has its error.
+
+    `ideal`: nothing but the drawing, on a ground that does not turn: then the rate is all that anybody can feel of it.
+    """
+
+    def __init__(
+        self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random, drawing: Drawing = UR10E
+    ) -> None:
+        self._motion, self._site = motion, site
+        self._speed = 1.0 + 1e-6 * section.clock_ppm
+        self._links = known_links(section.calibration, section.unmodelled.twist_rad, drawing)
+        errors = _errors(section)
+        self._errors = JointErrors(errors, random) if errors.any else None
+        self._at_rest: Felt | None = None
+        self._forearm: tuple[tuple[tuple[float, ...], ...], Felt] = ((), base(site))  # felt there, and how joints were
+        self.ideal = (
+            self._speed == 1.0
+            and self._links == links(drawing=drawing)
+            and self._errors is None
+            and motion.vibration is None
+            and not any(site.earth_rate_rad_s)
+        )
+
+    @property
+    def tick_s(self) -> float:
+        """How long the controller's tick of 2 ms really lasts."""
+        return TICK_S / self._speed
+
+    def true_s(self, controller_s: float) -> float:
+        """The time when the controller's clock shows that."""
+        return controller_s / self._speed
+
+    def step(self, controller_s: float) -> None:
+        """A tick of the controller has ended."""
+        if not self._motion.still:
+            self._at_rest = None
+            if self._errors is not None:
+                self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
+
+    def rate_at(self, time_s: float) -> Vector:
+        """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
+        return STILL if self._motion.still else flange_rate(*self._motion.at(time_s), self._links)
+
+    def felt_at(self, time_s: float) -> Felt:
+        """All that a body on the flange feels at a time inside the last tick or the motion's memory."""
+        controller_s = time_s * self._speed
+        resting = (
+            self._motion.still
+            and self._motion.vibration is None
+            and (self._errors is None or self._errors.quiet(controller_s))
+        )
+        if resting and self._at_rest is not None:
+            return self._at_rest
+        q, qd, qdd = self._joints_at(controller_s)
+        if self._speed != 1.0:  # the controller's seconds are not the world's
+            speed, squared = self._speed, self._speed**2
+            qd, qdd = tuple([v * speed for v in qd]), tuple([a * squared for a in qdd])
+        inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
+        if self._forearm[0] != inner:
+            forearm = self._links[:WRIST]
+            self._forearm = inner, carried(base(self._site), turns_of(inner[0], forearm), *inner[1:], forearm)
+        wrist = self._links[WRIST:]
+        now = carried(self._forearm[1], turns_of(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
+        self._at_rest = now if resting else None
+        return now
+
+    def frames_at(self, time_s: float) -> list[tuple[Rotation, Vector]]:
+        """Rotation (rows) and place (m) in the base frame of the base and of what each joint carries, the flange last,
+        at such a time."""
+        q, _, _ = self._joints_at(time_s * self._speed)
+        return list(frames(q, self._links))
+
+    def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
+        """Angles, speeds and accelerations of the joints by the controller's seconds."""
+        joints, seen = self._motion.with_accelerations(controller_s), self._motion.vibration
+        if self._errors is not None:
+            joints = self._errors.at(controller_s, *joints)
+        return joints if seen is None else seen.added(controller_s, *joints)
+
+
+def _errors(section: SimulatedArmSection) -> Errors:
+    unmodelled = section.unmodelled
+    return Errors(
+        unmodelled.zero_rad,
+        unmodelled.encoder_once_rad,
+        unmodelled.encoder_twice_rad,
+        unmodelled.hysteresis_rad,
+        [2.0 * pi * hertz for hertz in (section.vibration_hz, *section.vibration_further_hz)],
+        section.vibration_rms_rad_s,
+        section.settling_rad,
+        2.0 * pi * section.settling_hz,
+        section.settling_decay_s,
+    )

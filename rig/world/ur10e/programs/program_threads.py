@@ -1,0 +1,109 @@
+"""Programs as cooperative threads: each a generator that gives way once a tick."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.motion.cartesian import joints_for, straight_line
+from rig.world.ur10e.motion.forward_kinematics import flange_pose
+from rig.world.ur10e.motion.trajectory import line
+from rig.world.ur10e.robot import Robot
+
+Steps = Iterator[None]
+
+NUMBER_MAX = 1e6  # of angles, lengths, speeds and accelerations, all in SI units
+SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # rad/s and m/s, and the same per second: slower ways are not planned for
+HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose of the tool's frame.
+
+    Speed and acceleration in rad/s and rad/s², straight: m/s and m/s².
+    """
+
+    target: tuple[float, ...]
+    speed: float
+    acceleration: float
+    straight: bool = False
+    is_pose: bool = False
+
+
+def finite(values: Sequence[float]) -> None:
+    """Raises `ProgramError` for a number no joint can follow."""
+    if not all(abs(value) <= NUMBER_MAX for value in values):
+        raise ProgramError(f"a number no joint can follow among {list(values)}")
+
+
+class Threads:
+    """The threads of one program. Only one at a time may move the robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._threads: dict[str, Steps] = {}
+        self._mover: str | None = None
+
+    def run(self, name: str, steps: Steps) -> None:
+        self._threads[name] = steps
+
+    def kill(self, name: str) -> None:
+        self._threads.pop(name, None)
+        self.let_go(name)
+
+    @property
+    def any(self) -> bool:
+        """Whether there are threads beside the main one."""
+        return bool(self._threads)
+
+    def running(self, name: str) -> bool:
+        return name in self._threads
+
+    def step(self) -> None:
+        """One tick of every thread."""
+        for name, steps in list(self._threads.items()):
+            if next(steps, StopIteration) is StopIteration:
+                self.kill(name)
+
+    def take(self, name: str) -> None:
+        """Claim the joints. Raises `ProgramError` when another thread has them."""
+        if self._mover not in (None, name):
+            raise ProgramError("another thread is already controlling the robot")
+        self._mover = name
+
+    def let_go(self, name: str) -> None:
+        if self._mover == name:
+            self._mover = None
+
+    def move(self, name: str, move: Move) -> Steps:
+        """A move on behalf of the thread `name`: ends when the joints stand at the target."""
+        if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
+            raise ProgramError("a move needs a speed and an acceleration above zero")
+        finite([*move.target, move.speed, move.acceleration])
+        self.take(name)
+        yield from self.stopj(name, HAND_OVER_RAD_S2)
+        self.take(name)
+        motion, links = self.robot.motion, self.robot.links
+        if move.straight:
+            pose = self.robot.flange_for(move.target) if move.is_pose else flange_pose(move.target, links)
+            trajectory = yield from straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
+        else:
+            target = move.target
+            if move.is_pose:
+                target = joints_for(self.robot.flange_for(target), motion.q_rad, links)
+            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
+        if not self.robot.within_limits(trajectory.end_rad):
+            raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
+        motion.follow(trajectory)
+        while not motion.standing:
+            yield
+        self.let_go(name)
+
+    def stopj(self, name: str, deceleration_rad_s2: float) -> Steps:
+        """Bring the joints to rest."""
+        self.take(name)
+        if not self.robot.motion.standing:
+            self.robot.motion.stop(max(deceleration_rad_s2, 0.01))
+            while not self.robot.motion.standing:
+                yield
+        self.let_go(name)

@@ -1,0 +1,245 @@
+"""The program that ur_rtde uploads, acted out: its register protocol, not its text.
+
+A client writes a command into input integer register 0; the program answers 2 in output integer register 0 when it is
+done, the client writes 0, the program answers 1 (ready). Real-time commands are never answered 2.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from rig.world.clock import TICK_S
+from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.motion.cartesian import approaching, joint_speeds, joints_for
+from rig.world.ur10e.motion.trajectory import Joints
+from rig.world.ur10e.programs.program_threads import Move, Steps, Threads, finite
+from rig.world.ur10e.programs.ur_rtde_questions import NOT_ACTED_OUT, questions
+from rig.world.ur10e.programs.ur_rtde_registers import Registers
+from rig.world.ur10e.robot import Robot
+
+REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+STOP_SCRIPT = 255
+READY, DONE = 1, 2
+
+FOLLOWING_RAD_S2 = 40.0  # of joints that follow a target from tick to tick
+
+Command = Callable[[], Steps]
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Speed the joints are to have, rad/s and rad/s²; `of_tool`: the tool in the base's frame, m/s, rad/s and m/s²."""
+
+    speed: Joints
+    acceleration: float
+    of_tool: bool = False
+
+
+class ControlProgram:
+    """`rtde_control`, as uploaded by ur_rtde. `path` holds the moves injected into it (moveJ with a path)."""
+
+    name = "rtde_control"
+
+    def __init__(self, robot: Robot, register_offset: int, path: Sequence[Move]) -> None:
+        self._robot = robot
+        self._registers = Registers(robot, register_offset)
+        self._path = tuple(path)
+        self._threads = Threads(robot)
+        self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
+        self._speed_target = Speed((0.0,) * 6, 0.5)
+        self._operation = self._writes = 0
+        self._heard: int | None = None  # the command that was there when the main thread last gave way between two
+        self._commands: dict[int, Command] = {
+            1: self._movej,
+            2: self._movej_ik,
+            3: self._movel,
+            4: self._movel_fk,
+            9: self._speedj,
+            10: self._speedl,
+            11: self._servoj,
+            15: self._speed_stop,
+            16: self._servo_stop,
+            24: self._servol,
+            33: self._stop,
+            34: self._stop,
+            45: self._move_path,
+        }
+        self._questions = questions(robot, self._registers)
+        self._main = self._loop()
+
+    def step(self) -> bool:
+        self._threads.step()
+        return next(self._main, StopIteration) is not StopIteration
+
+    @property
+    def waiting(self) -> bool:
+        """Every command is done and answered, and no thread runs."""
+        return not self._threads.any and self._heard is not None and self._registers.whole(0) == self._heard
+
+    def _loop(self) -> Steps:
+        self._signal_async(-1)
+        self._registers.answer(0, READY)
+        executing = False
+        while True:
+            code = self._registers.whole(0)
+            if code == 0 or code in REALTIME:
+                executing = False if code == 0 else executing
+                if code:
+                    yield from self._command(code)()
+                self._registers.answer(0, READY)
+            elif not executing:
+                if code == STOP_SCRIPT:
+                    return
+                yield from self._command(code)()
+                self._registers.answer(0, DONE)
+                executing = True
+            self._heard = None if code in REALTIME else code
+            yield
+            self._heard = None
+
+    def _command(self, code: int) -> Command:
+        if code in self._questions:
+            return partial(_at_once, self._questions[code])
+        if code not in self._commands:
+            name = f" ({NOT_ACTED_OUT[code]})" if code in NOT_ACTED_OUT else ""
+            raise ProgramError(f"not simulated: command {code}{name} of rtde_control")
+        return self._commands[code]
+
+    def _asynchronously(self) -> bool:
+        return self._registers.whole(1) == 1
+
+    def _signal_async(self, progress: int) -> None:
+        """The word an asynchronous operation is watched by: operation id, write count, running bit, progress."""
+        self._writes = (self._writes + 1) % 128
+        if progress == 0:
+            self._operation = (self._operation + 1) % 128
+        word = self._operation << 24 | self._writes << 16
+        if progress >= 0:
+            word |= 1 << 15 | min(progress, 0x7FFF)
+        self._registers.answer(2, word)
+
+    # -- moves ---------------------------------------------------------------------------------------------------
+    def _asked(self, straight: bool, is_pose: bool) -> Steps:
+        *target, speed, acceleration = self._registers.doubles(0, 8)
+        return self._move([Move(tuple(target), speed, acceleration, straight, is_pose)])
+
+    def _movej(self) -> Steps:
+        return self._asked(straight=False, is_pose=False)
+
+    def _movej_ik(self) -> Steps:
+        return self._asked(straight=False, is_pose=True)
+
+    def _movel(self) -> Steps:
+        return self._asked(straight=True, is_pose=True)
+
+    def _movel_fk(self) -> Steps:
+        return self._asked(straight=True, is_pose=False)
+
+    def _move_path(self) -> Steps:
+        return self._move(self._path)
+
+    def _move(self, path: Sequence[Move]) -> Steps:
+        self._kill_async("move")
+        if self._asynchronously():
+            self._threads.run("move", self._async_move(path))
+            return
+        for step in path:
+            yield from self._threads.move("main", step)
+
+    def _async_move(self, path: Sequence[Move]) -> Steps:
+        for index, step in enumerate(path):
+            self._signal_async(index)
+            yield from self._threads.move("move", step)
+        self._signal_async(-1)
+
+    def _kill_async(self, name: str) -> None:
+        if self._threads.running(name):
+            self._threads.kill(name)
+            self._signal_async(-1)
+
+    def _stop(self) -> Steps:
+        self._kill_async("stop")
+        self._kill_async("move")
+        deceleration = self._registers.doubles(0, 1)[0]
+        if self._asynchronously():
+            self._threads.run("stop", self._async_stop(deceleration))
+            return
+        yield from self._threads.stopj("main", deceleration)
+
+    def _async_stop(self, deceleration: float) -> Steps:
+        self._signal_async(0)
+        yield from self._threads.stopj("stop", deceleration)
+        self._signal_async(-1)
+
+    def _speedj(self) -> Steps:
+        return self._speed(of_tool=False)
+
+    def _speedl(self) -> Steps:
+        return self._speed(of_tool=True)
+
+    def _speed(self, of_tool: bool) -> Steps:
+        *velocity, acceleration, _ = self._registers.doubles(0, 8)
+        finite([*velocity, acceleration])
+        self._speed_target = Speed(tuple(velocity), max(acceleration, 0.01), of_tool)
+        if not self._threads.running("speed"):
+            self._threads.run("speed", self._speed_thread())
+        return _nothing()
+
+    def _speed_thread(self) -> Steps:
+        done = None
+        tool: Sequence[float] = (0.0,) * 6
+        while True:
+            self._threads.take("speed")
+            wanted = self._speed_target
+            if wanted.of_tool:
+                tool = approaching(tool, wanted.speed, wanted.acceleration * TICK_S)
+                here = self._robot.motion.now.target_q_rad
+                self._robot.motion.speed(joint_speeds(here, tool, self._robot.links), FOLLOWING_RAD_S2)
+            elif wanted != done:
+                self._robot.motion.speed(wanted.speed, wanted.acceleration)
+            done = wanted
+            yield
+
+    def _speed_stop(self) -> Steps:
+        self._threads.kill("speed")
+        return self._threads.stopj("main", self._registers.doubles(0, 1)[0])
+
+    def _servoj(self) -> Steps:
+        values = self._registers.doubles(0, 11)
+        finite(values)
+        return self._servo(values[:6], values[9])
+
+    def _servol(self) -> Steps:
+        values = self._registers.doubles(0, 11)
+        finite(values)
+        pose = self._robot.flange_for(values[:6])
+        return self._servo(joints_for(pose, self._robot.motion.q_rad, self._robot.links), values[9])
+
+    def _servo(self, target: Joints, lookahead_s: float) -> Steps:
+        self._servo_target = (target, max(lookahead_s, 0.03))
+        if not self._threads.running("servo"):
+            self._threads.run("servo", self._servo_thread())
+        return _nothing()
+
+    def _servo_thread(self) -> Steps:
+        """Every tick steer towards the newest target: the way left is to be made in the look-ahead time."""
+        while True:
+            self._threads.take("servo")
+            target, lookahead_s = self._servo_target
+            here = self._robot.motion.now.target_q_rad
+            velocity = tuple((b - a) / lookahead_s for a, b in zip(here, target, strict=True))
+            self._robot.motion.speed(velocity, FOLLOWING_RAD_S2)
+            yield
+
+    def _servo_stop(self) -> Steps:
+        self._threads.kill("servo")
+        return self._threads.stopj("main", self._registers.doubles(0, 1)[0])
+
+
+def _at_once(act: Callable[[], None]) -> Steps:
+    act()
+    return iter(())
+
+
+def _nothing() -> Steps:
+    return iter(())

@@ -1,0 +1,79 @@
+"""What a client of ur_rtde asks and sets: the commands of its program that move nothing, by number."""
+
+from collections.abc import Callable, Sequence
+
+from rig.world.clock import TICK_S
+from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.motion.cartesian import joints_for
+from rig.world.ur10e.motion.forward_kinematics import flange_pose, placed_pose
+from rig.world.ur10e.motion.trajectory import Joints
+from rig.world.ur10e.programs.program_threads import finite
+from rig.world.ur10e.programs.ur_rtde_registers import Registers
+from rig.world.ur10e.robot import Robot
+
+
+def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None]]:
+    """Each command as a function that takes no time. Raises `ProgramError` where the program would end."""
+
+    def put(values: Sequence[float]) -> None:
+        registers.results(values)
+
+    def say(yes: bool) -> None:
+        registers.answer(1, int(yes))
+
+    def near() -> Joints:
+        return registers.doubles(6, 6)
+
+    def joints(nearest: Joints) -> Joints:
+        """The joints that bring the tool to the asked pose."""
+        pose = registers.doubles(0, 6)
+        finite([*pose, *nearest])
+        return joints_for(robot.flange_for(pose), nearest, robot.links)
+
+    def reached(nearest: Joints) -> bool:
+        try:
+            return robot.within_limits(joints(nearest))
+        except ProgramError:
+            return False
+
+    def set_payload() -> None:
+        mass, *centre = registers.doubles(0, 4)
+        robot.set_payload(mass, centre if any(centre) else robot.payload_centre_m)
+
+    def forward_kinematics() -> None:
+        q, offset = registers.doubles(0, 6), registers.doubles(6, 6)
+        put(placed_pose(flange_pose(q, robot.links), offset))
+
+    return {
+        8: lambda: None,  # zeroFtSensor: nothing pulls at the simulated one
+        17: set_payload,
+        26: lambda: put([TICK_S]),
+        29: lambda: robot.set_tcp(registers.doubles(0, 6)),
+        30: lambda: put(joints(near())),
+        31: robot.protective_stop,
+        35: lambda: robot.set_watchdog(registers.doubles(0, 1)[0]),
+        36: lambda: say(reached(robot.motion.q_rad)),
+        37: lambda: say(robot.within_limits(registers.doubles(0, 6))),
+        38: lambda: put([0.0] * 6),
+        39: lambda: put(placed_pose(registers.doubles(0, 6), registers.doubles(6, 6))),
+        40: lambda: put(robot.tcp_offset),
+        43: lambda: put(robot.tcp_pose(robot.motion.actual_q_rad)),
+        44: forward_kinematics,
+        46: lambda: put(joints(robot.motion.q_rad)),
+        47: lambda: say(robot.steady),
+        58: lambda: put(flange_pose(robot.motion.actual_q_rad, robot.links)),
+        60: lambda: say(reached(robot.motion.q_rad)),
+        61: lambda: say(reached(near())),
+    }
+
+
+NOT_ACTED_OUT = {
+    6: "forceMode", 7: "forceModeStop", 12: "servoC", 18: "teachMode", 19: "endTeachMode", 20: "forceModeSetDamping",
+    21: "forceModeSetGainScaling", 25: "toolContact", 27: "getActualJointPositionsHistory", 28: "getTargetWaypoint",
+    41: "jogStart", 42: "jogStop", 51: "moveUntilContact", 52: "freedriveMode", 53: "endFreedriveMode",
+    54: "getFreedriveStatus", 56: "ftRtdeInputEnable", 57: "enableExternalFtSensor", 59: "setGravity",
+    62: "startContactDetection", 63: "stopContactDetection", 64: "readContactDetection", 65: "setTargetPayload",
+    66: "directTorque", 67: "getMassMatrix", 68: "getCoriolisAndCentrifugalTorques",
+    69: "getTargetJointAccelerations", 70: "getJacobian", 71: "getJacobianTimeDerivative",
+}  # fmt: skip
+"""The commands that end the simulated program, by the names of the client's methods."""

@@ -1,0 +1,279 @@
+"""Simple URScript programs: statements and endless loops, played one after another."""
+
+import ast
+import operator
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rig.world.clock import TICKS_PER_SECOND
+from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
+from rig.world.ur10e.motion.trajectory import Joints
+from rig.world.ur10e.programs.program_threads import Move, Steps, Threads, finite
+from rig.world.ur10e.robot import Robot
+
+NESTED = 50  # loops in one another
+CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
+TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # in which brackets and # mean nothing
+FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
+
+
+def arguments(statement: str) -> dict[str, Any]:
+    """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but constants."""
+    match = CALL.match(statement)
+    if match is None:
+        raise ProgramError(f"not simulated: {statement}")
+    source = re.sub(r"\bp\[([^\]]*)\]", r"(\1)", match.group(2))  # a pose becomes a tuple, joints stay a list
+    try:
+        call = ast.parse(f"f({source})", mode="eval").body
+        if not isinstance(call, ast.Call):
+            raise ValueError("more than a call")
+        values = {str(i): constant(value) for i, value in enumerate(call.args)}
+        return values | {str(item.arg): constant(item.value) for item in call.keywords}
+    except (SyntaxError, ValueError, ArithmeticError, TypeError, RecursionError, MemoryError):
+        # The last two: the parser's way of saying that brackets are nested too deeply.
+        raise ProgramError(f"not simulated: {statement}") from None
+
+
+OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
+
+
+def constant(node: ast.expr) -> Any:
+    """What an expression of numbers is worth (`0 + 0`), or a literal. Raises ValueError, ArithmeticError."""
+    match node:
+        case ast.BinOp(left, operation, right) if type(operation) in OPERATIONS:
+            one, other = constant(left), constant(right)
+            if not (isinstance(one, int | float) and isinstance(other, int | float)):
+                raise ValueError("no number")
+            return OPERATIONS[type(operation)](one, other)
+        case ast.List(values):
+            return [constant(value) for value in values]
+        case ast.Tuple(values):
+            return tuple(constant(value) for value in values)
+        case _:
+            return ast.literal_eval(node)
+
+
+def joints(value: Any) -> Joints:
+    """Six joint angles. Raises `ProgramError` when it is something else."""
+    if not isinstance(value, list) or len(value) != 6:
+        raise ProgramError(f"six joint angles expected, got {value}")
+    return tuple(float(angle) for angle in value)
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One statement and where it stands in the program."""
+
+    text: str
+    place: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """`while True:` and its body."""
+
+    body: "Block"
+
+
+Block = tuple[Call | Loop, ...]
+
+
+def syntax(lines: Sequence[str]) -> None:
+    """Raises `ProgramError` at the line at which the controller's compiler finds that brackets do not match.
+
+    A bracket that is left open is noticed on the line after, and the line is said as it is written.
+    """
+    depth = 0
+    for number, line in enumerate(lines, 1):
+        text = TEXT.sub("", line).split("#", 1)[0]
+        if text.strip() and depth > 0:
+            raise ProgramError(f"syntax_error_on_line:{number}:{line}:", (number, 1))
+        depth += sum(text.count(bracket) for bracket in "([") - sum(text.count(bracket) for bracket in ")]")
+        if depth < 0:
+            raise ProgramError(f"syntax_error_on_line:{number}:{line}:", (number, 1))
+
+
+def parse(lines: Sequence[str]) -> tuple[str, Block]:
+    """The name and body of a program.
+
+    Raises `ProgramError` at the first line the simulation does not know, in the words of the maker's compiler where the
+    line is one that this would not know either.
+    """
+    syntax(lines)
+    name = "unnamed"
+    stack: list[list[Call | Loop]] = [[]]
+    for number, line in enumerate(lines, 1):
+        text = line.split("#", 1)[0].strip()
+        frame = FRAME.match(text)
+        call = CALL.match(text)
+        if not text:
+            continue
+        if frame and number == 1:
+            name = frame.group(2)
+        elif text == "while True:":
+            if len(stack) > NESTED:
+                raise ProgramError("not simulated: loops so deep in one another", (number, 1))
+            stack.append([])
+        elif text == "end" and len(stack) > 1:
+            body = stack.pop()
+            stack[-1].append(Loop(tuple(body)))
+        elif call and call.group(1) in STATEMENTS:
+            stack[-1].append(Call(text, (number, len(line) - len(line.lstrip()) + 1)))
+        elif text != "end":
+            what = f"compile_error_name_not_found:{call.group(1)}:" if call else f"not simulated: {text}"
+            raise ProgramError(what, (number, len(line) - len(line.lstrip()) + 1))
+    return name, tuple(stack[0])
+
+
+class ScriptProgram:
+    """A program of the statements below and endless loops: no variables, no conditions."""
+
+    waiting = False  # nobody looks ahead for it
+
+    def __init__(self, robot: Robot, lines: Sequence[str]) -> None:
+        self._robot = robot
+        self._threads = Threads(robot)
+        self.name, body = parse(lines)
+        self._main = self._play(body)
+
+    def step(self) -> bool:
+        return next(self._main, StopIteration) is not StopIteration
+
+    def _play(self, block: Block) -> Steps:
+        for item in block:
+            if isinstance(item, Loop):
+                while True:
+                    yield from self._play(item.body)
+                    yield  # a loop that takes no time would never give way
+            try:
+                yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
+            except OutOfReach:
+                raise
+            except (ProgramError, TypeError, ValueError, IndexError, ArithmeticError) as error:
+                raise ProgramError(str(error), item.place) from None
+
+
+class Arguments:
+    """The arguments of one call, found by keyword or place."""
+
+    def __init__(self, statement: str) -> None:
+        self._statement, self._values = statement, arguments(statement)
+
+    def all(self) -> list[Any]:
+        return list(self._values.values())
+
+    def __call__(self, place: str, keyword: str, default: Any = None) -> Any:
+        found = self._values.get(keyword, self._values.get(place, default))
+        if found is None:
+            raise ProgramError(f"{self._statement} needs {keyword}")
+        return found
+
+
+def move(name: str, value: Arguments) -> Move:
+    """The move a `movej` or `movel` asks for; a blend radius is not used: it stops at every target."""
+    target = value("0", "pose" if name == "movel" else "q")
+    if not isinstance(target, list | tuple) or len(target) != 6:
+        raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
+    speed, acceleration = (0.25, 1.2) if name == "movel" else (1.05, 1.4)
+    numbers = tuple(float(number) for number in target)
+    speed, acceleration = float(value("2", "v", speed)), float(value("1", "a", acceleration))
+    return Move(numbers, speed, acceleration, straight=name == "movel", is_pose=isinstance(target, tuple))
+
+
+def _movej(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    return threads.move("main", move("movej", value))
+
+
+def _movel(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    return threads.move("main", move("movel", value))
+
+
+def _speedj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    threads.take("main")
+    velocity, acceleration = joints(value("0", "qd")), float(value("1", "a"))
+    finite([*velocity, acceleration])
+    robot.motion.speed(velocity, max(acceleration, 0.01))
+    yield from _wait(float(value("2", "t", 0.0)))
+    threads.let_go("main")
+
+
+def _stopj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    return threads.stopj("main", float(value("0", "a")))
+
+
+def _sleep(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    return _wait(float(value("0", "t")))
+
+
+def _wait(duration_s: float) -> Steps:
+    for _ in range(round(duration_s * TICKS_PER_SECOND)):
+        yield
+
+
+def _sync(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    yield
+
+
+def _at_once(action: Callable[[Robot, Arguments], None]) -> Callable[[Robot, Threads, Arguments], Steps]:
+    def steps(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+        action(robot, value)
+        return iter(())
+
+    return steps
+
+
+def _payload(robot: Robot, value: Arguments) -> None:
+    robot.set_payload(float(value("0", "m")), value("1", "cog", [0.0, 0.0, 0.0]))
+
+
+def _tcp(robot: Robot, value: Arguments) -> None:
+    robot.set_tcp(value("0", "pose"))
+
+
+def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
+    def put(robot: Robot, value: Arguments) -> None:
+        number = int(value("0", "n"))
+        if not 0 <= number < 8:
+            raise ProgramError(f"there is no output {number}")
+        bit = 1 << first + number
+        robot.digital_outputs = robot.digital_outputs | bit if value("1", "b") else robot.digital_outputs & ~bit
+
+    return put
+
+
+def _integer_register(robot: Robot, value: Arguments) -> None:
+    number = int(value("1", "value"))
+    if not -(2**31) <= number < 2**31:
+        raise ProgramError(f"{number} does not fit an integer register")
+    robot.outputs.ints[int(value("0", "address"))] = number
+
+
+def _float_register(robot: Robot, value: Arguments) -> None:
+    robot.outputs.doubles[int(value("0", "address"))] = float(value("1", "value"))
+
+
+def _boolean_register(robot: Robot, value: Arguments) -> None:
+    robot.outputs.bits[int(value("0", "address"))] = bool(value("1", "value"))
+
+
+def _say(robot: Robot, value: Arguments) -> None:
+    robot.messages.say("".join(str(part) for part in value.all()))
+
+
+STATEMENTS: dict[str, Callable[[Robot, Threads, Arguments], Steps]] = {
+    "movej": _movej, "movel": _movel, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
+    "textmsg": _at_once(_say), "popup": _at_once(_say),
+    "set_payload": _at_once(_payload), "set_target_payload": _at_once(_payload), "set_tcp": _at_once(_tcp),
+    "set_gravity": _at_once(lambda robot, value: None),
+    "set_digital_out": _at_once(_digital_out(0)), "set_standard_digital_out": _at_once(_digital_out(0)),
+    "set_configurable_digital_out": _at_once(_digital_out(8)), "set_tool_digital_out": _at_once(_digital_out(16)),
+    "write_output_integer_register": _at_once(_integer_register),
+    "write_output_float_register": _at_once(_float_register),
+    "write_output_boolean_register": _at_once(_boolean_register),
+    "protective_stop": _at_once(lambda robot, value: robot.protective_stop()),
+    "power_down": _at_once(lambda robot, value: robot.power_off()),
+}  # fmt: skip

@@ -1,0 +1,58 @@
+"""Segments of sweeps in which the arm vibrates, whole and where states are lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
+from rig.analysis.gyroscope.segments import Segments, stack_segments
+from rig.analysis.surroundings import surroundings_of
+from rig.data.recording.run_file import RunData
+from rig.observation.consistency.segments import segment_recordings
+from rig.observation.windows import swept
+from support.recordings.synthetic_run import BIAS_RAD_S, SCALE, SENSITIVITY, Setup, synthetic_run
+
+SHAKEN = Setup(
+    noise_rad_s=4.5e-4, vibration=0.0, mounting_error_rad=(0.0, 0.0, 0.0), state_rate_hz=500.0, sample_rate_hz=200.0
+)
+UNSEEN_RAD_S, HERTZ = 0.004, 8.58
+
+
+def unseen(run: RunData) -> RunData:
+    """With a vibration about each axis of which no state tells."""
+    samples = run.samples["gyro"].copy()
+    phase = 2 * np.pi * HERTZ * 1e-6 * samples["board_time_us"][:, None] + [0.3, 2.0, 4.1]
+    samples["counts"] += np.round(np.sqrt(2) * UNSEEN_RAD_S * np.sin(phase) / SENSITIVITY).astype(np.int32)
+    return replace(run, samples={"gyro": samples})
+
+
+def without_states(run: RunData, from_s: float, to_s: float) -> RunData:
+    """Of each sweep, between so many seconds after it began."""
+    kept = np.ones(len(run.states), dtype=np.bool_)
+    for each in swept(run):
+        since_s = run.states["time_s"] - each.window.start_s
+        kept &= (since_s < from_s) | (since_s > to_s)
+    return replace(run, states=run.states[kept])
+
+
+def segments_of(run: RunData) -> Segments:
+    recordings = observe_recordings([run])
+    result = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings, run.settings))["gyro"]
+    assert result.explained is not None and run.settings.site is not None
+    return stack_segments(segment_recordings("gyro", recordings), result.explained, run.settings.site)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lost_s", "known_rad_s"), [(0.0, 4e-5), (0.3, 8e-5)])
+def test_of_a_vibration_that_no_encoder_sees_a_segment_keeps_no_more_than_is_stated(
+    lost_s: float, known_rad_s: float
+) -> None:
+    """Without states for a while the readings left are no longer even, and what is found of a line in them less."""
+    run = unseen(synthetic_run(SHAKEN))
+    segments = segments_of(without_states(run, 3.0, 3.0 + lost_s) if lost_s else run)
+    turning = segments.sweep >= 0
+    off = (segments.means_rad_s + BIAS_RAD_S - segments.rates_rad_s / SCALE)[turning]
+    variances = segments.variances_rad2_s2[turning]
+    assert np.sqrt(np.mean(variances)) < known_rad_s
+    assert 0.75 < np.sqrt(np.mean(off**2 / variances)) < 1.25

@@ -1,0 +1,106 @@
+"""From what size on a recording contradicts itself is said beforehand, and again of what was recorded: and it is so."""
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+import pytest
+
+from rig.analysis.consistency.contradictions import Contradictions, contradictions
+from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.design.planned import planned_told_from
+from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
+from rig.analysis.surroundings import surroundings_of
+from rig.config.load import parse
+from rig.data.recording.run_file import RunData
+from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL
+from rig.observation.windows import swept
+from support.recordings.drawn_recording import KINDS, Drawn, damaged, drawn
+from support.recordings.synthetic_run import Motion, Setup
+
+SURE = 1.3  # times the size from which on it is told in 95 of 100
+AXES = np.eye(3)
+
+
+def held(run: RunData) -> Contradictions:
+    recordings = observe_recordings([run])
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
+    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
+    return contradictions(recordings, results, ["gyro"], surroundings, recordings[0].run.settings)
+
+
+def later(seen: Drawn) -> Array:
+    """(n, 1) −½ in the first half, ½ in the second."""
+    return np.where(seen.time_s > (seen.time_s[0] + seen.time_s[-1]) / 2, 0.5, -0.5)[:, None]
+
+
+def sweeps(seen: Drawn) -> Array:
+    """(n, M) one inside each sweep."""
+    windows = [each.window for each in swept(seen.run)]
+    return np.array([(seen.time_s >= each.start_s) & (seen.time_s <= each.end_s) for each in windows], dtype=float).T
+
+
+# (n, 3) of one unit, in one of the ways in which each may happen: on an axis, or in one sweep and on one axis.
+PLANTED: Mapping[str, Callable[[Drawn, int], Array]] = {
+    "all scale factors change half-way": lambda seen, _: seen.felt_rad_s * later(seen),
+    "one scale factor changes half-way": lambda seen, way: seen.felt_rad_s * later(seen) * AXES[way % 3],
+    "the sensor turns on the flange half-way": lambda seen, way: np.cross(AXES[way % 3], seen.felt_rad_s) * later(seen),
+    "another scale one way than the other": lambda seen, _: np.abs(seen.felt_rad_s) / 2,
+    "another bias in sweeps than in rests": lambda seen, way: sweeps(seen).sum(axis=1, keepdims=True) * AXES[way % 3],
+    "the bias jumps half-way": lambda seen, way: later(seen) * AXES[way % 3],
+    "another reading in one sweep": lambda seen, way: sweeps(seen)[:, [way // 3 % 6]] * AXES[way % 3],
+}
+
+
+def planted(seen: Drawn, kind: str, times: float, way: int) -> Iterator[tuple[ToldFrom, bool]]:
+    """Each damage of so many times the size from which on it is told, and whether it was."""
+    for each in held(seen.run).told_from["gyro"]:
+        by = times * each.size * PLANTED[each.what](seen, way)
+        checks = held(damaged(seen, KINDS[kind], by)).checks
+        yield each, not all(check.passed for check in checks)
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("kind", ["ADIS16465", "quiet LSM9DS1"])
+def test_what_is_larger_than_the_size_that_is_said_is_told(kind: str, thorough: bool) -> None:
+    missed = [
+        (seed, each.what)
+        for seed in range(18 if thorough else 1)
+        for each, told in planted(drawn(900 + seed, KINDS[kind]), kind, SURE, way=seed)
+        if not told
+    ]
+    assert not missed
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(3000)
+def test_what_is_as_large_is_told_nearly_always_and_a_quarter_of_it_hardly_ever() -> None:
+    """Over 18 recordings, of the ways in which it may happen those that are told last among them."""
+    told: dict[float, list[bool]] = {
+        times: [
+            found
+            for seed in range(18)
+            for _, found in planted(drawn(940 + seed, KINDS["ADIS16465"]), "ADIS16465", times, way=seed)
+        ]
+        for times in (1.0, 0.25)
+    }
+    print(f"told at the size {np.mean(told[1.0]):.3f}, at a quarter of it {np.mean(told[0.25]):.3f}")
+    assert np.mean(told[1.0]) > 0.93
+    assert np.mean(told[0.25]) < 0.35
+
+
+@pytest.mark.slow
+def test_what_a_plan_says_will_be_told_is_what_its_recording_says() -> None:
+    seen = drawn(3, KINDS["quiet LSM9DS1"])
+    motion = Motion(Setup(), np.random.default_rng(0))
+    will = planned_told_from(parse(motion.config).config, motion.plan, NOMINAL).rates["gyro"]
+    recorded = {each.what: each for each in held(seen.run).told_from["gyro"]}
+    assert set(PLANTED) == set(recorded) == {each.what for each in will}
+    for each in will:
+        assert each.size == pytest.approx(recorded[each.what].size, rel=0.6), each.what
+        assert each.unit == recorded[each.what].unit

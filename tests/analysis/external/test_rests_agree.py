@@ -1,0 +1,40 @@
+"""A bias that increments tell is held against what the gyroscope reads at rest, however short the rests are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.external.increments import solve_turning
+from rig.analysis.external.rests_agree import check_rests_agree
+from rig.errors import Fault
+from support.external.followed_body import World, follow, turning
+
+# As of a reference with bad time stamps: it errs much while the body moves, and little at rest.
+STOPPING = World(duration_s=30, attitude_rad=6e-3, colour_s=0.5, stops_s=(7.0, 14.0, 21.0))
+OFF_RAD_S = 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stop_lasts_s", [0.8, 3.0])
+def test_a_bias_that_short_rests_contradict_is_refused_and_a_sound_one_is_not(stop_lasts_s: float) -> None:
+    body = turning(follow(replace(STOPPING, stop_lasts_s=stop_lasts_s), 1))
+    sound = solve_turning(body, None, any_mounting=False).solution
+    for axis in np.eye(3):
+        with pytest.raises(Fault, match="bias_contradicts_rests"):
+            check_rests_agree(body, replace(sound, bias=sound.bias + OFF_RAD_S * axis))
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+def test_sound_recordings_are_hardly_ever_refused() -> None:
+    """By 1 in 1000; of 300 no more than two, with cameras' errors as well."""
+    refused = []
+    for seed in range(300):
+        world = replace(STOPPING, attitude_rad=(6e-3, 1e-3)[seed % 2], colour_s=(0.5, 0.0, 0.1)[seed % 3])
+        try:
+            solve_turning(turning(follow(world, seed)), None, any_mounting=False)
+        except Fault as fault:
+            refused.append((seed, fault.name))
+    assert sum(name == "bias_contradicts_rests" for _, name in refused) <= 2, refused

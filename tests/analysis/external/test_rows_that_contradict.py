@@ -1,0 +1,126 @@
+"""Files of others whose rows contradict each other, or of sensors that feel nothing: refused by name, or a wider U."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.external.attitudes import solve_placed
+from rig.analysis.external.elsewhere import budget_of, solve_swept
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recording.settings import Elsewhere, Site
+from rig.errors import Fault, Refused
+from rig.observation.external.attitude_import import placed_by, read_attitudes
+from rig.observation.external.csv_import import ExternalData, average, averaged, read_sweeps
+from rig.observation.external.csv_samples import Samples, read_samples
+from support.external.loggers import MATRIX
+from support.external.loggers import SCALE as OF_MATRIX
+from support.paths import DOCS
+
+EXAMPLES = DOCS / "examples"
+SCALE = np.array([1.1771, 1.1554, 1.1440])  # what the example was made with
+SITE = Site(up=(0, 0, -1.0), gravity_m_s2=9.80061, earth_rate_rad_s=None)
+ASKED = Elsewhere(any_mounting=False, find_clock=False, exact_rates=False)
+
+
+def swept(row: int, factor: float) -> ExternalData:
+    """The example's sweeps, one of whose rows states another angle."""
+    sweeps = read_sweeps(EXAMPLES / "sweeps.csv")
+    sweeps["angle_rad"][row - 1] *= factor
+    return averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("row", [1, 3])
+def test_of_two_sweeps_about_an_axis_both_are_named_for_either_may_be_wrong(row: int, factor: float) -> None:
+    both = "bad_sweep: of sweeps 1 and 3, alone about their axis, one contradicts the other by "
+    with pytest.raises(Refused, match=both + r"\d+ % of its rate"):
+        solve_swept(swept(row, factor), None)
+    with pytest.raises(Refused, match=both):
+        solve_swept(swept(row, factor), "newton")
+
+
+def test_half_a_turn_given_as_a_whole_one_is_refused_by_its_row_where_others_tell() -> None:
+    whole = read_sweeps(EXAMPLES / "sweeps.csv")
+    sweeps = {name: np.concatenate([column[:1], column]) for name, column in whole.items()}
+    sweeps["end_s"][0] = sweeps["start_s"][1] = 4.0  # row 1 in two halves
+    sweeps["angle_rad"][:2] = [2 * np.pi, np.pi]
+    with pytest.raises(Refused, match="bad_sweep: sweep 1 contradicts the others by "):
+        solve_swept(averaged(read_samples(EXAMPLES / "samples.csv", [RATE]), sweeps), None)
+
+
+def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
+    sound, contradicting = (solve_swept(swept(1, factor), None) for factor in (1.0, 1.03))
+    std = np.sqrt(np.diag(contradicting.covariance))[:3]
+    assert (std > 3 * np.sqrt(np.diag(sound.covariance))[:3]).all()
+    assert (np.abs(contradicting.scale - SCALE) < 3 * std).all()
+    budget = budget_of(contradicting, swept(1, 1.03))
+    assert [line.name for line in budget.contributors] == ["noise", "sweeps"]
+    assert sum(line.covariance for line in budget.contributors) == pytest.approx(contradicting.covariance)
+    assert [line.name for line in budget_of(sound, swept(1, 1.0)).contributors] == ["noise"]
+
+
+def test_where_few_rows_are_left_student_s_t_makes_the_uncertainty_as_large_as_it_is() -> None:
+    """Four sweeps and a rest whose table is off by 0.3 %: one row is more than the solution takes."""
+    noise_rad_s, speed_rad_s, row_s = 5e-4, np.pi / 2, 5.0
+    axes = np.array([*np.eye(3), [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    speeds, starts_s, within = np.array([speed_rad_s] * 4 + [0.0]), row_s * np.arange(5), []
+    time_s = np.arange(round(5 * row_s * 100)) / 100
+    rates = (speeds[:, None] * axes)[(time_s // row_s).astype(int)] @ MATRIX.T
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        samples = np.column_stack([time_s, rates + noise_rad_s * rng.normal(size=rates.shape)])
+        stated = speeds * (1 + 3e-3 * rng.normal(size=5))
+        data = average(samples, np.column_stack([starts_s + 0.3, starts_s + 4.3, stated]), axes)
+        found = solve_swept(data, None)
+        within.append(np.abs(found.scale - OF_MATRIX) < budget_of(found, data).expanded[:3])
+    assert np.mean(within) > 0.9
+
+
+def test_rows_outside_the_recording_are_not_covered_and_lack_no_samples() -> None:
+    samples, rows = read_samples(EXAMPLES / "swinging_samples.csv"), read_attitudes(EXAMPLES / "swinging_attitudes.csv")
+    ends_s = float(rows["end_s"][479])
+    kept = samples.time_s <= ends_s
+    cut = replace(
+        samples, time_s=samples.time_s[kept], readings={each: of[kept] for each, of in samples.readings.items()}
+    )
+    placed = placed_by(cut, rows)
+    assert [str(each) for each in placed.omitted] == [
+        f"120 of 600 rows, not covered by the recording; the first row 481, from {ends_s:.10g} s"
+    ]
+    assert placed.incomplete == ()
+
+
+def constant(samples: Samples, quantity: object, value: float) -> Samples:
+    """The z axis of a sensor has one value throughout."""
+    readings = {each: column.copy() for each, column in samples.readings.items()}
+    readings[quantity][:, 2] = value  # type: ignore[index]
+    return replace(samples, readings=readings)
+
+
+def by_sweeps(samples: Samples) -> object:
+    return averaged(samples, read_sweeps(EXAMPLES / "sweeps.csv"))
+
+
+def by_attitudes(samples: Samples) -> object:
+    placed = placed_by(samples, read_attitudes(EXAMPLES / "swinging_attitudes.csv"))
+    raise solve_placed("imu", placed, SITE, ASKED, None, second_order=False).faults[RATE]
+
+
+@pytest.mark.parametrize("value", [0.0, 0.01])
+@pytest.mark.parametrize(("file", "solve"), [("samples.csv", by_sweeps), ("swinging_samples.csv", by_attitudes)])
+def test_an_axis_that_reads_the_same_throughout_is_named(
+    file: str, solve: Callable[[Samples], object], value: float
+) -> None:
+    stuck = constant(read_samples(EXAMPLES / file, [RATE]), RATE, value)
+    with pytest.raises(Fault, match=f"stuck_sensor: the gyroscope reads {value:g} rad/s on z in every sample"):
+        solve(stuck)
+
+
+def test_a_rest_whose_readings_are_all_the_same_is_named() -> None:
+    samples = constant(read_samples(EXAMPLES / "still_samples.csv"), ACCELERATION, 9.3)
+    placed = placed_by(samples, read_attitudes(EXAMPLES / "still_attitudes.csv"))
+    found = solve_placed("imu", placed, SITE, ASKED, None, second_order=False).faults[ACCELERATION]
+    assert found.name == "stuck_sensor"
+    assert "the accelerometer reads 9.3 m/s² on z" in str(found) and "at the end of its range" in str(found)

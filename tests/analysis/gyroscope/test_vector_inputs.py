@@ -1,0 +1,28 @@
+"""What the averages of a run's recordings are to the bias that wanders: one after the other in time."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from rig.analysis.analyses import calibrate
+from support.recordings.synthetic_run import Setup, synthetic_run, truth
+
+SETUP = Setup(noise_rad_s=0.005)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("later_s", [-3600, 0, 20, 7200])
+def test_a_resumed_recording_begins_after_the_last_one_ended_whatever_the_computers_clock_says(later_s: int) -> None:
+    """The clock may have been set, and an accelerated laboratory's minutes are a computer's seconds."""
+    first, again = synthetic_run(SETUP), synthetic_run(replace(SETUP, seed=2))
+    started = datetime.fromisoformat(first.provenance.started_utc) + timedelta(seconds=later_s)
+    again = replace(again, provenance=replace(again.provenance, started_utc=started.isoformat()))
+    result = calibrate([first, again]).results["gyro"]
+    assert result.explained is not None and result.uncertainty is not None
+    windows = result.explained.seen.windows_s
+    windows = windows[np.argsort(windows[:, 0])]
+    assert (windows[1:, 0] > windows[:-1, 1]).all()
+    off = np.array([*result.scale, *result.bias_rad_s]) - truth(SETUP)
+    assert (np.abs(off) < 4 * np.sqrt(np.diag(result.uncertainty.covariance))).all()

@@ -1,0 +1,44 @@
+"""What a run knows of its sensors before it begins."""
+
+from pathlib import Path
+
+import pytest
+
+from rig.commands.history.recall import remembered
+from rig.config.load import load
+from rig.history.store import open_history
+from support.history.past_runs import finished
+from support.laboratories.commands import CI
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("RIG_HISTORY", str(tmp_path / "history.sqlite"))
+    return str(tmp_path / "history.sqlite")
+
+
+def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_first(place: str) -> None:
+    with open_history(place) as history:
+        for day, serial_number in ((0, "G-1"), (1, "G-2"), (2, "G-1"), (3, "G-1")):
+            history.enter(finished(day, serial_number=serial_number, passed=day != 2))
+        history.void(4, "another sensor was mounted")
+    known = remembered(load(CI, ["sensors.gyro.serial_number=G-1"], None).config, frozenset({"G-1"}))
+    assert [(each.number, each.day, each.verdict) for each in known.calibrations] == [
+        (3, "2025-01-08", "pass"),
+        (1, "2025-01-06", "pass"),
+    ]
+    assert {each.board_unique_id for each in known.calibrations} == {finished(0).document.provenance.board_unique_id}
+    assert known.silent is None and known.moved == {"G-1"}
+
+
+def test_a_history_that_is_not_there_yet_is_an_empty_one_and_is_not_made(place: str) -> None:
+    known = remembered(load(CI, sections=None).config, frozenset())
+    assert known.calibrations == () and known.silent is None and not Path(place).exists()
+
+
+def test_a_run_does_not_depend_on_what_the_history_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "history.sqlite").write_text("no database", encoding="utf-8")
+    for said, words in ((str(tmp_path / "history.sqlite"), "the history is silent"), ("off", "the history is off")):
+        monkeypatch.setenv("RIG_HISTORY", said)
+        known = remembered(load(CI, sections=None).config, frozenset())
+        assert known.calibrations == () and known.silent is not None and known.silent.startswith(words)

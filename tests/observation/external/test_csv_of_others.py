@@ -1,0 +1,80 @@
+"""CSV files as loggers and spreadsheets write them: read for what they say, or refused by what is the matter."""
+
+import gzip
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.data.quantity import RATE
+from rig.data.recording.motion_file import Header
+from rig.errors import Refused
+from rig.observation.external.csv_samples import read_samples
+from rig.observation.formats.csv_table import Mapped, read_columns
+
+HEAD = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
+ROWS = [f"{n / 10},0.{n},-1.5,{n}" for n in range(30)]
+PLAIN = "\n".join([",".join(HEAD), *ROWS]) + "\n"
+NUMBERS = np.array([[float(cell) for cell in row.split(",")] for row in ROWS])
+
+
+def written(folder: Path, content: bytes) -> Path:
+    path = folder / "log.csv"
+    path.write_bytes(content)
+    return path
+
+
+def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
+    samples = read_samples(path, [RATE], mapped)
+    return np.column_stack([samples.time_s, samples.readings[RATE]])
+
+
+@pytest.mark.parametrize(
+    "as_written",
+    [
+        lambda text: gzip.compress(text.encode(), mtime=0),
+        lambda text: text.replace(",", "\t").encode("utf-16"),
+        lambda text: text.replace("\n", "\r\r\n").encode(),
+        lambda text: (text + "\n\r\n").encode(),
+        lambda text: text.replace(",", ";").replace(".", ",").encode("utf-8-sig"),
+    ],
+    ids=["gzip", "UTF-16 and tabs", "two carriage returns", "empty rows at the end", "semicolons and BOM"],
+)
+def test_what_others_write_is_read(tmp_path: Path, as_written: Callable[[str], bytes]) -> None:
+    assert np.array_equal(read(written(tmp_path, as_written(PLAIN))), NUMBERS)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-16"])
+def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+    headings = ["Zeit, ms", *(f"Drehrate {axis}, °/s" for axis in "xyz")]
+    text = "\n".join(["Gerät; 7", "", ";".join(headings), *(row.replace(",", ";").replace(".", ",") for row in ROWS)])
+    factors = (1e-3, 1.0, 1.0, 1.0)
+    mapped = Mapped({name: (there, by) for name, there, by in zip(HEAD, headings, factors, strict=True)}, 2)
+    assert read(written(tmp_path, text.encode(encoding)), mapped) == pytest.approx(NUMBERS * factors)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (PLAIN.replace(",", " ").encode(), "wrong_columns: .*neither by commas nor by semicolons nor by tabs"),
+        ("\n".join(ROWS).encode(), "wrong_columns: .*numbers in its first row and no names"),
+        (PLAIN.replace("\n", ",\n").encode(), "wrong_columns: .*a column without a name"),
+        (PLAIN.replace("time_s", "Zeit").encode(), "lacks time_s, has the unknown Zeit.* --columns"),
+        (b"PK\x03\x04\0\0\0\0xl/worksheets", "no_file: .*log.csv cannot be read: it is no text, but a spreadsheet"),
+        (gzip.compress(PLAIN.encode(), mtime=0)[:60], "no_file: .*ended before the end"),
+        (gzip.compress(PLAIN.encode(), mtime=0)[:30] + b"\xff" * 60, "no_file: .*log.csv cannot be read"),
+        ("\n".join(PLAIN.splitlines()[:9]).encode(), "time_not_increasing: .*log.csv has 8 samples, 20 are the least"),
+        (PLAIN.replace("\n1.0,", "\n0.9,").encode(), "time_s 0.9 after 0.9, in sample 11, and 1 such steps"),
+    ],
+)
+def test_what_cannot_be_read_says_what_is_the_matter(tmp_path: Path, content: bytes, says: str) -> None:
+    with pytest.raises(Refused, match=says):
+        read(written(tmp_path, content))
+
+
+def test_a_packed_file_is_as_long_as_what_it_holds(tmp_path: Path) -> None:
+    packed = gzip.compress((PLAIN + "3,0,0,0\n" * 200_000).encode(), mtime=0)
+    assert len(packed) < 10_000
+    with pytest.raises(Refused, match=r"no_file: .*what is packed in it is too long"):
+        read_columns(written(tmp_path, packed), Header(tuple(HEAD)), 1)

@@ -1,0 +1,206 @@
+"""The same session by CSV, in a ROS 2 bag and in PX4's log solves to the same numbers."""
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.analysis.analyses import calibrate
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recording.motion_file import TIME, Item, samples_header
+from rig.data.recording.settings import Elsewhere, Site
+from rig.errors import Refused
+from rig.observation.external.attitude_import import read_attitudes
+from rig.observation.external.csv_samples import read_sample_table, read_samples
+from rig.observation.external.from_files import Files, recorded_in_files
+from rig.observation.formats.csv_table import read_columns
+from rig.observation.formats.sample_files import entry_of
+from rig.report.document import document_of
+from support.external.ulog_writer import write_ulog
+from support.paths import DOCS
+
+EXAMPLES = DOCS / "examples"
+STANDARD = Site(up=(0.0, 0.0, 1.0), gravity_m_s2=9.80665, earth_rate_rad_s=None)
+BEGAN_NS = 1_764_000_000 * 10**9
+
+
+def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = None, transform: bool = False) -> None:
+    """A bag with one IMU, and poses if there are any: those of intervals, stamped in their middles."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    of = {name.rpartition("/")[2]: each for name, each in store.types.items()}
+    vector, quaternion = of["Vector3"], of["Quaternion"]
+
+    def header(time_s: float) -> Any:
+        at = BEGAN_NS + round(time_s * 1e9)
+        return of["Header"](of["Time"](sec=at // 10**9, nanosec=at % 10**9), "body"), at
+
+    with Writer(path, version=9) as bag:
+        imu = bag.add_connection("/imu/data", "sensor_msgs/msg/Imu", typestore=store)
+        kept = np.zeros(9)
+        unknown = np.array([-1.0, *[0.0] * 8])
+        forces = np.column_stack([table.get(name, np.zeros(len(table[TIME]))) for name in ACCELERATION.columns])
+        rates = np.column_stack([table[name] for name in RATE.columns])
+        told = kept if ACCELERATION.columns[0] in table else unknown
+        for time_s, rate, force in zip(table[TIME], rates, forces, strict=True):
+            stamp, at = header(time_s)
+            message = of["Imu"](
+                stamp, quaternion(0.0, 0.0, 0.0, 1.0), unknown, vector(*rate), kept, vector(*force), told
+            )
+            bag.write(imu, at, store.serialize_cdr(message, "sensor_msgs/msg/Imu"))
+        if poses is None:
+            return
+        kind = "geometry_msgs/msg/" + ("TransformStamped" if transform else "PoseStamped")
+        connection = bag.add_connection("/mocap/body", kind, typestore=store)
+        for start, end, w, x, y, z in zip(*(poses[name] for name in
+                                            ("start_s", "end_s", "qw", "qx", "qy", "qz")), strict=True):  # fmt: skip
+            stamp, at = header((start + end) / 2)
+            turned = quaternion(x, y, z, w)
+            message = (
+                of["TransformStamped"](stamp, "body", of["Transform"](vector(0.0, 0.0, 0.0), turned))
+                if transform
+                else of["PoseStamped"](stamp, of["Pose"](of["Point"](0.0, 0.0, 0.0), turned))
+            )
+            bag.write(connection, at, store.serialize_cdr(message, kind))
+
+
+def solved(samples: Path, sweeps: Path) -> np.ndarray:
+    """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
+    item = Item("imu", "any", "1")
+    found = calibrate([recorded_in_files(Files(samples, sweeps, "sweeps", item), STANDARD, Elsewhere())])
+    (entry,) = document_of(found).gyroscopes.values()
+    return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
+
+
+def as_csv(path: Path, table: dict[str, Any]) -> None:
+    columns = np.column_stack(list(table.values()))
+    np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
+
+
+@pytest.mark.slow
+def test_a_session_solves_to_the_same_numbers_from_all_three(tmp_path: Path) -> None:
+    """The log holds floats of 32 bits, and whole microseconds; so do the other two then."""
+    table = dict(read_columns(EXAMPLES / "samples.csv", samples_header([RATE]), 256))
+    table[TIME] = np.round((table[TIME] - table[TIME][0]) * 1e6) / 1e6
+    table = {name: each if name == TIME else each.astype(np.float32).astype(float) for name, each in table.items()}
+    began_s = float(read_columns(EXAMPLES / "samples.csv", samples_header([RATE]), 256)[TIME][0])
+    rates = np.column_stack([table[name] for name in RATE.columns])
+    forces = np.tile([0.0, 0.0, 9.8], (len(rates), 1))
+    assert ACCELERATION.columns[0] not in table, "the example is a gyroscope's"
+    sweeps = np.genfromtxt(EXAMPLES / "sweeps.csv", delimiter=",", names=True)
+    moved = {name: sweeps[name] - (began_s if name in ("start_s", "end_s") else 0) for name in sweeps.dtype.names or ()}
+    as_csv(tmp_path / "sweeps.csv", moved)
+    as_csv(tmp_path / "samples.csv", table)
+    write_bag(tmp_path / "bag", table)
+    write_ulog(tmp_path / "log.ulg", np.round(table[TIME] * 1e6).astype(int) + 5_000_000, rates, forces)
+    csv, bag, log = (solved(tmp_path / name, tmp_path / "sweeps.csv") for name in ("samples.csv", "bag", "log.ulg"))
+    assert bag == pytest.approx(csv, rel=1e-6, abs=1e-15)
+    assert log == pytest.approx(csv, rel=1e-6, abs=1e-15)
+
+
+@pytest.mark.parametrize("transform", [False, True])
+def test_attitudes_come_from_poses_in_the_same_bag(transform: bool, tmp_path: Path) -> None:
+    table = dict(read_columns(EXAMPLES / "swinging_samples.csv", samples_header(), 256))
+    poses = read_attitudes(EXAMPLES / "swinging_attitudes.csv")
+    poses = {name: each[:400] for name, each in poses.items()}
+    table = {name: each[:400] for name, each in table.items()}
+    write_bag(tmp_path / "bag", table, poses, transform)
+    found = read_attitudes(Path(f"{tmp_path / 'bag'}::/mocap/body"))
+    shift = float(np.mean(found["start_s"][1:] + found["end_s"][1:] - poses["start_s"][1:] - poses["end_s"][1:])) / 2
+    for name in ("qw", "qx", "qy", "qz"):
+        assert found[name] == pytest.approx(poses[name], abs=1e-12)
+    middles = (found["start_s"] + found["end_s"] - poses["start_s"] - poses["end_s"])[1:-1] / 2
+    assert middles == pytest.approx(np.full(len(middles), shift), abs=2e-3)
+    samples = read_samples(tmp_path / "bag")
+    assert np.diff(samples.time_s) == pytest.approx(np.diff(table[TIME]), abs=2e-9)
+    read = np.column_stack([table[name] for name in RATE.columns])
+    assert samples.readings[RATE] == pytest.approx(read, abs=1e-12)
+
+
+def test_what_is_not_in_a_file_is_said_with_what_is(tmp_path: Path) -> None:
+    table = {TIME: np.arange(5) * 0.01, **{name: np.zeros(5) for name in RATE.columns}}
+    write_bag(tmp_path / "bag", table)
+    with pytest.raises(Refused, match=r"bag_topic: .*its topics are /imu/data"):
+        read_samples(Path(f"{tmp_path / 'bag'}::/other"))
+    with pytest.raises(Refused, match="bag_topic"):
+        read_attitudes(tmp_path / "bag")
+    write_ulog(tmp_path / "log.ulg", np.arange(5) * 1000, np.zeros((5, 3)), np.zeros((5, 3)))
+    with pytest.raises(Refused, match=r"ulog_topic: .*sensor_gyro 0"):
+        read_samples(Path(f"{tmp_path / 'log.ulg'}::1"))
+    with pytest.raises(Refused, match="no_attitudes"):
+        read_attitudes(tmp_path / "log.ulg")
+    (tmp_path / "broken.ulg").write_bytes(b"no log at all")
+    with pytest.raises(Refused, match="no_file"):
+        read_samples(tmp_path / "broken.ulg")
+    shutil.rmtree(tmp_path / "bag")
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "metadata.yaml").write_text("none", encoding="utf-8")
+    with pytest.raises(Refused, match="no_file"):
+        read_samples(tmp_path / "bag")
+
+
+def mcap(path: Path, *, not_measured: float = 0.0, without_rate: int = 0) -> Path:
+    """A bag in one MCAP file with a hundred readings, one of which has that value; so many first hold no rate."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types, kind = store.types, "sensor_msgs/msg/Imu"
+    none, no_rate, level = (
+        np.zeros(9),
+        np.array([-1.0, *[0.0] * 8]),
+        types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+    )
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        imu = bag.add_connection("/imu", kind, typestore=store)
+        for number in range(100):
+            stamp = types["builtin_interfaces/msg/Time"](sec=number, nanosec=0)
+            header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="imu")
+            z = not_measured if number == 40 else 0.1
+            read = types["geometry_msgs/msg/Vector3"](x=0.1 * number, y=0.0, z=z)
+            message = types[kind](header, level, none, read, no_rate if number < without_rate else none, read, none)
+            bag.write(imu, number * 10**9, store.serialize_cdr(message, kind))
+    return path
+
+
+def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: Path) -> None:
+    bag, damage = mcap(tmp_path / "bag"), np.random.default_rng(1)
+    (file,) = bag.glob("*.mcap")
+    whole = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    refused = 0
+    for _ in range(12):
+        content = whole.copy()
+        content[damage.integers(len(content), size=60)] = damage.integers(256, size=60)
+        file.write_bytes(content.tobytes())
+        try:
+            read_samples(bag)
+        except Refused:
+            refused += 1
+    assert refused > 6
+
+
+def test_a_reading_that_was_not_measured_is_named_in_a_bag_too(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match=r"not_a_number: .*bag has 1 samples whose z_rad_s .*the first is sample 41"):
+        read_samples(mcap(tmp_path / "bag", not_measured=float("nan")))
+
+
+def test_messages_of_a_bag_that_hold_no_rate_by_their_covariance_are_no_samples(tmp_path: Path) -> None:
+    samples = read_samples(mcap(tmp_path / "some", without_rate=30))
+    assert samples.readings[RATE][:, 0] == pytest.approx(0.1 * np.arange(30, 100)), "its driver was not ready before"
+    assert read_sample_table(tmp_path / "some").others == 30, "they are counted"
+    without = mcap(tmp_path / "all", without_rate=100)
+    assert read_sample_table(without).others == 0
+    assert [*read_samples(without).readings] == [ACCELERATION]
+    with pytest.raises(Refused, match=r"wrong_columns: .* holds no x_rad_s y_rad_s z_rad_s"):
+        read_samples(without, [RATE])
+
+
+def test_a_name_that_is_no_utf_8_is_recorded_as_it_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"imu\xff\x1b[31m.csv")
+    path.write_text("time_s\n", encoding="utf-8")
+    assert entry_of(path).name == "imu\\udcff\\x1b[31m.csv"

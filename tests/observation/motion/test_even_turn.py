@@ -1,0 +1,66 @@
+"""A turn of a shaft whose readings scatter, and what its rates are, from the simulated servo in virtual time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.errors import Fault
+from rig.observation.arm_rests import standing
+from rig.observation.motion.arm_motion import motion_of
+from rig.observation.motion.even_turn import smoothed
+from rig.observation.windows import rested, swept
+from support.motions.drawn_servo import Drawn, drawn_servo
+
+SHARE = 5e-5  # of the scale's uncertainty, that the turning may have
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Drawn:
+    return drawn_servo(7)
+
+
+@pytest.mark.slow
+def test_the_time_of_a_turn_is_known_to_a_few_hundred_thousandths(drawn: Drawn) -> None:
+    for run in drawn.runs:
+        motion = motion_of(run)
+        for finished in swept(run):
+            turn = motion.turn(finished.sweep, finished.window, run.settings.observation)
+            assert turn.closed and turn.speed_std_rad_s / turn.speed_rad_s < SHARE
+            assert np.abs(turn.axis_flange @ np.array(run.settings.mount)[:, 2]) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
+    """The drive turns by 2π where its encoder says so, a servo's time between: T by the truth is what is found."""
+    drawn = drawn_servo(8)
+    run = drawn.runs[0]
+    motion, sweep = motion_of(run), next(swept(run))
+    turn = motion.turn(sweep.sweep, sweep.window, run.settings.observation)
+    times = np.linspace(turn.start_s, turn.end_s, 4001)
+    rate = np.array([drawn.shafts[0].rate_at(each) for each in times.tolist()])
+    truth = float(np.mean((rate[1:] + rate[:-1]) / 2))
+    assert truth == pytest.approx(turn.speed_rad_s, rel=4 * SHARE)
+
+
+@pytest.mark.slow
+def test_a_shaft_that_dithers_is_at_rest(drawn: Drawn) -> None:
+    motion = motion_of(drawn.runs[0])
+    assert all(standing(motion, window) is not None for window in rested(drawn.runs[0]))
+
+
+@pytest.mark.slow
+def test_a_turn_that_was_not_ended_is_refused(drawn: Drawn) -> None:
+    run = drawn.runs[0]
+    motion, finished = motion_of(run), next(swept(run))
+    middle_s = (finished.window.start_s + finished.window.end_s) / 2
+    cut = motion_of(replace(run, states=run.states[run.states["time_s"] < middle_s]))
+    with pytest.raises(Fault, match="incomplete_revolution"):
+        cut.turn(finished.sweep, finished.window, run.settings.observation)
+    assert motion.turn(finished.sweep, finished.window, run.settings.observation).closed
+
+
+def test_smoothed_rates_are_those_of_a_line() -> None:
+    time_s = np.sort(np.random.default_rng(1).uniform(0, 4, 500))
+    middles, angles, rates = smoothed(time_s, (2.0 + 0.7 * time_s)[:, None])
+    assert np.allclose(angles[:, 0], 2.0 + 0.7 * middles) and np.allclose(rates, 0.7)

@@ -1,0 +1,128 @@
+"""A signature that can be checked when its certificate has expired: with the authorities' revocation lists under it."""
+
+import io
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from asn1crypto.x509 import Certificate
+from cryptography.hazmat.primitives.serialization import Encoding
+from pyhanko.pdf_utils.generic import StreamObject
+from pyhanko.pdf_utils.reader import PdfFileReader
+from pyhanko.pdf_utils.writer import PageObject, PdfFileWriter
+from pyhanko.sign.validation import validate_pdf_signature
+from pyhanko.sign.validation.dss import DocumentSecurityStore
+from pyhanko_certvalidator import ValidationContext
+
+from rig.errors import Refused
+from rig.report.signatures.findings import Looked
+from rig.report.signatures.inspection import looked_at
+from rig.report.signatures.long_term import authorities_in
+from rig.report.signatures.reason import Reason
+from rig.report.signatures.signatory import signatory
+from rig.report.signatures.signing import signed_pdf
+from rig.report.signatures.trust import Trust
+from support.documents.signing import PASSPHRASE, Holder, holder, revocation_list, stamping, time_server
+from support.processes.waiting import PATIENCE_S
+
+
+@dataclass(frozen=True)
+class Signing:
+    """A laboratory's key file, its authority, a time server of the same authority, and a folder for lists."""
+
+    key: Path
+    laboratory: Holder
+    authority: Holder
+    time_server: str
+    folder: Path
+
+    @property
+    def trust(self) -> list[bytes]:
+        return [self.authority.chain[0].public_bytes(Encoding.DER)]
+
+    def signed(self, *lists: bytes) -> bytes:
+        file = self.folder / "authority.pem"
+        file.write_bytes(b"".join((*lists, self.authority.certificates())))
+        with signatory(str(self.key)) as by:
+            return signed_pdf(page(), by, Reason("A test"), self.time_server, authorities_in([file]))
+
+
+@pytest.fixture
+def signing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Signing]:
+    monkeypatch.setenv("RIG_SIGNING_PASSPHRASE", PASSPHRASE)
+    authority = holder("Authority")
+    laboratory = holder("Laboratory", authority)
+    server = stamping("Time server", authority)
+    with time_server(server) as url:
+        yield Signing(laboratory.p12(tmp_path / "key.p12"), laboratory, authority, url, tmp_path)
+
+
+def page() -> bytes:
+    writer = PdfFileWriter()
+    content = writer.add_object(StreamObject(stream_data=b"q Q"))
+    writer.insert_page(PageObject(contents=content, media_box=(0, 0, 200, 200)))
+    out = io.BytesIO()
+    writer.write(out)
+    return out.getvalue()
+
+
+def seen(pdf: bytes, trust: list[bytes]) -> Looked:
+    return looked_at("certificate.pdf", pdf, Trust(tuple(trust)))
+
+
+def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(signing: Signing) -> None:
+    made = signing.signed(revocation_list(signing.authority))
+    looked = seen(made, signing.trust)
+    (by,) = looked.signatures
+    assert not looked.problems and by.long_term and by.time_server == "CN=Time server"
+    (signing.folder / "made.pdf").write_bytes(made)
+    told = subprocess.run(
+        ["pdfsig", "-nocert", signing.folder / "made.pdf"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=True,
+    ).stdout
+    assert "Signature is Valid" in told and "Total document signed" in told
+    # pyHanko, which asks for lists of that time: what is in the file is enough, and without it nothing is.
+    reader = PdfFileReader(io.BytesIO(made))
+    asked: dict[str, Any] = {"trust_roots": list(map(Certificate.load, signing.trust)), "moment": by.when}
+    asked |= {"revocation_mode": "require", "allow_fetching": False}
+    with_lists = DocumentSecurityStore.read_dss(reader).as_validation_context(asked)
+    for context, clear in ((with_lists, True), (ValidationContext(crls=[], **asked), False)):
+        status = validate_pdf_signature(reader.embedded_signatures[0], context)
+        assert status.intact and status.trusted is clear
+
+
+def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
+    made = signing.signed(revocation_list(signing.authority))
+    own = signing.laboratory.chain[0].public_bytes(Encoding.DER)
+    for trust, problems in (([], ["signer_unknown"]), ([own], ["signer_not_trusted"]), ([own, *signing.trust], [])):
+        looked = seen(made, trust)
+        assert [problem.name for problem in looked.problems] == problems and not looked.signatures[0].long_term
+
+
+def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
+    made = bytearray(signing.signed(revocation_list(signing.authority)))
+    reader = PdfFileReader(io.BytesIO(bytes(made)))
+    held = reader.root["/DSS"]["/CRLs"][0].encoded_data
+    made[made.index(held) + len(held) // 2] ^= 1
+    assert [each.name for each in seen(bytes(made), signing.trust).problems] == ["not_as_signed", "signer_not_trusted"]
+
+
+def test_what_no_list_clears_is_not_signed(signing: Signing) -> None:
+    revoked = revocation_list(signing.authority, signing.laboratory)
+    expired = revocation_list(signing.authority, days=(-9, -2))
+    of_another = revocation_list(holder("Authority"))
+    for lists in ((revoked,), (expired,), (of_another,), ()):
+        with pytest.raises(Refused, match="revocation_list"):
+            signing.signed(*lists)
+
+
+def test_a_file_that_is_no_list_is_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "odd.crl").write_bytes(b"no list")
+    with pytest.raises(Refused, match=r"revocation_list.*odd\.crl"):
+        authorities_in([tmp_path / "odd.crl"])

@@ -1,0 +1,118 @@
+"""A session by hand: what is right is taken, what is wrong is asked again by its name, and the rest gives the truth."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.data.recording.hand_events import HandBegunAnew
+from rig.errors import Fault
+from support.laboratories.at_the_table import LIST, TRUE_SCALE, Table
+
+SHORT = replace(LIST, flips=8, turns=2)
+
+
+def held(table: Table) -> None:
+    """The scale factors are right, by what the session itself tells of its uncertainty (k = 3)."""
+    solution = table.solution
+    off = np.abs(solution.scale - TRUE_SCALE) / solution.expanded_scale
+    assert np.all(off < 1.5), (off, table.again)
+
+
+@pytest.mark.slow
+def test_without_a_mistake_the_list_is_made_and_gives_the_truth() -> None:
+    table = Table(seed=3)
+    table.sit()
+    assert not table.reminded
+    assert [each.kind for each in table.taken].count("flip") == 12
+    assert [each.kind for each in table.taken].count("turn") == 3
+    held(table)
+
+
+@pytest.mark.slow
+def test_it_ends_when_u_is_as_small_as_is_wanted() -> None:
+    short = Table(seed=4, settings=replace(LIST, wanted_scale_u=2e-3))
+    short.sit()
+    assert len(short.taken) < 15
+    assert float(max(short.solution.expanded_scale)) <= 2e-3
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mistakes", "names"),
+    [
+        ({"short": 0.7}, {"turn_not_closed"}),
+        ({"too_fast": 0.2}, {"clipping"}),
+    ],
+    ids=lambda each: next(iter(each)),
+)
+def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, float], names: set[str]) -> None:
+    table = Table(seed=5, mistakes=dict(mistakes), settings=SHORT)
+    table.sit()
+    assert table.operator.state["mistakes"]
+    assert names <= set(table.again)
+    held(table)
+
+
+@pytest.mark.thorough
+def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
+    table = Table(seed=6, mistakes={"held": 0.2}, settings=SHORT)
+    table.sit()
+    assert {"held_not_laid_down", "not_flat"} & set(table.reminded)
+    held(table)
+
+
+@pytest.mark.thorough
+@pytest.mark.slow
+def test_a_crumb_under_it_does_no_harm_where_an_accelerometer_is_the_level() -> None:
+    table = Table(seed=5, mistakes={"crumb": 0.2}, settings=SHORT)
+    table.sit()
+    assert "crumb" in table.operator.state["mistakes"]
+    held(table)
+
+
+@pytest.mark.slow
+def test_a_wrong_side_is_read_and_the_list_goes_on_from_there() -> None:
+    table = Table(seed=7, mistakes={"wrong_face": 0.2}, settings=SHORT)
+    table.sit()
+    assert "wrong_face" in table.operator.state["mistakes"]
+    held(table)
+
+
+@pytest.mark.slow
+def test_after_ten_refusals_in_a_row_it_ends_by_the_name_of_the_last() -> None:
+    with pytest.raises(Fault) as ended:
+        Table(seed=8, mistakes={"too_fast": 1.0}).sit()
+    assert ended.value.name == "clipping"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("creeps", [6, 11])
+def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: int) -> None:
+    table = Table(seed=3, settings=SHORT, creeps=creeps)
+    table.sit()
+    assert table.again == ["bias_jumped"]
+    assert not [event for event in table.events if isinstance(event, HandBegunAnew)]
+    assert [move.kind for move in table.taken].count("turn") == 2
+    held(table)
+
+
+ALL = ("short", "two_turns", "other_way", "wrong_face", "skipped", "crumb", "table_pushed", "held", "dropped", "left",
+       "lifted", "too_fast")  # fmt: skip
+
+
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("mistake", ALL)
+@pytest.mark.parametrize("seed", range(20))
+def test_every_mistake_is_mended_or_refused_by_name(mistake: str, seed: int) -> None:
+    table = Table(seed=100 + seed, mistakes={mistake: 0.12})
+    try:
+        table.sit()
+    except Fault as fault:
+        assert fault.name in {"bias_jumped", "table_moved", "not_flat", "turn_not_closed", "lost_in_move", "clipping"}
+        return
+    held(table)

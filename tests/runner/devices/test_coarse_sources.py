@@ -1,0 +1,65 @@
+"""Whole runs with every message of an autopilot, and with every number of digits: what they state holds.
+
+Their steps are coarse beside the noise of a good part. Many seeds are for `make proof`; one run with each message is in
+`make test`.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from support.laboratories.hidden_results import Judged, solved
+from support.laboratories.hidden_worlds import at_address, by_message, run_in, with_digits
+from support.laboratories.worlds import fresh_host
+
+MESSAGES = ("RAW_IMU", "SCALED_IMU", "HIGHRES_IMU")
+DIGITS = (1, 2, 3)
+NOISE_RAD_S = (0.0003, 0.0015, 0.005)
+SEEDS = range(500, 505)
+WITHIN, BEYOND = 0.93, 2.2  # at least such a share of the errors within U, and none so many U away
+
+
+def judged(document: dict[str, Any], folder: Path) -> Judged:
+    """A run of a laboratory, solved."""
+    run_in(at_address(document, fresh_host()), folder)
+    assert (folder / "status").read_text(encoding="utf-8") == "0\n", (folder / "said").read_text(encoding="utf-8")
+    return solved(folder)
+
+
+def shares(runs: list[Judged]) -> tuple[float, float]:
+    """Which share of all errors is within U, and the largest of them, in U."""
+    beyond = np.concatenate([np.abs(one.error) / one.expanded for run in runs for one in run.stated])
+    return float(np.mean(beyond <= 1)), float(beyond.max())
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("message", MESSAGES)
+def test_a_quiet_imu_passes_by_every_message(message: str, tmp_path: Path) -> None:
+    """With and without a thermometer, on an arm that turns evenly."""
+    run = judged(by_message(message, 0.0005, vibrates=False, seed=600 + MESSAGES.index(message)), tmp_path / "run")
+    assert not run.refused and shares([run])[1] < BEYOND
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(14_400)
+@pytest.mark.parametrize("source", [*MESSAGES, *DIGITS])
+def test_what_is_stated_by_every_message_and_number_of_digits_holds(source: str | int, tmp_path: Path) -> None:
+    def run(draw: tuple[float, bool, int]) -> Judged:
+        noise_rad_s, vibrates, seed = draw
+        drawn = by_message if isinstance(source, str) else with_digits
+        document = drawn(source, noise_rad_s, vibrates=vibrates, seed=seed)  # type: ignore[arg-type]
+        return judged(document, tmp_path / f"{noise_rad_s}-{vibrates}-{seed}")
+
+    with ThreadPoolExecutor(2) as two_at_once:  # each run is mostly one process that simulates, and waits for its arm
+        runs = list(two_at_once.map(run, product(NOISE_RAD_S, (False, True), SEEDS)))
+    within, largest = shares(runs)
+    print(source, f"{100 * within:.1f} % within U, largest {largest:.2f} U")
+    assert not [(each.folder.name, each.refused) for each in runs if each.refused]
+    assert within >= WITHIN and largest < BEYOND

@@ -1,0 +1,1 @@
+"""Results and certificates: made, signed and forged."""

@@ -1,0 +1,251 @@
+"""Forgeries of a signed PDF: ways to make it say something else under the signature that it has."""
+
+import io
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pyhanko.pdf_utils.generic import (
+    ArrayObject,
+    DictionaryObject,
+    NameObject,
+    NullObject,
+    NumberObject,
+    StreamObject,
+    TextStringObject,
+    pdf_name,
+)
+from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+from pyhanko.pdf_utils.reader import PdfFileReader
+from pyhanko.sign.signers import PdfSignatureMetadata, sign_pdf
+
+from support.documents.forging_cms import (
+    Forgery,
+    certificate_added,
+    certificate_altered,
+    contained,
+    digests_more,
+    in_stamp,
+    lists_added,
+    parameters_more,
+    said_unsigned,
+    server_altered,
+    signer_doubled,
+    stamp_doubled,
+    stamped_by_a_stranger,
+)
+from support.documents.signing import holder, signing_as
+
+
+def replaced(old: bytes, new: bytes) -> Forgery:
+    def forge(content: bytes) -> bytes:
+        assert old in content
+        return content.replace(old, new, 1)
+
+    return forge
+
+
+def flipped(of: bytes, further: int) -> Forgery:
+    """One bit, so many bytes behind the first `of`."""
+
+    def forge(content: bytes) -> bytes:
+        found = bytearray(content)
+        found[content.index(of) + further] ^= 1
+        return bytes(found)
+
+    return forge
+
+
+def hex_changed(content: bytes, at: int) -> bytes:
+    digit = b"0" if content[at : at + 1] != b"0" else b"1"
+    return content[:at] + digit + content[at + 1 :]
+
+
+def signature_changed(content: bytes) -> bytes:
+    """Its value, which lies among certificates and a time stamp."""
+    (signature,) = PdfFileReader(io.BytesIO(content)).embedded_signatures
+    value = signature.signer_info["signature"].native.hex().encode()
+    return hex_changed(content, content.lower().index(value) + 20)
+
+
+def padding_changed(content: bytes) -> bytes:
+    return hex_changed(content, content.index(b">", content.index(b"/Contents <")) - 2)
+
+
+def without_signature(content: bytes) -> bytes:
+    return content[: content.index(b"%%EOF") + 6]
+
+
+def updated(change: Callable[[IncrementalPdfFileWriter], object]) -> Forgery:
+    """An incremental update, as an editor makes one."""
+
+    def forge(content: bytes) -> bytes:
+        writer = IncrementalPdfFileWriter(io.BytesIO(content))
+        change(writer)
+        writer.update_root()
+        out = io.BytesIO()
+        writer.write(out)
+        return out.getvalue()
+
+    return forge
+
+
+def page_of(writer: IncrementalPdfFileWriter) -> Any:
+    page = writer.root["/Pages"]["/Kids"][0]
+    writer.mark_update(page.container_ref)
+    return page
+
+
+def other_page(writer: IncrementalPdfFileWriter) -> None:
+    shown = b"BT /F1 24 Tf 50 700 Td (k = 1 1 1) Tj ET"
+    page_of(writer)[pdf_name("/Contents")] = writer.add_object(StreamObject(stream_data=shown))
+
+
+def no_page(writer: IncrementalPdfFileWriter) -> None:
+    pages = writer.root["/Pages"]
+    del pages["/Kids"][-1]
+    pages[pdf_name("/Count")] = NumberObject(len(pages["/Kids"]))
+    writer.mark_update(pages.container_ref)
+
+
+def note(writer: IncrementalPdfFileWriter) -> None:
+    """An annotation over the page, as a reader's comment."""
+    box = ArrayObject(map(NumberObject, (0, 0, 500, 800)))
+    names = {"/Type": "/Annot", "/Subtype": "/FreeText"}
+    annotation = DictionaryObject({pdf_name(key): NameObject(value) for key, value in names.items()})
+    annotation[pdf_name("/Rect")], annotation[pdf_name("/Contents")] = box, TextStringObject("k = 1 1 1")
+    page_of(writer)[pdf_name("/Annots")] = ArrayObject([writer.add_object(annotation)])
+
+
+def attachments(writer: IncrementalPdfFileWriter) -> Any:
+    return writer.root["/Names"]["/EmbeddedFiles"]["/Names"]
+
+
+def other_attachment(writer: IncrementalPdfFileWriter) -> None:
+    stream = writer.add_object(StreamObject(stream_data=b'{"verdict": "pass"}'))
+    file = attachments(writer)[1]
+    file["/EF"][pdf_name("/F")] = file["/EF"][pdf_name("/UF")] = stream
+    writer.mark_update(file.container_ref)
+
+
+def script(writer: IncrementalPdfFileWriter) -> None:
+    action = {pdf_name("/S"): NameObject("/JavaScript"), pdf_name("/JS"): TextStringObject("app.alert('pass')")}
+    writer.root[pdf_name("/OpenAction")] = DictionaryObject(action)
+
+
+def signature_object(change: Callable[[Any], object]) -> Callable[[IncrementalPdfFileWriter], None]:
+    def update(writer: IncrementalPdfFileWriter) -> None:
+        field = writer.root["/AcroForm"]["/Fields"][0]
+        change(field["/V"])
+        writer.mark_update(field["/V"].container_ref)
+
+    return update
+
+
+def uncertified(writer: IncrementalPdfFileWriter) -> None:
+    """Another page, and nothing that says that a signature forbids it."""
+    other_page(writer)
+    del writer.root["/Perms"]
+
+
+def signed_again(content: bytes) -> bytes:
+    """A second signature, by somebody, over a page that says something else."""
+    by = signing_as(holder("Laboratory", holder("Authority")))
+    about = PdfSignatureMetadata(field_name="Other", md_algorithm="sha256")
+    writer = IncrementalPdfFileWriter(io.BytesIO(updated(uncertified)(content)))
+    return bytes(sign_pdf(writer, about, by.signer).getbuffer())
+
+
+def ranged(change: Callable[[list[int], int], Sequence[int]]) -> Forgery:
+    """Another range of what is signed."""
+
+    def forge(content: bytes) -> bytes:
+        begin = content.index(b"/ByteRange [")
+        end = content.index(b"]", begin) + 1
+        numbers = list(map(int, content[begin + 12 : end - 1].split()))
+        said = " ".join(map(str, change(numbers, len(content))))
+        return content[:begin] + f"/ByteRange [{said}]".encode().ljust(end - begin) + content[end:]
+
+    return forge
+
+
+def moved_end(content: bytes) -> bytes:
+    """The end that is signed moved back, and something between (signature wrapping)."""
+    inserted = b"\n9 0 obj\n(k = 1 1 1)\nendobj\n"
+    forged = ranged(lambda numbers, _: [*numbers[:2], numbers[2] + len(inserted), numbers[3]])(content)
+    at = content.index(b">", content.index(b"/Contents <")) + 1
+    return forged[:at] + inserted + forged[at:]
+
+
+def mixed_case(content: bytes) -> bytes:
+    at = content.index(b"/Contents <") + 11
+    return content[:at] + content[at : at + 40].swapcase() + content[at + 40 :]
+
+
+def _none(found: Any, key: str) -> None:
+    found[pdf_name(key)] = NullObject()
+
+
+def _removed(found: Any, key: str) -> None:
+    del found[key]
+
+
+def _language(writer: IncrementalPdfFileWriter) -> None:
+    writer.root[pdf_name("/Lang")] = TextStringObject("de")
+
+
+def _form(writer: IncrementalPdfFileWriter) -> None:
+    writer.root[pdf_name("/AcroForm")] = DictionaryObject({pdf_name("/Fields"): ArrayObject([])})
+
+
+FORGED_PDF: dict[str, Forgery] = {
+    # Bytes that are signed.
+    "a byte of a page": flipped(b"stream\n", 40),
+    "a byte of an attachment": flipped(b"/EmbeddedFile", 120),
+    "the version": replaced(b"%PDF-1.7", b"%PDF-1.6"),
+    "the reason": replaced(b"(Simulated", b"(Different"),
+    "the day": replaced(rb"/M (D\07220", rb"/M (D\07219"),
+    "which files are attached": replaced(b"/EmbeddedFiles", b"/EmbeddedFilez"),
+    # What is signed of it.
+    "a range that begins later": ranged(lambda numbers, _: [1, *numbers[1:]]),
+    "a range that ends earlier": ranged(lambda numbers, _: [*numbers[:3], numbers[3] - 10]),
+    "a range with a wider gap": ranged(lambda numbers, _: [numbers[0], numbers[1] - 10, *numbers[2:]]),
+    "a range of six": ranged(lambda numbers, _: [0, 9, 9, numbers[1] - 9, *numbers[2:]]),
+    "an end moved back": moved_end,
+    "letters of the signature": mixed_case,
+    "its signature": signature_changed,
+    "what follows its signature": padding_changed,
+    # What comes before or after.
+    "bytes at its end": lambda content: content + b"\n% better\n",
+    "its end": lambda content: content[:-40],
+    "an update by an editor": updated(_language),
+    "a page replaced by an update": updated(other_page),
+    "a page removed by an update": updated(no_page),
+    "a note over a page": updated(note),
+    "an attachment replaced by an update": updated(other_attachment),
+    "a script that runs at once": updated(script),
+    "a signature without contents": updated(signature_object(lambda found: _removed(found, "/Contents"))),
+    "a signature with no contents": updated(signature_object(lambda found: _none(found, "/Contents"))),
+    "a signature without a range": updated(signature_object(lambda found: _removed(found, "/ByteRange"))),
+    "a signature with no range": updated(signature_object(lambda found: _none(found, "/ByteRange"))),
+    "a second signature over another page": signed_again,
+    # What the signature's container holds.
+    "another certificate beside": certificate_added(lambda: holder("PTB")),
+    "another certificate of the time server": contained(in_stamp(server_altered)),
+    "lists of somebody": contained(lists_added),
+    "a time that is not signed": contained(said_unsigned),
+    "two time stamps": contained(stamp_doubled),
+    "two signers": contained(signer_doubled),
+    "another digest beside": contained(digests_more),
+    "a text in the method": contained(parameters_more),
+    "a text in the time stamp": contained(in_stamp(said_unsigned)),
+    "lists in the time stamp": contained(in_stamp(lists_added)),
+}
+# By whom it is: nothing is altered that is signed.
+UNTRUSTED_PDF: dict[str, tuple[Forgery, str]] = {
+    "all but the signature": (without_signature, "not_signed"),
+    "another document at its end": (lambda content: content + without_signature(content), "not_signed"),
+    "no field for a signature": (updated(_form), "not_signed"),
+    "something before it": (lambda content: b"% better\n" + content, "not_signed"),
+    "a certificate of the authority altered": (contained(certificate_altered), "signer_not_trusted"),
+    "a time stamp by a stranger": (contained(stamped_by_a_stranger), "signer_not_trusted"),
+}

@@ -1,0 +1,176 @@
+"""Forgeries of a signed digital certificate: ways to make it say something else under the signature that it has."""
+
+import copy
+import re
+from base64 import b64encode
+from hashlib import sha1, sha256
+
+from lxml import etree
+
+from support.documents.forging_xml import (
+    DCC,
+    DS,
+    SI,
+    VALUE,
+    XADES,
+    Forgery,
+    attribute,
+    before_root,
+    better_results,
+    by_entity,
+    declared,
+    element,
+    first,
+    first_last,
+    inside_itself,
+    keyed_by_what_is_public,
+    of_another,
+    on_start_tag,
+    padded,
+    properties_doubled,
+    properties_elsewhere,
+    redigested,
+    removed,
+    replaced,
+    results_beside,
+    signature,
+    signature_in,
+    signed_info,
+    swapped_names,
+    text,
+    twice,
+    typed,
+    within,
+    wrapped,
+    wrapped_around,
+)
+
+SCRIPT = etree.XML('<script xmlns="http://www.w3.org/1999/xhtml">document.body.textContent = "pass"</script>')
+UNSIGNED = etree.XML(
+    f'<x:UnsignedProperties xmlns:x="{XADES[1:-1]}"><x:UnsignedSignatureProperties/></x:UnsignedProperties>'
+)
+MANIFEST = etree.XML(f'<d:Manifest xmlns:d="{DS[1:-1]}"><d:Reference URI=""/></d:Manifest>')
+XPATH = etree.XML(
+    f'<d:Transform xmlns:d="{DS[1:-1]}" Algorithm="http://www.w3.org/TR/1999/REC-xpath-19991116">'
+    "<d:XPath>not(ancestor-or-self::node())</d:XPath></d:Transform>"
+)
+INCLUDED = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="other.xml"/>'
+EXCLUSIVE, WITH_COMMENTS = (
+    "http://www.w3.org/2001/10/xml-exc-c14n#",
+    "http://www.w3.org/2006/12/xml-c14n11#WithComments",
+)
+
+# What has been altered of what is signed.
+OF_CONTENT: dict[str, Forgery] = {
+    "a value": element(VALUE, text("1 1 1")),
+    "an uncertainty": element(f".//{SI}uncertaintyXMLList", text("0 0 0")),
+    "the number": element(f".//{DCC}uniqueIdentifier", text("RIG-1")),
+    "that it is valid": replaced(b"valid>false<", b"valid>true<"),
+    "that it is simulated": element(f".//{DCC}statement", removed),
+    "an order": element(f".//{DCC}statements", first_last),
+    "a unit's letter by one that looks the same": replaced("°C".encode(), "ºC".encode()),
+    "a blank between elements": replaced(b"<dcc:administrativeData>", b"<dcc:administrativeData> "),
+    "which item it is of": element(f".//{DCC}measurementResult", attribute("refId", "gyroscope-1")),
+    "the reason": element(f".//{XADES}Description", text("A calibration certificate")),
+    "the time": element(f".//{XADES}SigningTime", text("2020-01-01T00:00:00+00:00")),
+    "a second set of results": element("", lambda root: root.insert(2, better_results(root))),
+    "an XInclude in a value": element(VALUE, lambda found: found.append(etree.XML(INCLUDED))),
+}
+# What C14N leaves out, or takes for the same, and namespaces.
+OF_FORM: dict[str, Forgery] = {
+    "a comment in a value": lambda content: re.sub(rb"(<si:valueXMLList>\d)", rb"\1<!-- -->", content, count=1),
+    "a comment that hides a statement": replaced(b"<dcc:statement>", b"<!-- x --><dcc:statement>"),
+    "a comment before": before_root(b"<!-- valid -->"),
+    "a comment behind": lambda content: content + b"<!-- valid -->",
+    "a style sheet": before_root(b'<?xml-stylesheet href="other.xsl"?>'),
+    "an instruction in a value": lambda content: re.sub(rb"(<si:valueXMLList>\d)", rb"\1<?x?>", content, count=1),
+    "an instruction behind": lambda content: content + b"<?verdict pass?>",
+    "a document type": typed('<!ENTITY e "1">'),
+    "a document type elsewhere": typed("", outside='SYSTEM "https://ptb.de.example/dcc.dtd" '),
+    "a default for an attribute": typed('<!ATTLIST dcc:digitalCalibrationCertificate xml:lang CDATA "de">'),
+    "a document type with Ids": typed("<!ATTLIST dcc:item id ID #IMPLIED>"),
+    "a value by an entity": by_entity,
+    "a namespace that nothing is in": on_start_tag(b"dcc:digitalCalibrationCertificate", b'xmlns:x="https://ptb.de/x"'),
+    "a default namespace": on_start_tag(b"dcc:digitalCalibrationCertificate", b'xmlns="https://ptb.de/dcc"'),
+    "a namespace on an inner element": on_start_tag(b"dcc:measurementResults", b'xmlns:x="https://ptb.de/x"'),
+    "a namespace that is relative": on_start_tag(b"dcc:measurementResults", b'xmlns:x="other"'),
+    "another namespace of a prefix": replaced(b'"https://ptb.de/si"', b'"https://ptb.de/si/"'),
+    "prefixes swapped": swapped_names,
+    "another prefix": lambda content: re.sub(rb"(</?|xmlns:)si(?=[:=])", rb"\1unit", content),
+    "a base for addresses": element("", attribute("{http://www.w3.org/XML/1998/namespace}base", "https://ptb.de/")),
+    "that blanks count": element("", attribute("{http://www.w3.org/XML/1998/namespace}space", "preserve")),
+    "another version of XML": declared('<?xml version="1.1" encoding="UTF-8"?>', "utf-8"),
+    "another encoding": declared('<?xml version="1.0" encoding="ISO-8859-1"?>', "latin-1"),
+    "an encoding that it is not in": declared('<?xml version="1.0" encoding="UTF-16"?>', "utf-8"),
+    "UTF-7": declared('<?xml version="1.0" encoding="UTF-7"?>', "utf-7"),
+}
+# What stands in the signature, or where it stands.
+OF_SIGNATURE: dict[str, Forgery] = {
+    "results in the signature": signature(results_beside),
+    "a text in the signature": signature(within(f"{DS}Object", "The result was replaced: k = 1 1 1")),
+    "a script in the signature": signature(within(f"{DS}Object", SCRIPT)),
+    "a manifest in the signature": signature(within(f"{DS}Object", MANIFEST)),
+    "an empty object": signature(within(f"{DS}Object")),
+    "an XInclude in the signature": signature(within(f"{DS}Object", etree.XML(INCLUDED))),
+    "something in the object of the properties": element(f".//{DS}Object", within(f"{DCC}comment", "pass")),
+    "unsigned properties": element(f".//{XADES}QualifyingProperties", lambda found: found.append(UNSIGNED)),
+    "a text between": element(f".//{DS}SignedInfo", lambda found: setattr(found, "tail", "k = 1 1 1")),
+    "a blank between": element(f".//{DS}SignedInfo", lambda found: setattr(found, "tail", "\n")),
+    "a text behind": signature(lambda found: setattr(found, "tail", "k = 1 1 1")),
+    "a text in the object": element(f".//{DS}Object", text("k = 1 1 1")),
+    "a comment in the signature": signature(lambda found: found.append(etree.Comment("k = 1 1 1"))),
+    "a comment in the signed properties": element(
+        f"{'.//'}{XADES}SigningTime", lambda found: found.append(etree.Comment("x"))
+    ),
+    "an instruction in the signature": signature(lambda found: found.append(etree.PI("verdict", "pass"))),
+    "an attribute of the signature": signature(attribute("{https://ptb.de/dcc}verdict", "pass")),
+    "a language of the signature": signature(attribute("{http://www.w3.org/XML/1998/namespace}lang", "de")),
+    "another name of the signature": signature(attribute("Id", "other")),
+    "an attribute of the object": element(f".//{DS}Object", attribute("MimeType", "text/html")),
+    "an attribute of the value": element(f".//{DS}SignatureValue", attribute("Id", "value")),
+    "another target of the properties": element(f".//{XADES}QualifyingProperties", attribute("Target", "#other")),
+    "a namespace on the signature": on_start_tag(b"ds:Signature", b'xmlns:x="https://ptb.de/x"'),
+    "a namespace on the object": on_start_tag(b"ds:Object", b'xmlns:x="https://ptb.de/x"'),
+    "a namespace on the value": on_start_tag(b"ds:SignatureValue", b'xmlns:x="https://ptb.de/x"'),
+    "a default namespace on the object": on_start_tag(b"ds:Object", b'xmlns="https://ptb.de/dcc"'),
+    "a second list of certificates": signature(lambda found: found.append(copy.deepcopy(found.find(f"{DS}KeyInfo")))),
+    "a name of the key": element(f".//{DS}KeyInfo", within(f"{DS}KeyName", "PTB")),
+    "certificates in another order": element(f".//{DS}X509Data", first_last),
+    "the signer's certificate": element(f".//{DS}X509Certificate", of_another),
+    "other properties of the same Id": signature(properties_doubled),
+    "properties moved aside": signature(properties_elsewhere),
+    "what is signed moved aside": wrapped,
+    "the signature first": signature(first),
+    "the signature twice": signature(twice),
+    "the signature in itself": signature(inside_itself),
+    "no XML any more": lambda content: content[:-30],
+}
+# What the signature is made by.
+OF_METHOD: dict[str, Forgery] = {
+    "a digest": element(f".//{DS}DigestValue", text("QUJD" * 11)),
+    "a digest that fits": redigested("http://www.w3.org/2001/04/xmlenc#sha256", sha256),
+    "a weak digest that fits": redigested("http://www.w3.org/2000/09/xmldsig#sha1", sha1),
+    "the signature's value": element(f".//{DS}SignatureValue", text("QUJD" * 22)),
+    "no value": element(f".//{DS}SignatureValue", text("")),
+    "a value of zeros": element(f".//{DS}SignatureValue", text(b64encode(bytes(64)).decode())),
+    "signs in the value that no base64 has": element(f".//{DS}SignatureValue", padded),
+    "a code by what is public": signature(keyed_by_what_is_public),
+    "another method": signed_info(
+        lambda found: found[1].set("Algorithm", "http://www.w3.org/2000/09/xmldsig#rsa-sha1")
+    ),
+    "an exclusive form": signed_info(lambda found: found[0].set("Algorithm", EXCLUSIVE)),
+    "a form with comments": signed_info(lambda found: found[0].set("Algorithm", WITH_COMMENTS)),
+    "a transform": element(f".//{DS}Transforms", lambda found: found.append(XPATH)),
+    "a part alone": element(f".//{DS}Reference", attribute("URI", "#gyroscope-0")),
+    "something elsewhere": element(f".//{DS}Reference", attribute("URI", "other.xml")),
+    "a reference less": signed_info(lambda found: found.remove(found[-1])),
+    "a reference more": signed_info(lambda found: found.append(copy.deepcopy(found[-1]))),
+    "references in another order": signed_info(lambda found: found.insert(2, found[-1])),
+}
+FORGED_XML = OF_CONTENT | OF_FORM | OF_SIGNATURE | OF_METHOD
+# Where the signature is no longer that of the document.
+MOVED_XML: dict[str, Forgery] = {
+    "all but the signature": element(f"{DS}Signature", removed),
+    "what is signed inside another": wrapped_around,
+    "the signature elsewhere": signature_in(f"{DCC}administrativeData"),
+}

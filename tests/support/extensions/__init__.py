@@ -1,0 +1,1 @@
+"""What somebody's own packages add: a kind of sensor, a turner."""

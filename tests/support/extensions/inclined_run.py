@@ -1,0 +1,51 @@
+"""Dwells on an arm, with an inclinometer beside its sensors: python -m support.extensions.inclined_run FOLDER."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rig.data.recording.channel import Channel
+from rig.data.recording.events import to_line
+from rig.data.recording.layout import Contents, lay_out
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.schema import EVENTS_DTYPE, SCHEMA
+from rig.observation.observed_run import observe_run
+from rig.observation.windows import dwelt
+from rig.plans.recorded import open_run
+from support.extensions.inclinometer import INCLINATION
+from support.paths import RECORDINGS
+
+SCALE, BIAS_RAD, PER_COUNT, NOISE_RAD = np.array([1.02, 0.97]), np.array([0.004, -0.007]), 1e-5, 2e-4
+
+
+def write(folder: Path) -> None:
+    """The frozen recording's samples, and those of an inclinometer by the board's clock."""
+    run = open_run(RECORDINGS / "imu").movement[0]
+    observed = observe_run(run, run.settings.observation)
+    tilt = RecordedSensor("tilt2", "I-1", 100.0, (Channel(INCLINATION.name, "tilt", "<i4", PER_COUNT, 0.0, 10**6),))
+    beside = run.samples["gyro"]
+    samples = np.zeros(len(beside), tilt.sample_dtype)
+    for name in ("sequence", "board_time_us", "host_time_s"):
+        samples[name] = beside[name]
+    time_s, noise = observed.time_s("gyro"), np.random.default_rng(4)
+    for each in dwelt(run):
+        inside = (time_s >= each.window.start_s) & (time_s <= each.window.end_s)
+        up = observed.motion.attitude(each.window.start_s, each.window.end_s) @ [0, 0, 1]
+        readings = np.arcsin(up[:2]) / SCALE + BIAS_RAD + noise.normal(0, NOISE_RAD, (int(inside.sum()), 2))
+        samples["tilt"][inside] = np.round(readings / PER_COUNT)
+    sensors = {**run.sensors, "tilt": tilt}
+    recorded = replace(run, sensors=sensors, samples={**run.samples, "tilt": samples})
+    texts = {"config": run.config, "settings": run.settings.to_json()}
+    texts["provenance"] = json.dumps(run.provenance.document())
+    assert run.turner is not None
+    texts["turner"] = run.turner.to_json()
+    events = np.frombuffer(b"".join(map(to_line, run.events)), EVENTS_DTYPE)
+    described = {name: sensor.attributes() for name, sensor in sensors.items()}
+    lay_out(folder / "run.h5", Contents(SCHEMA, texts, described, recorded.samples, run.states, events), swmr=False)
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))

@@ -1,0 +1,1 @@
+"""Files as other programs and other people write them, sound and hostile."""

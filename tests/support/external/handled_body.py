@@ -1,0 +1,104 @@
+"""Recordings of a sensor on a box that the simulated hand turns: readings as CSV, and the truth beside them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.world.hand.habits import FLIPS, Action, Flip, Habits, Turn
+from rig.world.hand.hand import Hand
+from support.external.csv_tables import write_table
+
+TWELVE: tuple[Action, ...] = tuple(Flip(face) for face in FLIPS)
+SIX_TURNS: tuple[Action, ...] = (
+    Turn(1),
+    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (Flip(face), Turn(1))),
+)
+# Three faces, a turn either way on each.
+BOTH_WAYS: tuple[Action, ...] = (Turn(1), Turn(-1), Flip("+x"), Turn(1), Turn(-1), Flip("+y"), Turn(1), Turn(-1))
+RATE, LEVEL = ("x_rad_s", "y_rad_s", "z_rad_s"), ("x_m_s2", "y_m_s2", "z_m_s2")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A sensor as its data sheet has it, read at `rate_hz`; its clock is off by as much as `clock_ppm`."""
+
+    rate_hz: float = 119.0
+    noise_rad_s: float = 1e-3
+    noise_m_s2: float = 0.01
+    walk_rad_s_sqrt_s: float = 5e-6
+    g_sensitivity_deg_s: float = 0.03
+    nonlinearity: float = 7e-5  # of the rate at `FAST_RAD_S`, even, and odd: of a move 1e-4
+    clock_ppm: float = 20.0
+    range_rad_s: float | None = None
+
+
+LSM9DS1 = Part()
+FAST_RAD_S = np.radians(150)  # as fast as a hand turns, half of the way
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Readings (n, 3) at `time_s` (n,), the gyroscope's F (3, 3), and its bias (3,) at the end."""
+
+    time_s: Array
+    rates: Array
+    acceleration: Array
+    matrix: Array
+    bias: Array
+
+    @property
+    def truth(self) -> Array:
+        """(6,) k and b of g = K (m + b)."""
+        return np.concatenate([1 / np.linalg.norm(self.matrix, axis=1), -self.bias])
+
+
+def handle(
+    actions: Sequence[Action], seed: int, part: Part = LSM9DS1, habits: Habits | None = None, rest_s: float = 1.2
+) -> Recorded:
+    rng = np.random.default_rng(seed + 1_000_000)
+    hand, now_s = Hand(habits or Habits(), seed), 1.5
+    for action in actions:
+        now_s = hand.act(action, now_s) + rest_s
+    time_s = np.arange(0, now_s, 1 / part.rate_hz)
+    felt = hand.felt_at(time_s)
+    matrix, bias = np.eye(3) + 0.02 * rng.normal(size=(3, 3)), 0.01 * rng.normal(size=3)
+    walk = part.walk_rad_s_sqrt_s / np.sqrt(part.rate_hz) * np.cumsum(rng.normal(size=(len(time_s), 3)), axis=0)
+    sensitivity = np.radians(part.g_sensitivity_deg_s) / 9.81 * rng.normal(size=(3, 3))
+    rates = felt.rate_rad_s @ matrix.T + felt.specific_force_m_s2 @ sensitivity.T + bias + walk + felt.gyro_bias_rad_s
+    rates += bent(felt.rate_rad_s, part.nonlinearity, seed)
+    rates += part.noise_rad_s * rng.normal(size=rates.shape)
+    if part.range_rad_s is not None:
+        rates = np.clip(rates, -part.range_rad_s, part.range_rad_s)
+    level, offset = np.eye(3) + 0.01 * rng.normal(size=(3, 3)), 0.3 * rng.normal(size=3)
+    force = felt.specific_force_m_s2 @ level.T + offset + felt.accelerometer_bias_m_s2
+    force += part.noise_m_s2 * rng.normal(size=force.shape)
+    stamped = time_s * (1 + 1e-6 * part.clock_ppm * rng.uniform(-1, 1))
+    kept = ~felt.lost
+    return Recorded(stamped[kept], rates[kept], force[kept], matrix, bias + walk[-1] + felt.gyro_bias_rad_s[-1])
+
+
+def creeping(recorded: Recorded, start_s: float, end_s: float, turning_rad_s: Array) -> Recorded:
+    """The recording of a body that turned slowly (3,) where it lay; the hand turns it back as it takes it up."""
+    rates = recorded.rates.copy()
+    there = (recorded.time_s >= start_s) & (recorded.time_s <= end_s)
+    after = (recorded.time_s > end_s) & (recorded.time_s <= end_s + 0.15)
+    rates[there] += turning_rad_s
+    rates[after] -= turning_rad_s * there.sum() / after.sum()
+    return replace(recorded, rates=rates)
+
+
+def bent(rates: Array, nonlinearity: float, seed: int) -> Array:
+    """(n, 3) deviations from a straight line: each axis has an even and an odd one, of sizes of its own."""
+    even, odd = nonlinearity * np.random.default_rng(seed + 2_000_000).normal(size=(2, 3))
+    deviations: Array = rates * (even * rates / FAST_RAD_S + odd * (rates / FAST_RAD_S) ** 2)
+    return deviations
+
+
+def write(path: Path, recorded: Recorded, *, level: bool = True) -> Path:
+    """The file of `rig solve --turns`, with the accelerometer's columns or without."""
+    columns = ("time_s", *RATE, *(LEVEL if level else ()))
+    readings = np.hstack([recorded.rates, recorded.acceleration]) if level else recorded.rates
+    return write_table(path, columns, recorded.time_s, readings)

@@ -1,0 +1,1 @@
+"""Histories, their databases and those who use them."""

@@ -1,0 +1,40 @@
+"""A history whose recordings lie there: copies of frozen ones, each entered as a run of its own."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from rig.data.result_file import ResultDocument
+from rig.history.entered.finished import Finished, compact, finished_run
+from rig.history.entered.issued import Issued
+from rig.history.store import History
+from support.paths import RECORDINGS
+
+CALIBRATION = RECORDINGS / "six_observation"  # the quickest to solve: a twentieth of a second
+Change = Callable[[ResultDocument], ResultDocument]
+
+
+def keep(history: History, folder: Path, of: Path = CALIBRATION, change: Change | None = None) -> Finished:
+    """Copy recordings to `folder` and enter the result beside them, changed if so, as if begun a day after the last."""
+    shutil.copytree(of, folder)
+    run = finished_run(folder)
+    document = _later(run.document, len(list(history.kept())))
+    document = document if change is None else change(document)
+    run = replace(run, document=document, text=compact(json.loads(document.text())), certificate=None)
+    history.enter(run)
+    return run
+
+
+def certified(history: History, run: Finished, number: str, *, marks: str = "", replaces: str | None = None) -> None:
+    """Note a certificate of that run, without a mark: what is to be relied on."""
+    issued = Issued(number, "Calibration certificate", "2026-01-02", replaces, marks)
+    assert history.certify(run.content_sha256, issued)
+
+
+def _later(document: ResultDocument, days: int) -> ResultDocument:
+    started = datetime.fromisoformat(document.provenance.started_utc) + timedelta(days=days)
+    provenance = document.provenance.model_copy(update={"started_utc": started.isoformat()})
+    return document.model_copy(update={"provenance": provenance})

@@ -1,0 +1,1 @@
+"""Whole simulated laboratories, and commands and runs on them."""

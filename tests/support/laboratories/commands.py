@@ -1,0 +1,68 @@
+"""The command line as somebody types it, on fast simulated laboratories of their own."""
+
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rig.cli import main
+from rig.config.load import load
+from support.laboratories.worlds import fresh_host, merge
+from support.paths import CONFIGS
+from support.processes.waiting import PATIENCE_S, wait_for
+from support.processes.warm import started
+
+CI = CONFIGS / "ci.yaml"
+
+
+def rig(
+    *arguments: str | Path, timeout_s: float = PATIENCE_S, stdin: int = subprocess.DEVNULL
+) -> subprocess.CompletedProcess[str]:
+    """`rig …`, until it has ended."""
+    with started(*arguments, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            said, errors = process.communicate(timeout=timeout_s)
+        finally:
+            process.kill()
+    return subprocess.CompletedProcess([*map(str, arguments)], process.returncode, said, errors)
+
+
+def python(*arguments: str | Path, timeout_s: float = PATIENCE_S) -> subprocess.CompletedProcess[str]:
+    """`python …`, until it has ended."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
+
+
+def rig_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """`rig …` without a process of its own, which saves a second: for commands that only read and reckon."""
+    said, errors = StringIO(), StringIO()
+    words = [*map(str, arguments)]
+    with redirect_stdout(said), redirect_stderr(errors):
+        status = main(words)
+    return subprocess.CompletedProcess(words, status, said.getvalue(), errors.getvalue())
+
+
+def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
+    """ci.yaml on an address of its own, with changes, or with another `procedure` altogether."""
+    host = fresh_host()
+    address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
+    document = merge(merge(yaml.safe_load(load(CI).text), address), changes or {})
+    if procedure is not None:
+        document["procedure"] = procedure
+    path = folder / "config.yaml"
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def wait_for_log(folder: Path, words: str, times: int = 1) -> None:
+    """Until the run's log says so, so many times."""
+    log = folder / "log.txt"
+
+    def said() -> bool:
+        return log.exists() and log.read_text(encoding="utf-8").count(words) >= times
+
+    wait_for(said, f"{words!r} in {log}")

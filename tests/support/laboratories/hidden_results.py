@@ -1,0 +1,157 @@
+"""What recordings of hidden worlds say, held against the truth that was drawn for them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from rig.analysis.check import Check
+from rig.analysis.estimators import DEFAULT_ESTIMATOR
+from rig.analysis.outcome import Outcome
+from rig.analysis.reference.acceleration import AccelerometerResult
+from rig.config.load import parse
+from rig.config.world.laboratory import SimulatedSensorSection
+from rig.errors import RigError
+from rig.estimation.gyroscope.budget import Budget
+from rig.observation.observed_run import ObservedRun
+from rig.plans.recorded import judged, open_run
+from rig.world.section import world_section
+from support.laboratories.drawn_laboratory import bias_at_0_g, truth
+
+SCALE, BIAS = "gyroscope scale", "gyroscope bias"
+OF_GRAVITY = "accelerometer scale", "accelerometer bias"
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """Three values of one sensor: how far they are from the truth, their u and their U, each (3,)."""
+
+    part: str
+    parameter: str
+    error: np.ndarray
+    std: np.ndarray
+    expanded: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A solved recording: what it states, its checks, and the name of the fault it ended in, if any."""
+
+    folder: Path
+    stated: tuple[Stated, ...]
+    checks: tuple[Check, ...]
+    fault: str | None
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Why it did not pass; an undamaged one has nothing here."""
+        failed = tuple(check.name for check in self.checks if not check.passed)
+        return failed if self.fault is None else (self.fault, *failed)
+
+
+def solved(folder: Path) -> Judged:
+    """The run in `folder`/run, whose laboratory is `folder`/config.yaml, solved by the code as it is now."""
+    document: dict[str, Any] = yaml.safe_load((folder / "config.yaml").read_text(encoding="utf-8"))
+    try:
+        outcome = judged(open_run(folder / "run"), DEFAULT_ESTIMATOR)
+    except RigError as error:
+        return Judged(folder, (), (), error.name)
+    return Judged(folder, tuple(_stated(outcome, document)), outcome.checks, None)
+
+
+def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
+    (recording,) = outcome.recordings
+    for name, result in outcome.results.items():
+        if name not in outcome.settings.to_calibrate:
+            continue
+        assert result.uncertainty is not None
+        speed_rad_s = float(np.mean([each.speed_rad_s for each in result.observations]))
+        true = true_gyroscope(document, name, recording, speed_rad_s)
+        found = np.concatenate([result.scale, result.bias_rad_s])
+        yield from _split(result.sensor.part, (SCALE, BIAS), found - true, result.uncertainty)
+    for name, accelerometer in outcome.accelerometers.items():
+        assert accelerometer.budget is not None
+        found = np.concatenate([accelerometer.triad.scale, accelerometer.bias_m_s2])
+        error = found - true_accelerometer(document, name, accelerometer)
+        yield from _split(accelerometer.sensor.part, OF_GRAVITY, error, accelerometer.budget)
+
+
+def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRun, speed_rad_s: float) -> np.ndarray:
+    """(6,) the scale over the times of the sweeps, the bias over the whole time that anything was averaged."""
+    seen = recording.sensors[name]
+    sweeps = [(turn.average.start_s, turn.average.end_s) for turn in seen.revolutions]
+    averages = [*sweeps, *((rest.start_s, rest.end_s) for rest in seen.rests)]
+    whole = min(start_s for start_s, _ in averages), max(end_s for _, end_s in averages)
+    scale = truth(document, name, sweeps, speed_rad_s)[:3]
+    return np.concatenate([scale, truth(document, name, [whole], speed_rad_s)[3:]])
+
+
+def true_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
+    """(6,) the scale of the readings at 1 g up and down, the bias of that at 0 g, as warm as in the mean of the dwells.
+
+    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. A bias that wanders is its mean
+    over the dwells.
+    """
+    sensor = world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
+    drawn = sensor.accelerometer
+    at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
+    warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))
+    scale = np.array(drawn.scale) * (1 + warmer_k * np.array(drawn.scale_per_k))
+    windows_s = sorted((dwell.window.start_s, dwell.window.end_s) for dwell in found.dwells)
+    return np.concatenate([scale, bias_at_0_g(document, name, windows_s)])
+
+
+def _warmer_k(sensor: SimulatedSensorSection, time_s: float) -> float:
+    """Than where its errors hold, `temperature_c`, of a part that gets power at zero."""
+    if sensor.start_temperature_c is None:
+        return 0.0
+    return float((sensor.start_temperature_c - sensor.temperature_c) * np.exp(-time_s / sensor.warm_up_s))
+
+
+def _split(part: str, names: Sequence[str], error: np.ndarray, budget: Budget) -> Iterable[Stated]:
+    for name, axes in zip(names, (slice(0, 3), slice(3, 6)), strict=True):
+        yield Stated(part, name, error[axes], budget.std[axes], budget.expanded[axes])
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """How what was stated of one kind of parameter holds: what a line of the table says."""
+
+    values: int
+    rms: float
+    within: float
+    largest: float
+    std: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        low, middle, high = self.std
+        return (
+            f"{self.values:4d} values: RMS {self.rms:.2f} u, {100 * self.within:5.1f} % within U, "
+            f"largest {self.largest:.2f} U; u {low:.3g}, {middle:.3g}, {high:.3g} ({high / low:.1f}-fold)"
+        )
+
+
+def held(runs: Iterable[Judged]) -> dict[tuple[str, str], Held]:
+    """By part and parameter."""
+    found: dict[tuple[str, str], list[Stated]] = {}
+    for run in runs:
+        for each in run.stated:
+            found.setdefault((each.part, each.parameter), []).append(each)
+    return {key: _held(each) for key, each in sorted(found.items())}
+
+
+def _held(stated: Sequence[Stated]) -> Held:
+    error, std, expanded = (
+        np.concatenate(each) for each in zip(*((one.error, one.std, one.expanded) for one in stated), strict=True)
+    )
+    beyond = np.abs(error) / expanded
+    return Held(
+        len(error),
+        float(np.sqrt(np.mean((error / std) ** 2))),
+        float(np.mean(beyond <= 1)),
+        float(beyond.max()),
+        (float(std.min()), float(np.median(std)), float(std.max())),
+    )

@@ -1,0 +1,279 @@
+"""Many calibrations in a row in one laboratory: what each found, and what it left behind in the processes that stay.
+
+Two processes live all the time: the world, and a station, which is one interpreter that is given one command line of
+`rig` after the other, as a notebook or a script in a laboratory does. Some runs are commands in processes of their own.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from scipy import stats
+
+from firmware_host.client import Board, BoardStatus
+from firmware_host.protocol import BAUD_RATE
+from rig.data.recording.run_file import read_run
+from rig.data.result_file import read_result
+from support.fault_matrix.setups import COVERAGE, SETUPS, errors_in_u
+from support.laboratories.worlds import WorldHandle, hardware, merge, worlds
+
+SETUP = merge(SETUPS["six_observation"], {"world": {"time_scale": 50}})
+PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
+OWN_EVERY, STORED_EVERY = 4, 10  # of so many runs one is a process of its own; one is stored on the board
+WRAP_US = 1 << 32  # of the board's counter
+GROWTH_MAX = 0.05
+WITHIN_U = 5.0  # of the truth
+END_S = 300.0
+
+# Replies go to what was its standard output; what the commands print does not.
+STATION = """
+import json, os, sys
+replies = os.fdopen(os.dup(1), "w")
+os.dup2(2, 1)
+from rig.cli import main
+for line in sys.stdin:
+    replies.write(f"{main(json.loads(line))}\\n")
+    replies.flush()
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """What a process holds: resident memory (bytes), threads, child processes, and its open files by kind."""
+
+    rss: int
+    threads: int
+    children: int
+    files: Counter[str]
+
+    @classmethod
+    def of(cls, pid: int) -> Self:
+        """Of a process that runs."""
+        process = Path("/proc") / str(pid)
+        memory = (process / "smaps_rollup").read_text().splitlines()
+        rss_kib = next(line.split()[1] for line in memory if line.startswith("Rss:"))
+        files: Counter[str] = Counter()
+        for link in (process / "fd").iterdir():
+            files[str(link.readlink()).split(":[")[0]] += 1
+        tasks = list((process / "task").iterdir())
+        children = sum(len((task / "children").read_text().split()) for task in tasks)
+        return cls(int(rss_kib) * 1024, len(tasks), children, files)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """One run: how it ended, what it found with which standard uncertainty, the board times (µs) of its samples."""
+
+    number: int
+    in_station: bool
+    status: int
+    wall_s: float
+    found: tuple[float, ...] = ()
+    std: tuple[float, ...] = ()
+    error_u: float = 0.0
+    board_us: tuple[int, int] = (0, 0)
+    world: Footprint | None = None
+    station: Footprint | None = None
+
+    @property
+    def wraps(self) -> int:
+        """How often the board's counter wrapped while it sampled."""
+        return self.board_us[1] // WRAP_US - self.board_us[0] // WRAP_US
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """All of it, and what the board said of itself before the first run and after the last."""
+
+    runs: Sequence[Calibration]
+    board: tuple[BoardStatus, BoardStatus]
+
+    @property
+    def wraps(self) -> int:
+        """How often the board's counter wrapped in all."""
+        return int(self.board[1].uptime_s * 1e6) // WRAP_US
+
+
+class Station:
+    """One rig process that carries out one command after the other."""
+
+    def __init__(self, log: Path, history: Path) -> None:
+        self._log = log.open("w", encoding="utf-8")
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", STATION],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            text=True,
+            env={**os.environ, "RIG_HISTORY": str(history)},
+        )
+        self.pid = self._process.pid
+
+    def rig(self, *arguments: str) -> int:
+        """The exit status of `rig` with these arguments."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write(json.dumps(arguments) + "\n")
+        self._process.stdin.flush()
+        return int(self._process.stdout.readline() or self._process.wait(END_S))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.communicate()
+        self._log.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """A laboratory with a station in it: where runs are written, and by which configuration."""
+
+    folder: Path
+    config: Path
+    world: WorldHandle
+    station: Station
+    history: Path
+
+
+def live(folder: Path, runs: int) -> Iterator[Calibration | Life]:
+    """So many runs in one laboratory: each when it has ended, all of them in the end.
+
+    Before the third the laboratory waits for so long that the board's counter should wrap in the middle of it.
+    """
+    done: list[Calibration] = []
+    history = folder / "history.sqlite"
+    with worlds(folder) as start, Station(folder / "station.log", history) as station:
+        world = start(SETUP)
+        config = hardware(world.config_path, folder)
+        bench = Bench(folder, config, world, station, history)
+        before = _status(world)
+        for number in range(runs):
+            began_s = float(world.state()["time_s"])
+            done.append(_run(bench, number))
+            yield done[-1]
+            if number == 1:
+                _wait_until(world, WRAP_US * 1e-6 - (sum(done[-1].board_us) / 2e6 - began_s))
+        yield Life(done, (before, _status(world)))
+
+
+def _wait_until(world: WorldHandle, time_s: float) -> None:
+    """Let the world's time pass as fast as it can."""
+    left_s = time_s - float(world.state()["time_s"])
+    if left_s > 0.0:
+        world.control({"do": "pace", "time_scale": 1000.0})
+        while left_s > 0.0:  # a piece at a time, each answered before patience ends
+            world.control({"do": "advance", "duration_s": min(left_s, 200.0)})
+            left_s -= 200.0
+        world.control({"do": "pace", "time_scale": SETUP["world"]["time_scale"]})
+        world.control({"do": "run"})
+
+
+def _run(bench: Bench, number: int) -> Calibration:
+    out, in_station = bench.folder / f"run-{number:03}", number % OWN_EVERY != OWN_EVERY - 1
+    arguments = ["run", str(bench.config), "--out", str(out), "--yes"]
+    began_s = time.monotonic()
+    if in_station:
+        status = bench.station.rig(*arguments)
+    else:
+        with (bench.folder / "processes.log").open("a", encoding="utf-8") as log:
+            status = subprocess.run(
+                [sys.executable, "-m", "rig", *arguments],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, timeout=END_S, check=False,
+                env={**os.environ, "RIG_HISTORY": str(bench.history)},
+            ).returncode  # fmt: skip
+    if status == 0 and number % STORED_EVERY == 0:
+        status = bench.station.rig("board", "calibration", "write", str(bench.config), str(out), "--yes")
+    wall_s = time.monotonic() - began_s
+    if status != 0:
+        return Calibration(number, in_station, status, wall_s)
+    gyro = read_result(out).gyroscopes["gyro"]
+    times_us = read_run(out / "run.h5").samples["gyro"]["board_time_us"]
+    bench.world.state()  # it has heard by now that the rig has hung up
+    return Calibration(
+        number, in_station, status, wall_s,
+        found=(*gyro.scale, *gyro.bias_rad_s),
+        std=tuple(np.sqrt(np.diag(np.array(gyro.covariance))).tolist()),
+        error_u=errors_in_u(out),
+        board_us=(int(times_us.min()), int(times_us.max())),
+        world=Footprint.of(bench.world.process.pid),
+        station=Footprint.of(bench.station.pid),
+    )  # fmt: skip
+
+
+def _status(world: WorldHandle) -> BoardStatus:
+    with Board(world.board_port, BAUD_RATE, lambda batch: None) as board:
+        return board.status()
+
+
+# -- what is not as it should be -------------------------------------------------------------------------------------
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One parameter over the runs: its mean, slope per run with its standard uncertainty, and its spread.
+
+    `chi2` is the sum of squared distances from the mean in stated standard uncertainties; of `freedom` degrees.
+    """
+
+    name: str
+    mean: float
+    slope: float
+    slope_std: float
+    chi2: float
+    freedom: int
+
+
+def courses(runs: Sequence[Calibration]) -> list[Course]:
+    """Of all parameters, over the runs that passed; the slope's uncertainty from what the runs scatter."""
+    number = np.array([run.number for run in runs], float)
+    found, std = np.array([run.found for run in runs]), np.array([run.std for run in runs])
+    away = number - number.mean()
+    courses = []
+    for index, name in enumerate(PARAMETERS):
+        values = found[:, index]
+        slope = float(away @ values / (away @ away))
+        rest = values - values.mean() - slope * away
+        slope_std = float(np.sqrt(rest @ rest / (len(runs) - 2) / (away @ away)))
+        chi2 = float((((values - values.mean()) / std[:, index]) ** 2).sum())
+        courses.append(Course(name, float(values.mean()), slope, slope_std, chi2, len(runs) - 1))
+    return courses
+
+
+def complaints(life: Life, warm_up: int, sigma: float = 3.0) -> list[str]:
+    """What is not as promised after the first `warm_up` runs; chance deviates by `sigma` as often as a normal does."""
+    found = [f"run {run.number} ended with status {run.status}" for run in life.runs if run.status]
+    if found:
+        return found
+    tail = float(stats.norm.sf(sigma))
+    for course in courses(life.runs):
+        if abs(course.slope) > stats.t.isf(tail, course.freedom - 1) * course.slope_std:
+            found.append(f"{course.name} drifts by {course.slope:.2g} ± {course.slope_std:.2g} a run")
+        low, high = stats.chi2.isf(1 - tail, course.freedom), stats.chi2.isf(tail, course.freedom)
+        if not low < course.chi2 < high:
+            found.append(f"{course.name} scatters by χ² = {course.chi2:.0f} of {course.freedom} about its mean")
+    found += [
+        f"run {run.number} is {run.error_u:.1f} U (k = {COVERAGE:g}) from the truth"
+        for run in life.runs
+        if run.error_u > WITHIN_U
+    ]
+    for name in ("world", "station"):
+        warm, last = (getattr(life.runs[index], name) for index in (warm_up, -1))
+        if last.rss > warm.rss * (1 + GROWTH_MAX):
+            found.append(f"the {name} has grown from {warm.rss / 2**20:.1f} to {last.rss / 2**20:.1f} MiB")
+        if (last.files, last.threads, last.children) != (warm.files, warm.threads, warm.children):
+            found.append(f"the {name} held {warm} and holds {last}")
+    before, after = life.board
+    if after.uptime_s <= before.uptime_s or after.reset_cause != before.reset_cause:
+        found.append(f"the board was reset: {before}, {after}")
+    if after.tx_overruns or after.bus_errors or after.rx_errors or after.fault_pc:
+        found.append(f"the board counts errors: {after}")
+    return found

@@ -1,0 +1,80 @@
+"""A script in place of the scanner and the operator: types at a station's terminal, and reads what it is told."""
+
+import os
+import pty
+import subprocess
+import termios
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from support.processes.waiting import PATIENCE_S
+from support.processes.warm import started
+
+
+class Scanner:
+    """At a station that was started with a terminal for its standard input."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", terminal: int) -> None:
+        self.process = process
+        self._terminal = terminal
+        self._told = ""
+        self._read = 0  # what was waited for already ends here
+        self._over = False  # it says no more
+        self._more = threading.Condition()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def types(self, line: str) -> None:
+        """A line and Enter."""
+        os.write(self._terminal, f"{line}\n".encode())
+
+    def waits_for(self, words: str) -> None:
+        """Until that is said, after what was waited for before."""
+        self._read = self.sees(words)
+
+    def sees(self, words: str) -> int:
+        """Until that is said; it can be waited for again."""
+        with self._more:
+            self._more.wait_for(lambda: self._end(words) >= 0 or self._over, PATIENCE_S)
+            end = self._end(words)
+            assert end >= 0, f"{words!r} not said after:\n{self._told[max(0, self._read - 2000) :]}"
+            return end
+
+    def said(self, words: str) -> bool:
+        """Whether it was said, ever."""
+        with self._more:
+            return words in self._told
+
+    def _end(self, words: str) -> int:
+        """Where they end, after what was read; -1 where they are not there."""
+        at = self._told.find(words, self._read)
+        return at + len(words) if at >= 0 else -1
+
+    def _listen(self) -> None:
+        assert self.process.stderr is not None
+        while data := os.read(self.process.stderr.fileno(), 65536):
+            with self._more:
+                self._told += data.decode(errors="replace")
+                self._more.notify_all()
+        with self._more:
+            self._over = True
+            self._more.notify_all()
+
+
+@contextmanager
+def station(*arguments: str | Path, start: Callable[..., "subprocess.Popen[Any]"] = started) -> Iterator[Scanner]:
+    """`rig station …`, ended by force if it has not ended by itself when the block does."""
+    terminal, far_end = pty.openpty()
+    modes = termios.tcgetattr(far_end)
+    modes[3] &= ~termios.ECHO
+    termios.tcsetattr(far_end, termios.TCSANOW, modes)
+    with start("station", *arguments, stdin=far_end, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        os.close(far_end)
+        try:
+            yield Scanner(process, terminal)
+        finally:
+            process.kill()
+            process.wait()
+            os.close(terminal)

@@ -1,0 +1,181 @@
+"""Sweeps and dwells of a UR10e that carries an accelerometer: what it feels, from where its flange goes.
+
+The acceleration comes from second differences of the flange's way through the arm as it is; nothing is shared with the
+closed forms of `rig.estimation.reference.accelerometer_model`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rig.config.load import parse
+from rig.config.procedures.procedure_sections import SixSweepsSection
+from rig.estimation.arrays import Array
+from rig.estimation.reference.accelerometer_model import Dwells, Sweeps
+from rig.estimation.reference.sweep_harmonics import evenly_turning
+from rig.motion.geometry import flange_arm, flange_axes, flange_pose
+from rig.motion.steps import Sweep
+from rig.plans.motions.six_sweeps import plan_six_observation
+from support.recordings.synthetic_run import CONFIG
+
+Poses = Callable[[Array], Array]  # of the flange (n, 4, 4), at joint angles (n, 6)
+
+STEP_RAD = 1e-3  # of the second differences
+POINTS = 360  # of a turn
+DWELL_S = 3.0
+MICRO_G = 9.80665e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """An accelerometer on the flange of an arm: F (3, 3), b, v_ref, r, τ."""
+
+    matrix: Array
+    bias_m_s2: Array
+    reference_m_s2: Array
+    lever_arm_m: Array
+    delay_s: float
+
+    def theta(self) -> Array:
+        """(22,) as `rig.estimation.reference.accelerometer_model` orders it."""
+        return np.concatenate(
+            [self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2, self.lever_arm_m, [self.delay_s], np.zeros(3)]
+        )
+
+
+@cache
+def planned(axes: int, speed_deg_s: float = 60.0) -> tuple[Sweep, ...]:
+    """The sweeps of the procedure about three or six axes."""
+    text = CONFIG.format(
+        speed_deg_s=speed_deg_s, rest_s=0.0, repeats=1, part="lsm9ds1", procedure=f", axes: {axes}", uncertainty=""
+    )
+    config = parse(text).config
+    assert isinstance(config.procedure, SixSweepsSection)
+    plan = plan_six_observation(config.arm, config.procedure)
+    return tuple(step for step in plan.steps if isinstance(step, Sweep))
+
+
+def signed_speed(sweep: Sweep) -> float:
+    """rad/s of the joint."""
+    return sweep.speed_rad_s if sweep.direction == "ccw" else -sweep.speed_rad_s
+
+
+def joints_at(sweep: Sweep, angle_rad: Array) -> Array:
+    """(n, 6) with the swept joint turned by angles (n,) from the revolution's lower end."""
+    joints = np.tile(sweep.start_q_rad, (len(angle_rad), 1))
+    joints[:, sweep.joint] = sweep.revolution_rad[0] + angle_rad
+    return joints
+
+
+def specific_force(
+    poses: Poses, sweep: Sweep, motion: tuple[Array, Array, Array], reference_m_s2: Array, lever_arm_m: Array
+) -> Array:
+    """(n, 3) in the flange's frame, of a sensor there, by the joint's angle, speed and acceleration, each (n,)."""
+    angle, speed, acceleration = motion
+    before, here, after = (poses(joints_at(sweep, angle + step)) for step in (-STEP_RAD, 0.0, STEP_RAD))
+    way = [each[:, :3, :3] @ lever_arm_m + each[:, :3, 3] for each in (before, here, after)]
+    slope, bend = (way[2] - way[0]) / (2 * STEP_RAD), (way[2] - 2 * way[1] + way[0]) / STEP_RAD**2
+    moved = acceleration[:, None] * slope + speed[:, None] ** 2 * bend
+    felt: Array = np.einsum("nji,nj->ni", here[:, :3, :3], moved + reference_m_s2)
+    return felt
+
+
+def recorded_sweeps(
+    truth: Truth, poses: Poses, sweeps: tuple[Sweep, ...], density_ug: float, rng: np.random.Generator
+) -> Sweeps:
+    """The first harmonics of evenly turning sweeps, with white noise of µg/√Hz."""
+    harmonics, covariances = [], []
+    angle = np.arange(POINTS) * 2 * np.pi / POINTS
+    columns = np.column_stack([np.full(POINTS, 0.5), np.cos(angle), np.sin(angle)]) * 2 / POINTS
+    for sweep in sweeps:
+        speed = signed_speed(sweep)
+        motion = angle - speed * truth.delay_s, np.full(POINTS, speed), np.zeros(POINTS)
+        s = specific_force(poses, sweep, motion, truth.reference_m_s2, truth.lever_arm_m)
+        variance = (density_ug * MICRO_G) ** 2 * sweep.speed_rad_s / (2 * np.pi) * np.repeat([1.0, 2.0, 2.0], 3)
+        m = columns.T @ (s @ truth.matrix.T + truth.bias_m_s2)
+        harmonics.append(m + (np.sqrt(variance) * rng.normal(size=9)).reshape(3, 3))
+        covariances.append(np.diag(variance))
+    return with_readings(np.array(harmonics), np.array(covariances), sweeps)
+
+
+def with_readings(harmonics: Array, covariances: Array, sweeps: tuple[Sweep, ...]) -> Sweeps:
+    """What the arm's own account says of its sweeps."""
+    joints = np.array([joints_at(sweep, np.zeros(1))[0] for sweep in sweeps])
+    places = np.arange(len(sweeps)), slice(None), [sweep.joint for sweep in sweeps]
+    poses = flange_pose(joints)
+    return Sweeps(
+        harmonics_m_s2=harmonics,
+        covariances_m2_s4=covariances,
+        axes_flange=flange_axes(joints)[places],
+        speeds_rad_s=np.array([signed_speed(sweep) for sweep in sweeps]),
+        turning_rad2_s2=np.array([evenly_turning(sweep.speed_rad_s) for sweep in sweeps]),
+        attitudes=poses[:, :3, :3],
+        arms_m=np.array([flange_arm(q, sweep.joint) for q, sweep in zip(joints, sweeps, strict=True)]),
+        stations=np.unique(np.round(joints, 3), axis=0, return_inverse=True)[1],
+    )
+
+
+def recorded_dwells(truth: Truth, poses: Poses, joints: Array, density_ug: float, rng: np.random.Generator) -> Dwells:
+    """Rests at joint angles (N, 6), with white noise of µg/√Hz."""
+    std = density_ug * MICRO_G / np.sqrt(DWELL_S)
+    felt = np.einsum("nji,j->ni", poses(joints)[:, :3, :3], truth.reference_m_s2)
+    readings = felt @ truth.matrix.T + truth.bias_m_s2
+    told = flange_pose(joints)[:, :3, :3]
+    return Dwells(readings + std * rng.normal(size=readings.shape), np.full_like(readings, std**2), told)
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How a revolution is sampled, and what is not ideal in it.
+
+    Each sample has the noise `noise_m_s2`; the servo's ripple is `vibration` of the rate, so many `cycles` in a
+    turn; the arm's states come `state_rate_hz` times a second with angles in steps of `encoder_step_rad`; the samples'
+    times, on the arm's clock, are late by `clock_error_s`.
+    """
+
+    noise_m_s2: float
+    rate_hz: float = 238.0
+    state_rate_hz: float = 125.0
+    vibration: float = 0.05
+    cycles: tuple[int, ...] = (18, 31, 50)
+    encoder_step_rad: float = 6e-6
+    clock_error_s: float = 2e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Of one revolution: time (n,), readings (n, 3), and the joint's angle and speed (n,) as the arm's states tell."""
+
+    time_s: Array
+    readings_m_s2: Array
+    angle_rad: Array
+    speed_rad_s: Array
+
+
+def recorded_samples(truth: Truth, poses: Poses, sweep: Sweep, sampling: Sampling, rng: np.random.Generator) -> Samples:
+    """A revolution as it is recorded."""
+    phases, speed = rng.uniform(0, 2 * np.pi, len(sampling.cycles)), signed_speed(sweep)
+
+    def motion(time_s: Array) -> tuple[Array, Array, Array]:
+        """The joint's angle, speed, acceleration: a ripple locked to the angle it is driven by."""
+        smooth, share = np.pi + speed * time_s, sampling.vibration * np.sqrt(2 / len(sampling.cycles))
+        waves = [(cycles, cycles * smooth + phase) for cycles, phase in zip(sampling.cycles, phases, strict=True)]
+        return (
+            smooth + sum(share / cycles * np.sin(wave) for cycles, wave in waves),
+            speed * (1 + sum(share * np.cos(wave) for _, wave in waves)),
+            -(speed**2) * sum(share * cycles * np.sin(wave) for cycles, wave in waves),
+        )
+
+    half_s = np.pi / sweep.speed_rad_s
+    states_s = np.arange(-half_s - 0.5, half_s + 0.5, 1 / sampling.state_rate_hz)
+    step = sampling.encoder_step_rad
+    told = CubicSpline(states_s, np.round(motion(states_s)[0] / step) * step)
+    true_s = np.arange(-half_s - 0.1, half_s + 0.1, 1 / sampling.rate_hz)
+    time_s = true_s + sampling.clock_error_s
+    inside = (told(time_s) >= 0) & (told(time_s) < 2 * np.pi)
+    felt = specific_force(poses, sweep, motion(true_s[inside] - truth.delay_s), truth.reference_m_s2, truth.lever_arm_m)
+    readings = felt @ truth.matrix.T + truth.bias_m_s2 + sampling.noise_m_s2 * rng.normal(size=felt.shape)
+    return Samples(time_s[inside], readings, told(time_s[inside]), told(time_s[inside], 1))

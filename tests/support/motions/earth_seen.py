@@ -1,0 +1,214 @@
+"""What a gyroscope on a UR10e sees of the Earth, in sweeps and in attitudes, on an arm that is not what it says.
+
+The flange's mean rates come from differences of its attitudes along the way through the arm as it is; nothing is shared
+with the estimator but the plan and the arm's own account.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rig.analysis.gyroscope.vector_inputs import WAVE_SHARE
+from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.estimation.arrays import Array
+from rig.estimation.gyroscope.earth_rate import DEG_H
+from rig.estimation.gyroscope.vector_fit import Seen
+from rig.estimation.statistics.rounding import Steps
+from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
+from rig.motion.steps import Sweep
+from rig.observation.statistics.mean import tapered_mean
+from rig.observation.statistics.tapered_weights import flank_s
+from rig.observation.windows import Window
+from rig.study.rate_table import GYRO_BIAS_RAD_S, GYRO_MATRIX
+from support.motions.arm_attitudes import crooked_arm, joints_rad
+from support.motions.arm_sweeps import joints_at, planned, signed_speed
+
+EARTH_RAD_S = 7.292115e-5
+LATITUDE_RAD = float(np.radians(38.777888))  # TRIAX, section II-A
+UP = np.array([0.0, 0.0, 1.0])
+HOME_RAD = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])
+POINTS = 180  # of a turn
+PAUSE_S = 2.0
+REST_S = 3.0
+VIBRATION_HZ, SAMPLES_HZ = 14.0, 250.0  # of configs/own_port/kvh1775_earth.yaml
+ARM_RAD = 6e-4  # half of what `uncertainty.axis_deg` allows, as a standard deviation
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A gyroscope's angle random walk (rad/√s), and how its bias wanders.
+
+    `scatter_rad_s` from one average to the next, `walk_rad_s_sqrt_s`, and steadily by `warming_rad_s_s`.
+    """
+
+    density: float
+    scatter_rad_s: float
+    walk_rad_s_sqrt_s: float
+    warming_rad_s_s: float = 0.0
+
+
+# TRIAX, table 1; scatter and walk are assumed, below the maker's bias instability of 0.05 °/h.
+KVH1775 = Part(0.012 * 60 * DEG_H, 0.03 * DEG_H, 0.002 * DEG_H)
+# 0.01 °/s/√Hz (PS-MPU-9250A-01, 3.1); a kelvin moves its bias by 864 °/h, and a run of minutes warms it by 0.03 K.
+MPU9250 = Part(0.01 * 3600 * DEG_H, 10 * DEG_H, 1.0 * DEG_H, 0.15 * DEG_H)
+LSM9DS1 = Part(0.008 * 3600 * DEG_H, 10 * DEG_H, 2.0 * DEG_H, 0.15 * DEG_H)
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What is done: sweeps about so many axes, with rests, then dwells of `dwell_s` (none for 0).
+
+    The arm: geometry and encoders off by `arm_rad`, hysteresis between both directions, turns timed to `timing_s` at
+    either end, axes that lean by `leaning_rad` for each sweep anew, a vibration about each of the flange's axes, RMS.
+    """
+
+    part: Part = KVH1775
+    axes: int = 3
+    dwell_s: float = 10.0
+    arm_rad: float = ARM_RAD
+    hysteresis_rad: float = 1e-4
+    timing_s: float = 2e-5
+    leaning_rad: float = 5e-5
+    vibration_rad_s: float = 0.0
+    g_sensitivity_rad_s_g: tuple[float, ...] = (0.0,) * 9
+    earth_rad_s: float = EARTH_RAD_S
+    wrists_deg: tuple[tuple[float, float, float], ...] = EIGHTEEN
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """`earth_rad_s` (3,) in the base's frame, `heading_rad` of its x axis, c (3,) as the mean over the run."""
+
+    earth_rad_s: Array
+    heading_rad: float
+    bias_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A sweep or a rest: how long; the true mean rate against the room; the mean attitude, true and told; and the
+    arm's account of the turn, with what its own errors do to it."""
+
+    duration_s: float
+    rate_rad_s: Array
+    attitude: Array
+    told: Array
+    turn_rad_s: Array
+    axis_errors_rad_s: Array
+    joint: str | None
+
+
+def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
+    """What the rig makes of one session of an arm and a gyroscope drawn by `seed`: sweeps first, as they were made."""
+    rng = np.random.default_rng(seed)
+    poses = crooked_arm(session.arm_rad, rng)
+    heading = rng.uniform(0, 2 * np.pi)
+    north = np.array([np.cos(heading), np.sin(heading), 0.0])
+    earth = session.earth_rad_s * (np.cos(LATITUDE_RAD) * north + np.sin(LATITUDE_RAD) * UP)
+    sweeps = list(_sweeps(session, poses, rng))
+    rests = list(_rests(session, poses, rng))
+    stretches = [*sweeps, *rests]
+
+    lengths = np.array([each.duration_s for each in stretches])
+    turns = len(sweeps)
+    places = [place for pair in zip(range(turns), range(turns, 2 * turns), strict=True) for place in pair]
+    places += range(2 * turns, len(stretches))  # a rest after each sweep, then dwells
+    starts = np.zeros(len(stretches))
+    starts[places] = np.cumsum([0.0, *(lengths[places[:-1]] + PAUSE_S)])
+    windows = np.column_stack([starts, starts + lengths])
+
+    attitudes = np.array([each.attitude for each in stretches])
+    told = np.array([each.told for each in stretches])
+    wandered, whole = _wandering(session.part, windows, rng)
+    rates = np.array([each.rate_rad_s for each in stretches]) + attitudes @ earth
+    pulled = attitudes @ -UP @ np.reshape(session.g_sensitivity_rad_s_g, (3, 3)).T
+    means = rates @ GYRO_MATRIX.T + pulled + GYRO_BIAS_RAD_S + wandered
+    variances = np.repeat((session.part.density**2 / lengths)[:, None], 3, axis=1)
+    std = ARM_RAD * np.array([1.0 if name.startswith(("twist", "zero")) else WAVE_SHARE for name in AXIS_ERRORS])
+    if session.vibration_rad_s:
+        noise, variances, windows = _vibrating(session, windows, turns, rng)
+    else:
+        noise = np.sqrt(variances) * rng.normal(size=means.shape)
+    seen = Seen(
+        means_rad_s=means + noise,
+        variances_rad2_s2=variances,
+        turns_rad_s=np.array([each.turn_rad_s for each in stretches]),
+        earth_rate_rad_s=np.zeros(3),
+        speed_std_rad_s=np.zeros(len(means)),
+        attitudes=told,
+        gravity_m_s2=9.80665 * told @ -UP,
+        windows_s=windows,
+        joints=tuple(each.joint for each in stretches),
+        axis_errors_rad_s=std[:, None, None] * np.stack([each.axis_errors_rad_s for each in stretches], axis=1),
+    )
+    return seen, Truth(earth, heading, GYRO_BIAS_RAD_S + whole)
+
+
+@cache
+def _turns(axes: int) -> tuple[tuple[Sweep, float, Array, Array, Array], ...]:
+    """Each sweep, its signed speed, its joint angles (POINTS + 1, 6), its axis and mean attitude as told by the arm."""
+    angles = np.linspace(0, 2 * np.pi, POINTS + 1)
+    found = []
+    for sweep in planned(axes):
+        way = joints_at(sweep, angles)
+        told = np.swapaxes(flange_pose(way[:-1])[:, :3, :3], -1, -2).mean(axis=0)
+        found.append((sweep, signed_speed(sweep), way, flange_axes(way[:1])[0, :, sweep.joint], told))
+    return tuple(found)
+
+
+def _sweeps(session: Session, poses: Callable[[Array], Array], rng: np.random.Generator) -> Iterator[Stretch]:
+    for sweep, speed, told_way, axis, told in _turns(session.axes):
+        way, forwards = told_way.copy(), 1 if speed > 0 else -1
+        way[:, sweep.joint] += forwards * session.hysteresis_rad / 2
+        along = poses(way)[::forwards, :3, :3]
+        steps = Rotation.from_matrix(np.swapaxes(along[:-1], -1, -2) @ along[1:])
+        halfway = along[:-1] @ (steps**0.5).as_matrix()
+        duration = 2 * np.pi / abs(speed)
+        rate = steps.as_rotvec().sum(axis=0) / duration
+        rate = rate + np.cross(session.leaning_rad * rng.normal(size=3), rate)
+        late = np.sqrt(2) * session.timing_s / duration * rng.normal()
+        errors = speed * axis_errors(told_way[0], sweep.joint)
+        attitude = np.swapaxes(halfway, -1, -2).mean(axis=0)
+        yield Stretch(duration, rate * (1 + late), attitude, told, speed * axis, errors, sweep.joint_name)
+
+
+def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Generator) -> Iterator[Stretch]:
+    dwells = joints_rad(session.wrists_deg) if session.dwell_s else np.zeros((0, 6))
+    home = [(HOME_RAD, REST_S)] * len(_turns(session.axes))
+    for angles, duration in [*home, *((each, session.dwell_s) for each in dwells)]:
+        stands = angles + np.r_[np.zeros(3), rng.choice([-0.5, 0.5], 3)] * session.hysteresis_rad
+        attitude, told = (each[0, :3, :3].T for each in (poses(stands[None]), flange_pose(angles[None])))
+        yield Stretch(duration, np.zeros(3), attitude, told, np.zeros(3), np.zeros((len(AXIS_ERRORS), 3)), None)
+
+
+def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """(N, 3) what noise and vibration leave in each average, by whole turns evenly, else as the rig averages rests; the
+    variances (N, 3) of that, and the windows (N, 2) as the rig tells them."""
+    noises, variances, windows = [], [], windows_s.copy()
+    for place, (start, end) in enumerate(windows_s):
+        edges = np.linspace(start, end, round((end - start) * SAMPLES_HZ) + 1)
+        turn = 2 * np.pi * VIBRATION_HZ
+        swing = np.sqrt(2) * session.vibration_rad_s / turn * np.sin(turn * edges[:, None] + rng.uniform(0, 7, 3))
+        sampled = session.part.density * np.sqrt(SAMPLES_HZ) * rng.normal(size=(len(edges) - 1, 3))
+        readings = np.diff(swing, axis=0) * SAMPLES_HZ + sampled
+        if place < turns:
+            noises.append(readings.mean(axis=0))
+            variances.append(np.full(3, session.part.density**2 / (end - start)))
+        else:
+            found = tapered_mean(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
+            noises.append(found.mean)
+            variances.append(found.variance)
+            windows[place] += np.array([0.5, -0.5]) * flank_s(end - start)
+    return np.array(noises), np.array(variances), windows
+
+
+def _wandering(part: Part, windows_s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """(N, 3) by which the bias of each average is off, and (3,) its mean over all the time."""
+    times = np.arange(0.0, windows_s.max(), 0.1)
+    walk = np.cumsum(part.walk_rad_s_sqrt_s * np.sqrt(0.1) * rng.normal(size=(len(times), 3)), axis=0)
+    walk += part.warming_rad_s_s * times[:, None] * rng.choice([-1.0, 1.0], 3)
+    means = np.array([walk[(times >= start) & (times < end)].mean(axis=0) for start, end in windows_s])
+    return means + part.scatter_rad_s * rng.normal(size=means.shape), walk.mean(axis=0)

@@ -1,0 +1,175 @@
+"""Sweeps and rests of a drawn gyroscope that warms and cools, as files and as observations."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.external.elsewhere import budget_of, solve_swept
+from rig.analysis.temperature.over_temperature import files_to_reference
+from rig.data.quantity import RATE
+from rig.estimation.arrays import Array
+from rig.estimation.temperature.over_temperature import Line, OverTemperature, Repeated, settled
+from rig.observation.average import Average
+from rig.observation.external.csv_import import ExternalData
+from rig.observation.observe import Observation, nearest_axis
+
+REFERENCE_C = 25.0
+FROM_C, TO_C = 20.0, 60.0
+SWEPT_S, RESTED_S, BETWEEN_S = 6.0, 3.0, 10.0
+SPEED_RAD_S = np.radians(60.0)
+DATA_SHEET_BIAS_K, DATA_SHEET_SCALE_K = np.radians(0.03), 3e-4  # rad/s and a share for a kelvin; MPU-9250, LSM9DS1
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A gyroscope: k(T) = k₀ (1 + s₁ d + s₂ d²), what a reading adds c(T) = c₀ + c₁ d + c₂ d², d = T − 25 °C.
+
+    `hysteresis` (3,) is how much more it reads half-way when it warms, `lag_s` its thermometer's, `gradient_k` by how
+    much it is warmer in use than its thermometer says, beside how much it was in the run: at the middle of the range,
+    and what is more at its upper end. `leaning` (P, 3): what each place adds, such as an arm's axis that leans.
+    """
+
+    scale: Array
+    bias: Array
+    hysteresis: Array
+    lag_s: float
+    gradient_k: tuple[float, float]
+    leaning: Array
+    noise: float
+    walk: float
+
+    def at(self, temperature_c: float) -> Array:
+        """(6,) k and c where the thermometer says that temperature, in use."""
+        even, tilted = self.gradient_k
+        warmer_k = even + tilted * (2 * temperature_c - FROM_C - TO_C) / (TO_C - FROM_C)
+        powers = (temperature_c + warmer_k - REFERENCE_C) ** np.arange(3)
+        return np.concatenate([powers @ self.scale, powers @ self.bias])
+
+
+PLACES = np.array([each for axis in np.eye(3) for each in (axis, 0 * axis, -axis, 0 * axis)]) * SPEED_RAD_S
+
+
+def drawn(
+    rng: np.random.Generator,
+    *,
+    hysteresis: float = 0.0,
+    lag_s: float = 0.0,
+    gradient_k: float = 0.1,
+    noise: float = 3e-4,
+    walk: float = 2e-6,
+) -> Drawn:
+    """A gyroscope with slopes and curvatures at the size of a data sheet's."""
+    first = rng.uniform(1.1, 1.2, 3)
+    scale = np.array([first, first * rng.uniform(-1, 1, 3) * DATA_SHEET_SCALE_K, first * rng.uniform(-1, 1, 3) * 3e-6])
+    ways = rng.uniform(-1, 1, (2, 3))
+    bias = np.array([rng.normal(0, 0.01, 3), ways[0] * DATA_SHEET_BIAS_K, ways[1] * DATA_SHEET_BIAS_K / 80])
+    return Drawn(
+        scale, bias, hysteresis * rng.uniform(-1, 1, 3), lag_s * rng.uniform(-1, 1),
+        (gradient_k * rng.uniform(-1, 1), gradient_k * rng.uniform(-1, 1)),
+        rng.normal(0, 3e-4, PLACES.shape), noise, walk,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Session:
+    """So many sets of sweeps and rests; `windows_s` (N, 2), `felt` (N, 3), the thermometer's `temperature_c` (N,)."""
+
+    windows_s: Array
+    felt: Array
+    places: NDArray[np.intp]
+    temperature_c: Array
+    warming_k_s: Array
+
+
+def session(repeats: int = 14, *, both_directions: bool = True) -> Session:
+    """From 20 to 60 °C and, if `both_directions`, back again."""
+    felt = np.tile(PLACES, (repeats, 1))
+    lasted = np.where(felt.any(axis=1), SWEPT_S, RESTED_S)
+    ends = np.cumsum(lasted + BETWEEN_S)
+    windows = np.column_stack([ends - lasted, ends])
+    middle = windows.mean(axis=1)
+    done = (middle - middle[0]) / (middle[-1] - middle[0])
+    temperature_c = FROM_C + (TO_C - FROM_C) * (1 - np.abs(1 - 2 * done) if both_directions else done)
+    places = np.tile(np.arange(len(PLACES)), repeats)
+    return Session(windows, felt, places, temperature_c, np.gradient(temperature_c, middle))
+
+
+def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
+    """(N, 3) mean readings."""
+    warm = of.temperature_c + sensor.lag_s * of.warming_k_s - REFERENCE_C
+    powers = np.vander(warm, 3, increasing=True)
+    within = (of.temperature_c - FROM_C) / (TO_C - FROM_C)
+    loop = np.outer(np.sign(of.warming_k_s) * 4 * within * (1 - within), sensor.hysteresis)
+    wandered = np.cumsum(
+        rng.normal(0, 1, of.felt.shape) * np.sqrt(np.diff(of.windows_s[:, 0], prepend=0.0))[:, None], axis=0
+    )
+    wandered -= wandered.mean(axis=0)  # a bias is that of the whole run
+    white = rng.normal(0, 1, of.felt.shape) * sensor.noise
+    found: Array = (
+        of.felt / (powers @ sensor.scale) + powers @ sensor.bias + loop
+        + sensor.leaning[of.places] + sensor.walk * wandered + white
+    )  # fmt: skip
+    return found
+
+
+def repeated(means: Array, of: Session, noise: float) -> Repeated:
+    """What the estimator takes."""
+    return Repeated(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
+
+
+def write_files(
+    sensor: Drawn, of: Session, rng: np.random.Generator, folder: Path, rate_hz: float = 20.0
+) -> tuple[Path, Path]:
+    """Samples with a column of temperature, and the sweeps, as `rig solve --sweeps` takes them."""
+    means, rows = readings(sensor, of, rng), []
+    for mean, (start_s, end_s), warm in zip(means, of.windows_s, of.temperature_c, strict=True):
+        times = np.arange(start_s + 0.5 / rate_hz, end_s, 1 / rate_hz)
+        noise = rng.normal(0, sensor.noise * np.sqrt(len(times)), (len(times), 3))
+        rows.append(np.column_stack([times, mean + noise - noise.mean(axis=0), np.full(len(times), warm)]))
+    samples, sweeps = folder / "samples.csv", folder / "sweeps.csv"
+    header = "time_s,x_rad_s,y_rad_s,z_rad_s,temperature_c"
+    np.savetxt(samples, np.vstack(rows), fmt="%.10g", delimiter=",", header=header, comments="")
+    speeds = np.linalg.norm(of.felt, axis=1)
+    axes = np.where(speeds[:, None] > 0, of.felt / np.maximum(speeds, 1e-9)[:, None], np.eye(3)[0])
+    header = "start_s,end_s,axis_x,axis_y,axis_z,speed_rad_s"
+    table = np.column_stack([of.windows_s, axes, speeds])
+    np.savetxt(sweeps, table, fmt="%.12g", delimiter=",", header=header, comments="")
+    return samples, sweeps
+
+
+def external(means: Array, of: Session, noise: float) -> ExternalData:
+    """The same as `averaged` makes of files."""
+    averages = [
+        Average(mean, np.full(3, noise**2), np.full(3, noise), 100, start_s, end_s, warm, freedom=np.full(3, 99.0))
+        for mean, (start_s, end_s), warm in zip(means, of.windows_s.tolist(), of.temperature_c.tolist(), strict=True)
+    ]
+    sweeps = [
+        Observation(
+            row, None, None, *nearest_axis(felt), felt / np.linalg.norm(felt), float(np.linalg.norm(felt)), 0.0, 0, each
+        )
+        for row, (felt, each) in enumerate(zip(of.felt, averages, strict=True), start=1)
+        if felt.any()
+    ]
+    rests = [each for felt, each in zip(of.felt, averages, strict=True) if not felt.any()]
+    return ExternalData(tuple(sweeps), tuple(rests))
+
+
+def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemperature:
+    """Polynomials with all of the uncertainty that sweeps of files have."""
+    moved, found = files_to_reference(external(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C)
+    solution = solve_swept(moved, "vector")
+    sign = np.diag(RATE.parameter_signs)
+    lines = tuple(
+        Line(
+            each.name,
+            each.kind,
+            each.distribution,
+            each.source,
+            each.freedom,
+            sign @ each.covariance @ sign,
+        )
+        for each in budget_of(solution, moved).contributors
+    )
+    return settled(found, np.r_[solution.scale, -solution.bias_rad_s], lines)

@@ -1,0 +1,1 @@
+"""Browsers, and pages of runs that nobody made."""

@@ -1,0 +1,153 @@
+"""A real browser, Debian's chromium, driven by Selenium; its pictures are kept in build/page."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from selenium.webdriver import Chrome, ChromeOptions, Keys
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.remote_connection import RemoteConnection
+
+from support.paths import ROOT
+from support.processes.waiting import PATIENCE_S
+
+PICTURES = ROOT / "build" / "page"
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+TABLET = (1280, 800)
+
+LEGIBLE = 4.5  # of contrast, WCAG 2.2, success criterion 1.4.3
+# Of every text the worst contrast with what is behind it, and the text.
+CONTRAST = """
+const channel = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
+const behind = (element) => {
+  for (let e = element; e; e = e.parentElement) {
+    const [r, g, b, a = 1] = parts(getComputedStyle(e).backgroundColor);
+    if (a > 0) return [r, g, b];
+  }
+};
+const found = [];
+const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (texts.nextNode()) {
+  const element = texts.currentNode.parentElement;
+  const hidden = !element.checkVisibility() || element.closest(":disabled, noscript, .skip");
+  if (hidden || !texts.currentNode.textContent.trim()) continue;
+  const [one, other] = [light(parts(getComputedStyle(element).color)), light(behind(element))];
+  found.push([(Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05), texts.currentNode.textContent]);
+}
+return found.sort((a, b) => a[0] - b[0])[0];
+"""
+
+# A machine without the browser may skip these tests; CI may not.
+needs_browser = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER) and os.environ.get("CI") != "true", reason="needs chromium and chromium-driver"
+)
+
+
+@contextmanager
+def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[Chrome]:
+    """A window of that size. It remembers what its console says and which addresses it asked."""
+    options = ChromeOptions()
+    options.binary_location = CHROMIUM or ""
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--no-first-run",
+        "--hide-scrollbars",
+        f"--window-size={size[0]},{size[1]}",
+        *(["--force-dark-mode"] if dark else []),
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = Chrome(options=options, service=Service(DRIVER))
+    if isinstance(driver.command_executor, RemoteConnection):
+        driver.command_executor.client_config.timeout = int(PATIENCE_S)
+    driver.set_page_load_timeout(PATIENCE_S)
+    driver.set_script_timeout(PATIENCE_S)
+    try:
+        set_theme(driver, dark=dark)
+        yield driver
+    finally:
+        driver.quit()
+
+
+def set_theme(driver: Chrome, *, dark: bool) -> None:
+    """What the system is said to prefer."""
+    wish = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": wish})
+
+
+@contextmanager
+def screen(driver: Chrome, width: int, height: int) -> Iterator[None]:
+    """A window whose page has just so many CSS pixels."""
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        yield
+    finally:
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
+    """What the window shows, or the `whole` page, as build/page/NAME.png."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    path = PICTURES / f"{name}.png"
+    if not whole:
+        driver.save_screenshot(str(path))
+        return path
+    width, height = driver.execute_script("return [innerWidth, document.documentElement.scrollHeight]")
+    with screen(driver, width, height):
+        driver.save_screenshot(str(path))
+    return path
+
+
+def legible(driver: Chrome) -> None:
+    """Every text shown stands out from what is behind it."""
+    contrast, words = driver.execute_script(CONTRAST)
+    assert contrast >= LEGIBLE, words
+
+
+def text(driver: Chrome, element: str) -> str:
+    """What is to be read of the element of that id."""
+    return driver.find_element(By.ID, element).text
+
+
+def typed(driver: Chrome, words: str) -> None:
+    """A line and Enter, as a keyboard or a scanner types them, wherever the cursor is."""
+    driver.switch_to.active_element.send_keys(words, Keys.ENTER)
+
+
+def kind(driver: Chrome) -> str:
+    """The run's state, by the page's own name for it."""
+    return str(driver.execute_script("return document.body.dataset.kind"))
+
+
+def severe(driver: Chrome) -> list[str]:
+    """What the console holds of errors since it was asked last."""
+    entries: list[dict[str, Any]] = driver.get_log("browser")  # type: ignore[no-untyped-call]
+    return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
+
+
+def asked_hosts(driver: Chrome) -> set[str]:
+    """The hosts of every address the browser has asked for since it was asked last."""
+    hosts = set()
+    for entry in driver.get_log("performance"):  # type: ignore[no-untyped-call]
+        message = json.loads(entry["message"])["message"]
+        if message["method"] == "Network.requestWillBeSent":
+            address = urlsplit(message["params"]["request"]["url"])
+            if address.scheme in ("http", "https", "ws", "wss"):  # chrome: and data: leave no wire
+                hosts.add(address.hostname or "")
+    return hosts

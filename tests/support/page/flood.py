@@ -1,0 +1,74 @@
+"""Connections that somebody opens to the operator's page to do harm."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from urllib.parse import urlsplit
+
+from support.processes.waiting import PATIENCE_S
+
+
+@contextmanager
+def opened(url: str, path: str, more: str = "", *, source: str = "") -> Iterator[socket.socket]:
+    """A request whose answer nobody has read yet."""
+    place = urlsplit(url)
+    address = (place.hostname or "", place.port or 0)
+    with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
+        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: {place.netloc}\r\n{more}\r\n".encode())
+        yield connection
+
+
+@contextmanager
+def half_a_request(url: str, *, source: str = "") -> Iterator[socket.socket]:
+    """A connection whose request never ends."""
+    place = urlsplit(url)
+    address = (place.hostname or "", place.port or 0)
+    with closing(socket.create_connection(address, 10, (source, 0) if source else None)) as connection:
+        with suppress(ConnectionError):
+            connection.sendall(b"GET / HTTP/1.1\r\n")
+        yield connection
+
+
+def alive(connection: socket.socket) -> bool:
+    """Whether the other side still holds it."""
+    connection.setblocking(False)
+    try:
+        return connection.recv(1 << 16) != b""
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+
+@contextmanager
+def flooded(url: str, connections: int) -> Iterator[None]:
+    """For the length of the block so many half requests are held; each that is closed is opened anew."""
+    place = urlsplit(url)
+    address = (place.hostname or "", place.port or 0)
+    over, full = threading.Event(), threading.Event()
+
+    def attack() -> None:
+        held: list[socket.socket] = []
+        while not over.is_set():
+            with suppress(OSError):
+                held.append(socket.create_connection(address, 1))
+                held[-1].sendall(b"GET / HTTP/1.1\r\n")
+            if len(held) >= connections:
+                full.set()
+                over.wait(0.05)
+                gone = [each for each in held if not alive(each)]
+                for each in gone:
+                    each.close()
+                held = [each for each in held if each.fileno() >= 0]
+        for each in held:
+            each.close()
+
+    thread = threading.Thread(target=attack, daemon=True)
+    thread.start()
+    try:
+        full.wait(PATIENCE_S)  # before the limits were there it could not come to so many
+        yield
+    finally:
+        over.set()
+        thread.join(PATIENCE_S)

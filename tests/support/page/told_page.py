@@ -1,0 +1,143 @@
+"""A page in a browser that is told of a run which nobody made. As a program: one that is told until it is killed."""
+
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from selenium.webdriver import Chrome
+
+from rig.motion.state import ArmState, RuntimeState
+from rig.page.about import About
+from rig.page.page_state import Shown
+from rig.page.rows import Look
+from rig.page.server.control import Control
+from rig.page.server.feed import Feed
+from rig.page.server.serving import Address, serving
+from rig.station.events import ArmSeen, HandSeen, Progress, RunEvent, SamplesTaken, StepFinished, StepStarted
+from support.page.browser import text
+from support.page.told_runs import ABOUT, before_it_moves, look, moving, planned
+from support.processes.waiting import wait_for
+
+AGAIN_S = 0.2  # a run that goes on tells so all the time
+GOING_ON = (StepStarted, StepFinished, Progress, SamplesTaken)
+
+
+class Telling:
+    """Events for a page in a browser, and the words it must show then.
+
+    As of a run that goes on, newer samples and states come again and again after an arm that moves or a hand was seen,
+    until all falls `silent`, or the last ones are only `repeating`, which brings nothing new.
+    """
+
+    def __init__(self, driver: Chrome, feed: Feed) -> None:
+        self._driver, self._feed = driver, feed
+        self._telling = threading.Lock()
+        self._samples: SamplesTaken | None = None
+        self._seen: ArmSeen | HandSeen | None = None
+        self.times = 0  # that newer ones came
+        self.silent, self.repeating = threading.Event(), threading.Event()
+
+    def __call__(self, *events: Any) -> None:
+        with self._telling:
+            for event in events:
+                self._feed.event(event)
+                if isinstance(event, SamplesTaken):
+                    self._samples = event
+                elif isinstance(event, ArmSeen | HandSeen):
+                    self._seen = event if goes_on(event) else None
+                elif not isinstance(event, GOING_ON):
+                    self._seen = None
+
+    def look(self, sweeps: int) -> None:
+        self._feed.look(look(planned(), sweeps))
+
+    def observed(self, rows: list[dict[str, Any]]) -> None:
+        self._feed.look(Look(rows, []))
+
+    def word(self, expected: str) -> None:
+        wait_for(
+            lambda: text(self._driver, "state-word") == expected, f"{expected}, not {text(self._driver, 'state-word')}"
+        )
+        assert text(self._driver, "sign")
+
+    def go_on(self) -> None:
+        while not self.silent.wait(AGAIN_S):
+            with self._telling:
+                if self._seen is None:
+                    continue
+                if not self.repeating.is_set():
+                    self._seen, self._samples = later(self._seen), more(self._samples)
+                    self.times += 1
+                if self._samples is not None:
+                    self._feed.event(self._samples)
+                self._feed.event(self._seen)
+
+
+def goes_on(seen: ArmSeen | HandSeen) -> bool:
+    """Whether more is to come: the program of an arm plays, a servo is held, a hand always may move."""
+    return not (
+        isinstance(seen, ArmSeen)
+        and isinstance(seen.state, ArmState)
+        and seen.state.runtime_state != RuntimeState.PLAYING
+    )
+
+
+def later(seen: ArmSeen | HandSeen) -> ArmSeen | HandSeen:
+    """The same a moment later."""
+    if isinstance(seen, HandSeen):
+        return replace(seen, time_s=seen.time_s + AGAIN_S)
+    state: Any = seen.state
+    return replace(seen, state=replace(state, time_s=state.time_s + AGAIN_S))
+
+
+def more(samples: SamplesTaken | None) -> SamplesTaken | None:
+    """Of each sensor one more that reads the same."""
+    if samples is None:
+        return None
+    return SamplesTaken(tuple(replace(each, samples=each.samples + 1) for each in samples.sensors))
+
+
+@contextmanager
+def showing(
+    driver: Chrome, folder: Path, *, token: bool = True, may_answer: bool = True, about: About = ABOUT
+) -> Iterator[Telling]:
+    """A page that has been loaded and told nothing yet."""
+    feed = Feed(Shown(replace(about, may_answer=may_answer)))
+    with serving(feed, Control(may_answer=may_answer), folder, Address(port=0)) as url:
+        driver.get(url if token else url.split("#")[0])
+        telling = Telling(driver, feed)
+        thread = threading.Thread(target=telling.go_on, daemon=True)
+        thread.start()
+        try:
+            yield telling
+        finally:
+            telling.silent.set()
+            thread.join()
+
+
+def main() -> None:
+    """Serve a page, print its address, and tell of movements without an end."""
+    feed = Feed(Shown(ABOUT))
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(feed, Control(may_answer=False), Path(folder), Address(port=0)) as url,
+    ):
+        print(url, flush=True)
+        for _ in count():
+            events: list[RunEvent] = [*before_it_moves(planned()), *moving(planned(), 60.0)]
+            for event in events:
+                feed.event(event)
+                if isinstance(event, Progress):
+                    time.sleep(0.05)
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[2]))
+    main()

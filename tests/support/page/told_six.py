@@ -1,0 +1,82 @@
+"""A run of three boards' worth of sensors that nobody made: three gyroscopes, and an accelerometer beside each."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from rig.analysis.check import Check
+from rig.data.result_file import ResultDocument, read_result, write_result
+from rig.data.run_folder import RESULT
+from rig.page.replay import ended
+from rig.station.events import Checked, DocumentWritten, Remembered, RunEvent, SamplesTaken, Since, VerdictReached
+from support.page.told_runs import ABOUT, moving, planned
+from support.paths import RECORDINGS
+
+PARTS = {
+    "lsm9ds1": "lsm9ds1 LSM9DS1-003",
+    "mpu9250": "mpu9250 MPU9250-2031-17",
+    "adis16465": "adis16465 ADIS16465-00042",
+}
+SIX = replace(ABOUT, folder="runs/2026-11-22T16-00-00Z-imu", procedure="imu", parts=PARTS)
+IMU = RECORDINGS / "imu"
+
+
+def six_moving(until_s: float) -> Iterator[RunEvent]:
+    """The arm and the readings of all six, as far as that."""
+    for event in moving(planned(), until_s):
+        if isinstance(event, SamplesTaken):
+            yield SamplesTaken(tuple(replace(event.sensors[1], sensor=name, lost=0) for name in PARTS))
+        else:
+            yield event
+
+
+def six_found() -> ResultDocument:
+    """What a recording of one of them gave, of all."""
+    one = read_result(IMU)
+    checks = tuple(
+        each.model_copy(update={"name": each.name.replace("gyro", name), "sensor": each.sensor and name})
+        for name in PARTS
+        for each in one.checks
+    )
+    return one.model_copy(
+        update={
+            "checks": checks,
+            "gyroscopes": dict.fromkeys(PARTS, one.gyroscopes["gyro"]),
+            "accelerometers": dict.fromkeys(PARTS, one.accelerometers["gyro"]),
+        }
+    )
+
+
+def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = ()) -> Iterator[RunEvent]:
+    """From the result to what the history says of it: one sensor has changed, two are there for the first time.
+
+    The checks of these names are `broken` of each of the three boards.
+    """
+    found = six_found()
+    write_result(found, folder)
+    (folder / "certificate.html").write_text("<title>Certificate</title>", encoding="utf-8")
+    yield DocumentWritten(folder / "certificate.html")
+    yield DocumentWritten(folder / RESULT)
+    *checks, _ = ended(found)
+    yield from checks
+    if not passed:
+        limit = found.checks[0]
+        yield Checked(Check(limit.name, 0.177, 0.1, "1", limit.means, 0.0012))
+    for each in found.checks:
+        if each.name.partition(".")[2] in broken and each.limit is not None:
+            yield Checked(Check(each.name, 3 * each.limit, each.limit, each.unit, each.means))
+    yield VerdictReached(passed and not broken)
+    yield Remembered("the history", (12, 13), tuple(_since(found)))
+
+
+def _since(found: ResultDocument) -> Iterator[Since]:
+    scale, bias = (
+        found.gyroscopes["gyro" if "gyro" in found.gyroscopes else "lsm9ds1"].scale,
+        (0.00766, -0.00977, -0.00452),
+    )
+    names = ("kx", "ky", "kz", "bx", "by", "bz")
+    values = [*scale[:2], scale[2] - 0.004, *bias]
+    before = {name: (value, 0.0012 if name[0] == "k" else 0.0005) for name, value in zip(names, values, strict=True)}
+    errors = {name: 2.4 if name == "kz" else 0.3 for name in names}
+    yield Since("lsm9ds1", "rate", 8, "2026-11-20", before, errors, ("kz",))
+    yield Since("mpu9250", "rate", 9, "2026-11-20", before, {**errors, "kz": 0.4})

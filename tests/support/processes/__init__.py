@@ -1,0 +1,1 @@
+"""Processes, waiting and what the system does to both."""

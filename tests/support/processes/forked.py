@@ -1,0 +1,20 @@
+"""Processes in which a test lets a function run beside itself, forked from one that has imported what these need."""
+
+import multiprocessing
+from multiprocessing.context import ForkServerContext
+
+# There is one such process for all tests, so it has what any of them needs. Before Python 3.12 it finds the rig and
+# what is installed, not what lies beside the tests, and it does not say what it has not found.
+IMPORTED = (
+    *("pytest", "h5py", "rig.data.recording.run_file", "rig.data.result_file"),
+    *("rig.history.store", "rig.report.kinds.registry"),
+    *("sqlalchemy.dialects.sqlite", "sqlalchemy.dialects.postgresql", "psycopg"),
+    *("rig.turners.servo.driver", "rig.world.servo.bus"),
+)
+
+
+def forked() -> ForkServerContext:
+    """Whose processes are forked so."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(IMPORTED))
+    return context

@@ -1,0 +1,223 @@
+"""The processes that `support.processes.warm` has others forked from: `python nursery.py ENVIRONMENT`.
+
+One has imported everything; the other, in an environment with these variables as JSON, what only reads. The line on
+stdout says by module where orders are taken. They end with their standard input.
+"""
+
+import gc
+import inspect
+import json
+import os
+import runpy
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+# What a run, its laboratory and what reads their result import sooner or later.
+IMPORTED = (
+    *(
+        "rig.cli",
+        "rig.commands.measure.run",
+        "rig.commands.measure.carry_out",
+        "rig.commands.configured",
+        "rig.commands.offline.solve",
+    ),
+    *("rig.procedure", "rig.runner.phases", "rig.report.document", "rig.history.store", "rig.world.process"),
+    *("rig.turners.ur.kind", "rig.turners.servo.kind", "rig.turners.hand.kind"),
+    *("h5py", "jinja2", "scipy.interpolate", "scipy.ndimage"),
+)
+# What reads a file of others is allowed little memory, and imports little.
+READS = ("h5py", "rig.data.recording.schema", "rig.data.processes.reading_process")
+LABORATORY, READER = "rig.world", "rig.data.processes.reading_child"
+
+Order = dict[str, Any]
+
+
+class Forked(subprocess.Popen[Any]):
+    """As Popen, but for its birth and its end: it is no child of this process, so its status comes through a socket.
+
+    `address` says where orders for it are taken, `command` what comes after `python -m`, with `safe_path` after
+    `python -P -m`.
+    """
+
+    def __init__(self, address: str, command: list[str], *, safe_path: bool, **options: Any) -> None:
+        self._address, self._safe_path = address, safe_path
+        super().__init__(command, **options)
+
+    def _execute_child(self, *given: Any) -> None:
+        of_popen = super()._execute_child  # type: ignore[misc]
+        named = inspect.signature(of_popen).bind(*given).arguments
+        module, *words = named["args"]
+        order = {
+            "module": module,
+            "words": words,
+            "environment": dict(os.environ if named["env"] is None else named["env"]),
+            "folder": str(named["cwd"] or Path.cwd()),
+            "safe_path": self._safe_path,
+            "new_session": named["start_new_session"],
+            "ignored": [number for number in signal.valid_signals() if signal.getsignal(number) == signal.SIG_IGN],
+        }
+        ends = ("p2cread", "c2pwrite", "errwrite")
+        inherited_or_given = [number if named[end] == -1 else named[end] for number, end in enumerate(ends)]
+        self.pid, self._status = _born(self._address, order, inherited_or_given)
+        self._child_created = True
+        self._close_pipe_fds(  # type: ignore[attr-defined]
+            *(named[end] for end in ("p2cread", "p2cwrite", "c2pread", "c2pwrite", "errread", "errwrite"))
+        )
+
+    def _internal_poll(self, _deadstate: int | None = None) -> int | None:
+        if self.returncode is None and self._waitpid_lock.acquire(blocking=False):  # type: ignore[attr-defined]
+            try:
+                pid, status = self._try_wait(os.WNOHANG)
+                if pid == self.pid:
+                    self._handle_exitstatus(status)  # type: ignore[attr-defined]
+            finally:
+                self._waitpid_lock.release()  # type: ignore[attr-defined]
+        return self.returncode
+
+    def _try_wait(self, wait_flags: int) -> tuple[int, int]:
+        try:
+            status = _number(self._status, socket.MSG_DONTWAIT if wait_flags & os.WNOHANG else 0)
+        except BlockingIOError:
+            return 0, 0
+        self._status.close()
+        return self.pid, status
+
+
+def forked_here(modules: Collection[str], address: Callable[[str], str]) -> None:
+    """Have every `python -P -m MODULE …` of these modules forked that this process starts by Popen.
+
+    A laboratory is forked only into a session of its own, as a run starts one: then no signal for the run reaches it.
+    """
+
+    class Named(Forked):
+        def __init__(self, args: list[str], **options: Any) -> None:
+            super().__init__(address(args[3]), args[3:], safe_path=True, **options)
+
+    def new(kind: type[subprocess.Popen[Any]], args: Any, *_: Any, **options: Any) -> subprocess.Popen[Any]:
+        named = isinstance(args, list) and args[:3] == [sys.executable, "-P", "-m"] and args[3] in modules
+        is_one = named and (args[3] != LABORATORY or options.get("start_new_session"))
+        return object.__new__(Named if is_one else kind)
+
+    subprocess.Popen.__new__ = new  # type: ignore[method-assign,assignment]
+
+
+def _born(address: str, order: Order, streams: list[int]) -> tuple[int, socket.socket]:
+    """A new process: its identity, and where its status is told (as of `os.waitpid`, 4 bytes) when it has ended."""
+    kept, given = socket.socketpair()
+    with given, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as orders:
+        orders.connect(bytes.fromhex(address))
+        socket.send_fds(orders, [json.dumps(order).encode()], [*streams, given.fileno()])
+    return _number(kept), kept
+
+
+def _number(told: socket.socket, flags: int = 0) -> int:
+    number = told.recv(4, flags)
+    assert number, "the process that all are forked from has ended"
+    return int.from_bytes(number, "little")
+
+
+def listening() -> socket.socket:
+    """A socket for orders, at an address that the system makes up."""
+    orders = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    orders.bind("")
+    orders.listen()
+    return orders
+
+
+def address_of(orders: socket.socket) -> str:
+    """Where it listens, as it is written in JSON."""
+    return bytes(orders.getsockname()).hex()
+
+
+def ordered(orders: socket.socket) -> Order | None:
+    """Fork until standard input ends: in a process that was forked what it shall do, None in the end."""
+    with selectors.DefaultSelector() as selector:
+        selector.register(orders, selectors.EVENT_READ)
+        selector.register(sys.stdin, selectors.EVENT_READ)
+        while True:
+            for key, _ in selector.select():
+                if key.fileobj is sys.stdin:
+                    return None
+                if key.fileobj is not orders:
+                    _tell_status(*key.data)
+                    selector.unregister(key.fileobj)
+                    os.close(key.fd)
+                    continue
+                with orders.accept()[0] as once:
+                    text, given, _, _ = socket.recv_fds(once, 1 << 20, 4)
+                if not text:  # who wanted to give one has ended
+                    continue
+                *streams, status = given
+                if not (process := os.fork()):
+                    selector.close()
+                    order: Order = json.loads(text)
+                    _become(order, streams, status)
+                    return order
+                for stream in streams:
+                    os.close(stream)
+                selector.register(os.pidfd_open(process), selectors.EVENT_READ, (process, status))
+
+
+def _tell_status(process: int, told: int) -> None:
+    """How it ended, where somebody still wants to know."""
+    _, status = os.waitpid(process, 0)
+    with suppress(BrokenPipeError):
+        os.write(told, status.to_bytes(4, "little"))
+    os.close(told)
+
+
+def _become(order: Order, streams: list[int], told: int) -> None:
+    """The environment, folder, session, signals and streams of a process that the system has just started."""
+    if order["new_session"]:
+        os.setsid()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in order["ignored"]:
+        signal.signal(number, signal.SIG_IGN)
+    os.environ.clear()
+    os.environ.update(order["environment"])
+    os.chdir(order["folder"])
+    sys.path[:1] = [] if order["safe_path"] else [order["folder"]]
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+    for name, stream, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
+        of_old = getattr(sys, name)
+        buffering = 1 if name == "stderr" else -1
+        new = open(stream, mode, buffering, of_old.encoding, of_old.errors, closefd=False)  # noqa: SIM115
+        setattr(sys, name, new)
+        setattr(sys, f"__{name}__", new)
+    os.write(told, os.getpid().to_bytes(4, "little"))
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+
+
+def _serve() -> None:
+    """Two processes, one with everything and one that only reads, which their children go on from."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for those that were forked
+    sys.path[0] = str(Path.cwd())  # as of `python -m`
+    everything, reading = listening(), listening()
+    addresses = {"rig": address_of(everything), LABORATORY: address_of(everything), READER: address_of(reading)}
+    print(json.dumps(addresses), flush=True)
+    reads = not os.fork()
+    if reads:
+        os.environ.update(json.loads(sys.argv[1]))
+    for module in READS if reads else IMPORTED:
+        import_module(module)
+    if not reads:
+        import_module("firmware_host.emulator.hooks").address_of("block")  # translated here, for every laboratory
+    gc.collect()
+    gc.freeze()  # what is never looked through is shared, not copied
+    if order := ordered(reading if reads else everything):
+        forked_here((LABORATORY, READER), addresses.__getitem__)
+        sys.argv = ["", *order["words"]]
+        runpy.run_module(order["module"], run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,85 @@
+"""Processes of `python -m rig …` that need not import everything anew, which takes longer than most of them run.
+
+They are forked from one process that has imported what they need, and so are the laboratories that they start; what
+takes run files apart is forked from another. Of those that the system starts they differ in this alone that /proc shows
+another command line and another parent. Tests of what a process imports, of how soon it starts, of how much memory it
+takes and of variables of Python's own start one by the system, and so does all of `make proof`.
+"""
+
+import atexit
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from rig.data.processes.reading_process import ENVIRONMENT
+from support.processes.nursery import READER, Forked, forked_here
+
+NURSERY = Path(__file__).with_name("nursery.py")
+
+
+class _Nursery:
+    """The processes that all are forked from; they are started when the first is wanted, and end with this one."""
+
+    def __init__(self) -> None:
+        self._addresses: dict[str, str] | None = None
+        self._starting = Lock()
+        self.closed = False  # nothing is forked: all are processes that the system starts
+
+    def address(self, module: str) -> str:
+        """Where orders for processes of that module are taken; one of the tests' own needs what the command does."""
+        with self._starting:
+            if self._addresses is None:
+                self._addresses = self._begun()
+        return self._addresses.get(module, self._addresses["rig"])
+
+    def _begun(self) -> dict[str, str]:
+        command = [sys.executable, str(NURSERY), json.dumps(ENVIRONMENT)]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert process.stdin is not None and process.stdout is not None
+        pipes = (process.stdin, process.stdout)
+
+        def end() -> None:
+            for pipe in pipes:
+                pipe.close()
+            process.kill()  # it has nothing to put away, and whoever starts tests on many processes does not wait long
+            process.wait()
+
+        atexit.register(end)
+        addresses: dict[str, str] = json.loads(process.stdout.readline())
+        return addresses
+
+
+nursery = _Nursery()
+
+
+def readers_forked() -> None:
+    """Have what takes run files apart forked for this process too."""
+    forked_here((READER,), nursery.address)
+
+
+@contextmanager
+def readers_of_system() -> Iterator[None]:
+    """For the length of the block they are processes that the system starts."""
+    forking = subprocess.Popen.__new__
+    subprocess.Popen.__new__ = lambda kind, *_, **__: object.__new__(kind)  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        subprocess.Popen.__new__ = forking  # type: ignore[method-assign]
+
+
+def started(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
+    """`python -m MODULE WORDS …`; `options` as of Popen, but for those of what is done before the program begins."""
+    if nursery.closed:
+        return of_system(*words, module=module, **options)
+    return Forked(nursery.address(module), [module, *map(str, words)], safe_path=False, **options)
+
+
+def of_system(*words: str | Path, module: str = "rig", **options: Any) -> "subprocess.Popen[Any]":
+    """As `started`, always by the system."""
+    return subprocess.Popen([sys.executable, "-m", module, *map(str, words)], **options)

@@ -1,0 +1,54 @@
+"""Checks of recordings against themselves, and what chance says of what they found."""
+
+from collections.abc import Sequence
+
+from rig.analysis.check import Check
+from rig.analysis.consistency.contradictions import CHECKS, FALSE_ALARMS, contradictions
+from rig.analysis.gyroscope.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.data.recording.run_file import RunData
+from rig.observation.observed_run import ObservedRun
+
+STATISTICS = len(CHECKS)  # of a gyroscope
+RATE = FALSE_ALARMS / STATISTICS  # of each
+
+Solved = tuple[tuple[ObservedRun, ...], dict[str, SensorResult], Surroundings]
+
+
+def solved(run: RunData) -> Solved:
+    """What checks are made of, of a recording of one gyroscope."""
+    recordings = observe_recordings([run])
+    surroundings = surroundings_of(recordings, recordings[0].run.settings)
+    return recordings, solve_observed(run.sensors, recordings, surroundings), surroundings
+
+
+def checks_of(found: Solved, rate: float = RATE) -> tuple[Check, ...]:
+    """With limits that are exceeded in such a share of undamaged recordings, each."""
+    recordings, results, surroundings = found
+    return contradictions(
+        recordings, results, ["gyro"], surroundings, recordings[0].run.settings, false_alarms=rate * STATISTICS
+    ).checks
+
+
+def checked(run: RunData) -> tuple[Check, ...]:
+    """As a run is judged."""
+    return checks_of(solved(run))
+
+
+def failed(checks: Sequence[Check]) -> set[str]:
+    """Their names, without the sensor's and the sweep's."""
+    return {kind_of(check) for check in checks if not check.passed}
+
+
+def kind_of(check: Check) -> str:
+    """The name of the check, of whatever sensor and sweep."""
+    return check.name.split(".")[1]
+
+
+def probability(check: Check, rate: float = RATE) -> float:
+    """Of χ² as large, with as many degrees of freedom as the limit for that rate shows."""
+    from scipy.special import chdtrc, chdtri
+
+    limit = float(check.limit or 0.0)
+    freedom = min(range(1, 400), key=lambda each: abs(float(chdtri(each, rate)) - limit))
+    return float(chdtrc(freedom, float(check.value or 0.0)))

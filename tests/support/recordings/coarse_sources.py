@@ -1,0 +1,111 @@
+"""Sensors whose source sends readings in steps: messages of autopilots, lines with few digits; drawn, with a truth."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from rig.analysis.consistency.contradictions import contradictions
+from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
+from rig.analysis.surroundings import surroundings_of
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.data.quantity import RATE
+from rig.data.recording.channel import Channel, of_thermometer, of_three_axes
+from rig.estimation.arrays import Array
+from rig.sensors.scales import fine_axes
+from support.recordings.drawn_recording import Drawn, Kind, drawn
+from support.recordings.synthetic_run import SENSOR
+
+DEG = float(np.radians(1.0))
+MILLI = 1e-3
+FULL_RAD_S = {"mavlink": 2000 * DEG, "lines": 500 * DEG}
+OF_16_BITS_RAD_S = 500 * DEG / 2**15  # a step of a MEMS gyroscope's converter
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """How a source sends rates in rad/s: `sent` makes of them what is recorded, in this channel, of such a part."""
+
+    part: str
+    channel: Channel
+    sent: Callable[[Array], Array]
+
+
+def _cut(rates: Array) -> Array:
+    whole = np.trunc(rates / MILLI)
+    sent: Array = MILLI * (whole + 0.5 * np.sign(whole))
+    return sent
+
+
+def _single(rates: Array) -> Array:
+    return np.asarray(np.float32(rates), dtype=np.float64)
+
+
+def _printed(digit: float, of_a_converter: float = 0.0) -> Callable[[Array], Array]:
+    """Numbers whose last digit is `digit`, rad/s, of readings in steps of a converter, if that has any."""
+
+    def sent(rates: Array) -> Array:
+        read = np.rint(rates / of_a_converter) * of_a_converter if of_a_converter else rates
+        rounded: Array = np.rint(read / digit) * digit
+        return rounded
+
+    return sent
+
+
+def _lines(digit: float, *, stated: bool = True, of_a_converter: float = 0.0) -> Source:
+    full = FULL_RAD_S["lines"]
+    channel = of_three_axes(RATE, digit, int(full / digit), full) if stated else fine_axes(RATE, full)
+    return Source("lines", channel, _printed(digit, of_a_converter))
+
+
+_FINE = fine_axes(RATE, FULL_RAD_S["mavlink"])
+SOURCES: Mapping[str, Source] = MappingProxyType(
+    {
+        "SCALED_IMU": Source("mavlink", replace(_FINE, step=2 * MILLI), _cut),
+        "HIGHRES_IMU": Source("mavlink", _FINE, _single),
+        "one decimal of a degree": _lines(0.1 * DEG),
+        "two decimals of a degree": _lines(0.01 * DEG),
+        "two decimals of a degree, not stated": _lines(0.01 * DEG, stated=False),
+        "three decimals of a converter's counts": _lines(1e-3 * DEG, of_a_converter=OF_16_BITS_RAD_S),
+        "three decimals of a radian, not stated": _lines(MILLI, stated=False),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What a recording says: errors of scale and bias (6,), their U (6,), the names of the checks that failed."""
+
+    error: Array
+    expanded: Array
+    failed: tuple[str, ...]
+
+
+def recorded(source: Source, seed: int, noise_rad_s: float, *, vibrates: bool) -> Drawn:
+    """A recording of a source, drawn as its part's data sheet and the arm's limits let it be."""
+    channels = (source.channel, of_thermometer(0.01, 0.0))
+    sensor = replace(SENSOR, part=source.part, rate_hz=100.0, channels=channels, clock="gyro")
+    flicker_rad_s = float(np.radians(PARTS[source.part].bias_instability_deg_h / 3600))
+    kind = Kind(sensor, noise_rad_s, flicker_rad_s, 1e-6, source.sent)
+    return drawn(seed, kind, vibrates=vibrates)
+
+
+def stated(seen: Drawn) -> Stated:
+    """What is solved of a recording, held against its truth."""
+    recordings = observe_recordings([seen.run])
+    surroundings = surroundings_of(recordings, seen.run.settings)
+    results = solve_observed(seen.run.sensors, recordings, surroundings=surroundings)
+    result = results["gyro"]
+    assert result.uncertainty is not None
+    (observed,) = recordings
+    averages = [turn.average for turn in observed.sensors["gyro"].revolutions] + [*observed.sensors["gyro"].rests]
+    first_s, last_s = min(each.start_s for each in averages), max(each.end_s for each in averages)
+    inside = (seen.time_s >= first_s) & (seen.time_s <= last_s)
+    true = np.concatenate([seen.scale, -seen.bias_rad_s[inside].mean(axis=0)])
+    checks = contradictions(recordings, results, ["gyro"], surroundings, seen.run.settings).checks
+    return Stated(
+        np.concatenate([result.scale, result.bias_rad_s]) - true,
+        result.uncertainty.expanded,
+        tuple(check.name for check in checks if not check.passed),
+    )

@@ -1,0 +1,218 @@
+"""Accelerometers drawn with all that their data sheets let them do, on crooked arms: sessions, and damages to them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.analysis.consistency.reference_consistency import reference_consistency
+from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.reference.accelerometer_errors import MILLI_G, STANDARD, Piece, Sheet, errors_of
+from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
+from rig.analysis.reference.reference_budgets import accelerometer_budget
+from rig.config.procedures.attitude_sets import EIGHTEEN
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.data.recording.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.earth import MICRO_G_M_S2
+from rig.estimation.gyroscope.budget import Budget
+from rig.estimation.reference.accelerometer_model import Movement, felt
+from rig.estimation.reference.imu import ImuSolution, solve_imu
+from rig.estimation.reference.reading_errors import of_pieces, of_sensor, per_axis
+from rig.estimation.statistics.bias_process import flicker_covariance
+from rig.estimation.statistics.expected_sizes import OWN_SHARES
+from rig.motion.geometry import NOMINAL, WRIST_1
+from support.motions.arm_attitudes import crooked_arm, joints_rad
+from support.motions.arm_sweeps import DWELL_S, Truth, joints_at, planned, recorded_dwells, recorded_sweeps
+
+GRAVITY = 9.80665
+SITE = Site(up=(0.0, 0.0, 1.0), gravity_m_s2=GRAVITY, earth_rate_rad_s=None, gravity_expanded_m_s2=1e-5)
+RANGES_G = {"lsm9ds1": 2.0, "mpu9250": 2.0, "adis16465": 8.0, "kvh1775": 10.0}
+STEPS_K = {"lsm9ds1": 1 / 16, "mpu9250": 1 / 333.87, "adis16465": 0.1, "kvh1775": 1.0}
+JOINTS, AXES = joints_rad(EIGHTEEN), 6
+SWEEP_S, BETWEEN_S = 6.0, 8.0
+ASKEW = np.array([1.0, -0.7, 0.5])
+SAMPLE_RATE_HZ = 200.0
+WARMER_K = 0.3  # either way, in a run
+AVERAGED = 500.0  # readings in a mean
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One run's readings, what of scale and bias is true of them (6,), and what is known of sensor and arm."""
+
+    part: str
+    truth: Truth
+    movement: Movement
+    parameters: Array
+    arm_rad: float
+
+    @property
+    def times_s(self) -> Array:
+        """(N + M,) of the middles."""
+        assert self.movement.own is not None
+        return np.asarray(self.movement.own.windows_s.mean(axis=1), dtype=np.float64)
+
+    @property
+    def late(self) -> Array:
+        """(N + M,) 1 in the second half of the run."""
+        return np.asarray(self.times_s > (self.times_s.min() + self.times_s.max()) / 2, dtype=np.float64)
+
+    def reading(self, more: Array, then: Array | float = 0.0) -> "Session":
+        """With so much (3 K,) more in its readings, which makes `then` (6,) of its parameters."""
+        added, count = more.reshape(-1, 3), len(self.movement.dwells.readings_m_s2)
+        dwells, sweeps = self.movement.dwells, self.movement.sweeps
+        movement = replace(
+            self.movement,
+            dwells=replace(dwells, readings_m_s2=dwells.readings_m_s2 + added[:count]),
+            sweeps=replace(sweeps, harmonics_m_s2=sweeps.harmonics_m_s2 + added[count:].reshape(-1, 3, 3)),
+        )
+        return replace(self, movement=movement, parameters=self.parameters + then)
+
+
+def sheet_of(part: str) -> Sheet:
+    """What is known of an accelerometer of that kind."""
+    known = PARTS[part]
+    return Sheet(
+        known.acceleration_nonlinearity_percent,
+        known.acceleration_nonlinear_over_g or RANGES_G[part],
+        known.acceleration_bias_mg_k,
+        known.acceleration_scale_ppm_k,
+        known.acceleration_bias_instability_ug,
+    )
+
+
+def drawn(part: str, seed: int, arm_rad: float = 1e-4, warmer_k: float = WARMER_K, *, evenly: bool = True) -> Session:
+    """Eighteen dwells after sweeps about six axes, at temperatures that stray by so much.
+
+    What a data sheet bounds is `evenly` drawn within its bounds, or normal with the standard deviation of that.
+    """
+    rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
+    density = PARTS[part].acceleration_noise_ug_sqrt_hz
+    truth = Truth(
+        matrix=np.diag(1 + 0.02 * rng.normal(size=3)) @ (np.eye(3) + 0.005 * rng.normal(size=(3, 3))),
+        bias_m_s2=0.1 * rng.normal(size=3),
+        reference_m_s2=np.array([0.0, 0.0, GRAVITY]),
+        lever_arm_m=np.array([0.02, 0.01, 0.03]),
+        delay_s=0.004,
+    )
+    arm, turned = crooked_arm(arm_rad, rng), planned(AXES)
+    straight = Movement(
+        recorded_dwells(truth, arm, JOINTS, density, rng), recorded_sweeps(truth, arm, turned, density, rng)
+    )
+    even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
+    start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
+    length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
+    warm_c = 22 + warmer_k * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
+    stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
+    pieces = [
+        Piece(number, (start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
+        for number, (start, length, warm, place) in enumerate(zip(start_s, length_s, warm_c, stood, strict=True))
+    ]
+    own = errors_of(sheet, pieces, STEPS_K[part], second_order=False)
+    movement = replace(straight, own=own, arm_turns=arm_turns(stood, NOMINAL, np.eye(3)))
+    session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
+
+    def within(half_width: float) -> Array:
+        return rng.uniform(-half_width, half_width, 3) if evenly else half_width / STANDARD * rng.normal(size=3)
+
+    chi, theta = within(odd), truth.theta()
+    warm = of_pieces(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
+    bent = of_sensor(theta, movement, np.square) @ within(even)
+    bent += of_sensor(theta, movement, lambda along: along**3) @ chi
+    bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ within(bias_k)
+    bent += per_axis(_along(session) * warm[:, None]) @ within(1e-6 * sheet.scale_ppm_k)
+    flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
+    flickering = movement.constant() * [of_pieces(each, movement) for each in flickered]
+    bent += own.instability_m_s2 * flickering.T.ravel()
+    return session.reading(bent, _parameters(truth, chi) - session.parameters)
+
+
+def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
+    """The solution, its budget, and by how much scale and bias (6,) are off."""
+    movement = session.movement
+    solution = solve_imu(
+        movement.dwells,
+        movement.sweeps,
+        gravity_m_s2=GRAVITY,
+        own=movement.own,
+        arm_turns=movement.arm_turns,
+        own_shares=OWN_SHARES,
+    )
+    freedom = np.full(movement.readings().size, AVERAGED)
+    budget = accelerometer_budget(solution, movement, SITE, 0.0, sheet=sheet_of(session.part), noise_freedom=freedom)
+    found = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
+    return solution, budget, found - session.parameters
+
+
+def read_of(session: Session, solution: ImuSolution) -> Read:
+    """What is held against itself."""
+    turned = planned(AXES)
+    stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
+    known = Known(NOMINAL, float(np.degrees(STANDARD * session.arm_rad)), np.eye(3), solution.attitude_error.std_rad)
+    patterns = arm_patterns(solution.theta, session.movement, stood, known)
+    return Read(solution.theta, session.movement, patterns, session.times_s, second_order=False)
+
+
+def told_of(session: Session, solution: ImuSolution, rate: float) -> set[str]:
+    """The names of what is beyond its limit."""
+    found = reference_consistency(read_of(session, solution), rate)
+    beyond = {name for name, (value, limit) in found.statistics.items() if value > limit}
+    return beyond | ({"disturbed"} if found.disturbed else set())
+
+
+Damage = Callable[[Session, float], Session]
+
+
+def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
+    """By what an axis adds that feels so much; `scale` is the part of it that is seen at 1 g up and down."""
+
+    def damage(session: Session, size: float) -> Session:
+        more = of_sensor(
+            session.truth.theta(), session.movement, lambda along: size * change(along / GRAVITY) * GRAVITY
+        )
+        then = np.zeros(6)
+        then[:3] = 1 / (1 / session.parameters[:3] + size * scale) - session.parameters[:3]
+        return session.reading(more @ np.ones(3), then)
+
+    return damage
+
+
+def stepped(session: Session, size: float) -> Session:
+    """The bias changes half-way; true is its mean."""
+    more = per_axis((of_pieces(session.late, session.movement) * session.movement.constant())[:, None] * ASKEW)
+    return session.reading(size * more @ np.ones(3), np.concatenate([np.zeros(3), size * ASKEW / 2]))
+
+
+def scaled(axes: Array) -> Damage:
+    """Scale factors change half-way; true is their mean."""
+
+    def damage(session: Session, size: float) -> Session:
+        more = per_axis(_along(session) * of_pieces(session.late, session.movement)[:, None])
+        return session.reading(size * more @ axes, np.concatenate([-size * axes / 2, np.zeros(3)]) * session.parameters)
+
+    return damage
+
+
+def swept(session: Session, size: float) -> Session:
+    """Another bias in sweeps alone, of which that at rest is meant."""
+    turning = session.movement.constant()
+    turning[: len(JOINTS)] = 0.0
+    return session.reading(size * per_axis(turning[:, None] * ASKEW) @ np.ones(3))
+
+
+def disturbed(session: Session, size: float) -> Session:
+    """Another reading in one dwell."""
+    more = np.zeros((len(session.movement.readings()), 3))
+    more[3] = size * ASKEW
+    return session.reading(more.ravel())
+
+
+def _along(session: Session) -> Array:
+    """(K, 3) what each axis feels."""
+    return np.asarray(felt(session.truth.theta(), session.movement) @ session.truth.matrix.T, dtype=np.float64)
+
+
+def _parameters(truth: Truth, chi: Array) -> Array:
+    """(6,) by the readings at 1 g up and down, and at 0 g."""
+    return np.concatenate([1 / (np.linalg.norm(truth.matrix, axis=1) + chi * GRAVITY**2), truth.bias_m_s2])

@@ -1,0 +1,250 @@
+"""Recordings of whole sensors on whole arms, drawn from what the configuration states of both: nothing is damaged.
+
+What the arm's encoders do not see lies within `uncertainty.*`, what the sensor does beside its noise within its data
+sheet: so p-values of checks that know as much, and no more, are uniform.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rig.config.sensors.sensor_catalogue import PARTS
+from rig.data.quantity import RATE
+from rig.data.recording.channel import of_thermometer, of_three_axes
+from rig.data.recording.recorded_sensor import RecordedSensor
+from rig.data.recording.run_file import RunData
+from rig.data.recording.settings import Uncertainty
+from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from rig.estimation.gyroscope.nonlinearity import CUBE_MISSED
+from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
+from rig.motion.steps import Sweep, Transfer
+from support.recordings.drawn_ripple import Ripple
+from support.recordings.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times, sizes_of
+
+WRISTS = (3, 4, 5)
+WAVE_SHARE = 0.3  # as the solver has it
+OUTWARDS_S = 0.1  # in which a joint that begins to move comes to where its friction holds it
+ARC_WAVES = np.arange(1, 5)  # of encoders: at ends 90°, 180° and 270° apart they err independently of each other
+OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Of sensors: what is recorded of one, and standard deviations of what it does.
+
+    `sent` makes of rates (n, 3) what a source sends of them, of one that rounds them otherwise than to counts.
+    """
+
+    sensor: RecordedSensor
+    noise_rad_s: float
+    flicker_rad_s: float
+    walk_rad_s_sqrt_s: float
+    sent: Callable[[Array], Array] = lambda rates: rates
+
+
+ADIS16465 = replace(
+    SENSOR,
+    part="adis16465",
+    serial_number="ADIS16465-001",
+    rate_hz=200.0,
+    channels=(  # of its 32 bits, but for the last six
+        of_three_axes(RATE, float(np.radians(0.025)) / 2**10, 500 * 40 * 2**10, float(np.radians(500))),
+        of_thermometer(1 / 16, 25.0),
+    ),
+)
+MPU9250 = replace(
+    SENSOR,
+    part="mpu9250",
+    serial_number="MPU9250-001",
+    rate_hz=200.0,
+    channels=(
+        of_three_axes(RATE, float(np.radians(250)) / 2**15, 32767, float(np.radians(250))),
+        of_thermometer(1 / 333.87, 21.0),
+    ),
+)
+KVH1775 = replace(
+    SENSOR,
+    part="kvh1775",
+    serial_number="1775-0042",
+    rate_hz=250.0,
+    channels=(
+        of_three_axes(RATE, float(np.radians(490)) / 2**30, 2**30, float(np.radians(490))),
+        of_thermometer(0.01, 0.0),
+    ),
+    clock="gyro",
+)
+KINDS = {
+    "noisy LSM9DS1": Kind(SENSOR, 0.035, 4.8e-5, 1e-5),
+    "quiet LSM9DS1": Kind(SENSOR, 0.002, 4.8e-5, 1e-5),
+    "ADIS16465": Kind(ADIS16465, 0.00045, 9.7e-6, 3e-7),
+    "MPU-9250": Kind(MPU9250, 0.002, 4.8e-5, 1e-5),
+    "KVH 1775": Kind(KVH1775, 5.5e-5, 2.4e-7, 1e-8),  # 0.012 °/√h at 250 Hz, 0.05 °/h
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt.
+
+    The truth beside it: `scale` (3,) at the sweeps' speed, either way, and what was read at each time without turning.
+    """
+
+    run: RunData
+    time_s: Array
+    felt_rad_s: Array
+    scale: Array
+    bias_rad_s: Array
+
+
+def drawn(
+    seed: int, kind: Kind, setup: Setup | None = None, ripple: Ripple | None = None, *, vibrates: bool = True
+) -> Drawn:
+    """The movement is that of `setup`, if any; it is as uneven as `ripple` says, or as is usual, or not at all."""
+    rng = np.random.default_rng(seed)
+    seen = rng.spawn(1)[0]
+    setup = replace(
+        Setup() if setup is None else setup,
+        seed=seed,
+        sample_rate_hz=kind.sensor.rate_hz,
+        vibration=vibrates * float(rng.uniform(0.0, 0.05)),
+        seen_vibration_rad_s=vibrates * float(seen.uniform(0.0, 0.002)),
+        seen_vibration_hz=float(seen.uniform(8.0, 30.0)),
+        boot_s=float(rng.uniform(-1e4, 0.0)),
+        drift=float(rng.uniform(-5e-5, 5e-5)),
+    )
+    if ripple is not None:
+        setup = replace(
+            setup,
+            vibration=ripple.fraction,
+            orders=tuple(ripple.orders),
+            seen_vibration_rad_s=ripple.seen_rad_s,
+            seen_vibration_hz=ripple.seen_hz,
+            unseen_vibration_rad_s=ripple.unseen_rad_s,
+            unseen_vibration_hz=tuple(ripple.unseen_hz),
+        )
+    motion = Motion(setup, rng)
+    known = motion.settings.uncertainty
+    assert known is not None
+    board_s, time_s = sample_times(setup, motion)
+    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng, setup.encoders_err, vibrates=vibrates)
+    to_flange = flange_attitude(q_rad, arm)
+    place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
+    pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
+    room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
+    turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
+    felt, scale = _felt(turned, pull, kind, rng, np.radians(setup.speed_deg_s))
+    bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
+    read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
+    run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
+    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes_of({"gyro": kind.sensor.part})))
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt, scale, bias)
+
+
+def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
+    """With so much (n, 3) added to the readings."""
+    samples = seen.run.samples["gyro"].copy()
+    samples["counts"] += np.round(by_rad_s / kind.sensor.channel(RATE).unit_per_count).astype(samples["counts"].dtype)
+    return replace(seen.run, samples={"gyro": samples})
+
+
+def _counts(read: Array, kind: Kind) -> Array:
+    full = kind.sensor.channel(RATE).full_scale_counts
+    assert full is not None
+    counts: Array = np.clip(np.round(kind.sent(read) / kind.sensor.channel(RATE).unit_per_count), -full, full)
+    return counts
+
+
+def _beside_the_encoders(
+    motion: Motion,
+    time_s: Array,
+    known: Uncertainty,
+    rng: np.random.Generator,
+    encoders_err: float,
+    *,
+    vibrates: bool = True,
+) -> tuple[Array, Array, DenavitHartenberg]:
+    """True angles and speeds, and how the arm is made; the encoders see neither."""
+    q, qd = motion.joints(time_s)
+    axis_rad, again_rad = np.radians([known.axis_deg, known.repeatability_deg])
+    true, speed = q.copy(), qd.copy()
+    once, twice = WAVE_SHARE * axis_rad / np.sqrt(3) * rng.standard_normal((2, 2, 6))
+    encoders = rng.spawn(1)[0].standard_normal((len(ARC_WAVES), 2, 6))  # drawn beside all else
+    if motion.settings.has_arcs:
+        encoders *= encoders_err * known.angle_std_rad / np.sqrt(len(ARC_WAVES))
+        once, twice = np.zeros((2, 2, 6))  # are among them
+        for joint in WRISTS:
+            angle, home = np.outer(q[:, joint], ARC_WAVES), motion.plan.home_q_rad[joint] * ARC_WAVES
+            cos, sin = encoders[:, :, joint].T
+            true[:, joint] += (np.cos(angle) - np.cos(home)) @ cos + (np.sin(angle) - np.sin(home)) @ sin
+            speed[:, joint] *= 1 + (np.cos(angle) * ARC_WAVES) @ sin - (np.sin(angle) * ARC_WAVES) @ cos
+    for joint in WRISTS:
+        e = q[:, joint]
+        (a, b), (c, d) = once[:, joint], twice[:, joint]
+        true[:, joint] += a * np.cos(e) + b * np.sin(e) + c * np.cos(2 * e) + d * np.sin(2 * e)
+        speed[:, joint] *= 1 - a * np.sin(e) + b * np.cos(e) - 2 * c * np.sin(2 * e) + 2 * d * np.cos(2 * e)
+        true[:, joint] += axis_rad * rng.uniform(-1, 1)
+    off = np.zeros(6)
+    for step, end in zip(motion.plan.steps, motion.ends, strict=True):
+        if not isinstance(step, (Sweep, Transfer)):
+            continue
+        moves = np.not_equal(step.start_q_rad, step.target_q_rad)
+        then = np.where(moves, again_rad * rng.uniform(-1, 1, 6), off)
+        share = np.clip((time_s - (end - step.duration_s)) / OUTWARDS_S, 0, 1)
+        true += share[:, None] * (then - off)
+        speed += ((share > 0) & (share < 1))[:, None] * (then - off) / OUTWARDS_S
+        off = then
+    vibration, hertz = vibrates * rng.uniform(0, 0.004), rng.uniform(8, 30)
+    lines_hz = [hertz]
+    if motion.unseen_hz:
+        vibration, lines_hz = motion.unseen_rad_s, list(motion.unseen_hz)
+    for each in lines_hz:
+        wave = np.cos(2 * np.pi * each * time_s[:, None] + rng.uniform(0, 6, 3))
+        speed[:, WRISTS] += vibration * np.sqrt(2 / len(lines_hz)) * wave
+    twist = np.zeros(6)
+    twist[list(WRISTS)] = axis_rad * rng.uniform(-1, 1, 3)
+    alpha = tuple((np.array(NOMINAL.alpha_rad) + twist).tolist())
+    return true, speed, replace(NOMINAL, alpha_rad=alpha)
+
+
+def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator, speed_rad_s: float) -> tuple[Array, Array]:
+    """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity; and its scale (3,)."""
+    part = PARTS[kind.sensor.part]
+    along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
+    most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
+    leaning = np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad)
+    along = along @ leaning
+    cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
+    to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
+    scale = rng.uniform(0.9, 1.1, 3)
+    even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
+    felt: Array = along * (1 + cube * along**2 + even * along) / scale + pull @ to_gravity.T
+    whole = np.linalg.norm(leaning, axis=0)
+    return felt, scale / (whole * (1 + cube * (whole * speed_rad_s) ** 2))
+
+
+def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
+    """(n, 3) of a random walk and of processes that forget in times an octave or two apart."""
+    from scipy.signal import lfilter
+
+    step_s = 1 / kind.sensor.rate_hz
+    walk = rng.uniform(0.5, 3) * kind.walk_rad_s_sqrt_s * np.sqrt(step_s)
+    wandered = np.cumsum(walk * rng.standard_normal((count, 3)), axis=0)
+    size = rng.uniform(0.5, 1.5) * kind.flicker_rad_s  # two octaves of flicker make its Allan deviation
+    for octave_s in OCTAVES_S:
+        memory = np.exp(-step_s / octave_s)
+        steps = size * np.sqrt(1 - memory**2) * rng.standard_normal((count, 3))
+        steps[0] = size * rng.standard_normal(3)
+        wandered += lfilter([1.0], [1.0, -memory], steps, axis=0)
+    return wandered
+
+
+def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
+    """The encoders are not looked at quite when a state says."""
+    arm = run.states.copy()
+    late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))
+    q_rad, _ = motion.joints(arm["time_s"] + late_s)
+    arm["q_rad"] = np.round(q_rad / setup.encoder_step_rad) * setup.encoder_step_rad
+    return replace(run, states=arm)

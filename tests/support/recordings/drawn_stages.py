@@ -1,0 +1,85 @@
+"""Recordings of one sensor on one arm, mounted anew from stage to stage and each time a little off, drawn as
+`support.recordings.drawn_recording` draws one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rig.config.load import parse
+from rig.config.procedures.procedure_sections import SixSweepsSection
+from rig.config.procedures.stage_section import rotation_by
+from rig.data.recording.run_file import RunData
+from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from rig.motion.geometry import flange_attitude, flange_pose, flange_rate
+from rig.plans.motions.six_sweeps import plan_six_observation
+from support.recordings.drawn_recording import Kind, _beside_the_encoders, _counts, _felt, _looked_at_late, _wandering
+from support.recordings.synthetic_run import Motion, Setup, run_data, sample_times, sizes_of
+
+QUARTER_TURNS = (
+    "{instruction: as it is}",
+    "{instruction: a quarter about z, mount: {x: +y, y: -x, z: +z}}",
+    "{instruction: a quarter about x, mount: {x: +x, y: +z, z: -y}}",
+)
+
+
+def staged(setup: Setup, stages: Sequence[str] = QUARTER_TURNS) -> Setup:
+    """The same movement in stages."""
+    return replace(setup, procedure=(*setup.procedure, ("stages", f"[{', '.join(stages)}]")))
+
+
+def drawn_stages(seed: int, kind: Kind, setup: Setup, off_deg: Array) -> tuple[list[RunData], Array]:
+    """A recording of each stage that `setup` names, and the (3,) scale factors that were drawn.
+
+    `off_deg` (S, 3) are rotation vectors by which what the item feels is turned beside its mounts. Sensor and arm are
+    the same in all stages; the noise, the wandering and the clock are each stage's own.
+    """
+    runs: list[RunData] = []
+    scale: Array = np.ones(3)
+    for stage, off in enumerate(np.radians(off_deg)):
+        alike, own = np.random.default_rng([seed, 1000]), np.random.default_rng([seed, stage])
+        room = EARTH_RATE_RAD_S * alike.uniform(-1, 1, 3)
+        bias = alike.uniform(-0.02, 0.02, 3)
+        made = replace(
+            setup,
+            seed=seed,
+            sample_rate_hz=kind.sensor.rate_hz,
+            vibration=float(own.uniform(0.0, 0.05)),
+            boot_s=float(own.uniform(-1e4, 0.0)),
+            drift=float(alike.uniform(-5e-5, 5e-5)),
+        )
+        motion = of_stage(made, stage, own)
+        known = motion.settings.uncertainty
+        assert known is not None
+        board_s, time_s = sample_times(made, motion)
+        q_rad, qd_rad_s, arm = _beside_the_encoders(
+            motion, time_s, known, np.random.default_rng([seed, 2000]), setup.encoders_err
+        )
+        to_item = rotation_by(off) @ np.array(motion.settings.mount)
+        to_flange = flange_attitude(q_rad, arm)
+        place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
+        pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
+        turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
+        alike_rng, speed_rad_s = np.random.default_rng([seed, 3000]), float(np.radians(setup.speed_deg_s))
+        felt, scale = _felt(turned @ to_item.T, pull @ to_item.T, kind, alike_rng, speed_rad_s)
+        read = felt + bias + _wandering(len(time_s), kind, own) + kind.noise_rad_s * own.standard_normal(felt.shape)
+        run = _looked_at_late(run_data(made, motion, board_s, _counts(read, kind)), motion, made, own)
+        sizes = sizes_of({"gyro": kind.sensor.part})
+        settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
+        runs.append(replace(run, sensors={"gyro": kind.sensor}, settings=settings))
+    return runs, scale
+
+
+def of_stage(setup: Setup, stage: int, rng: np.random.Generator) -> Motion:
+    """The movement of one stage, and the settings of its recording."""
+    motion = Motion(setup, rng)
+    config = parse(motion.config).config
+    assert isinstance(config.procedure, SixSweepsSection)
+    others = {index for place, each in enumerate(motion.plan.stages) for index in each.indices if place != stage}
+    motion.plan = plan_six_observation(config.arm, config.procedure, done=others)
+    motion.settings = replace(motion.settings, stage=stage)
+    motion.ends = 101.0 + np.cumsum([step.duration_s for step in motion.plan.steps])
+    motion.end_s = float(motion.ends[-1]) + 1.0
+    return motion

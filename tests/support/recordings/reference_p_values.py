@@ -1,0 +1,20 @@
+"""What chance says of what accelerometers and magnetometers contradict."""
+
+import numpy as np
+
+from rig.analysis.consistency.reference_consistency import reference_consistency
+from rig.analysis.consistency.reference_suspected import Read
+
+RATES = np.concatenate([np.geomspace(1e-4, 0.02, 5), np.linspace(0.05, 0.95, 19)])
+
+
+def p_values(read: Read) -> dict[str, float]:
+    """The rate of false alarms at which each statistic is just beyond its limit."""
+    beyond: dict[str, float] = {}
+    for rate in RATES:
+        for name, (value, limit) in reference_consistency(read, float(rate)).statistics.items():
+            if value > limit:
+                beyond.setdefault(name, float(rate))
+            elif rate == RATES[-1]:
+                beyond.setdefault(name, 1.0)
+    return beyond

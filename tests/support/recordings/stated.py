@@ -1,0 +1,125 @@
+"""Two results of one recording, held against each other by what their numbers mean: by the uncertainty they state.
+
+A processor's rounding is no difference, and neither is the order in which its kernel adds.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from rig.data.entries.earth_rate import EarthRateEntry
+from rig.data.entries.magnetometer import MagnetometerEntry
+from rig.data.result_file import (
+    AverageEntry,
+    CheckEntry,
+    ComparisonEntry,
+    ObservationEntry,
+    ResultDocument,
+    read_result,
+)
+from rig.report.findings.followed import Parameter
+from rig.report.kinds.registry import followed
+
+SHARE = 1e-6
+Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share
+
+
+def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
+    """Every number of `expected` that `found` lacks or has otherwise, verdict and checks too; there may be more.
+
+    A value is held by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count as it is.
+    """
+    told = _moved(_numbers(expected), _numbers(found))
+    said = {check.name: _said(check) for check in found.checks}
+    told += [
+        f"check {check.name}: {_said(check)}, now {said.get(check.name)}"
+        for check in expected.checks
+        if said.get(check.name) != _said(check)
+    ]
+    return told if expected.verdict == found.verdict else [*told, f"verdict: {expected.verdict}, now {found.verdict}"]
+
+
+def _said(check: CheckEntry) -> tuple[object, ...]:
+    """Whether it passed, and what it is of: one of fitness may say more of that than it did."""
+    means = check.means
+    return check.passed, means if means.kind == "conformity" else (means.kind, means.sweep)
+
+
+def solved_otherwise(run: Path, printed: str) -> list[str]:
+    """The same of a run's result and of what `rig solve --json` prints of it."""
+    return differences(read_result(run), ResultDocument.model_validate_json(printed))
+
+
+def moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
+    """The same of one sensor's parameters."""
+    return _moved(_of_parameters("", expected), _of_parameters("", found))
+
+
+def _moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
+    values = {name: value for name, value, _ in found}
+    return [
+        f"{name}: {value!r} (± {std:.2g}), now {values.get(name)!r}"
+        for name, value, std in expected
+        if name not in values or not abs(values[name] - value) <= SHARE * std
+    ]
+
+
+def _numbers(document: ResultDocument) -> Iterator[Number]:
+    for sensor in followed(document):
+        yield from _of_parameters(f"{sensor.sensor} {sensor.quantity} ", sensor.parameters)
+    for check in document.checks:
+        if check.value is not None:
+            yield f"check {check.name}", check.value, abs(check.limit or 0.0)
+    yield from _of_gyroscopes(document)
+    yield from _of_attitudes(document)
+    for name, against in document.verification.items():
+        yield from _vector(f"{name} rotation", against.rotation.vector_rad, against.rotation.std_rad)
+        yield from _of_comparison(f"{name} after", against.after)
+        if against.before is not None:
+            yield from _of_comparison(f"{name} before", against.before)
+    for name, drifts in document.bias_drift.items():
+        for quantity, drift in drifts.items():
+            for i, repeat in enumerate(drift.repeats):
+                yield from _vector(f"{name} {quantity} repeat {i}", repeat.scale_fixed.bias, repeat.scale_fixed.std)
+
+
+def _of_gyroscopes(document: ResultDocument) -> Iterator[Number]:
+    for name, gyroscope in document.gyroscopes.items():
+        averages: list[ObservationEntry | AverageEntry] = [*gyroscope.observations, *gyroscope.rests]
+        for i, average in enumerate(averages):
+            yield f"{name} average {i} samples", average.samples, 0.0
+            yield from _vector(f"{name} average {i}", average.mean_rad_s, average.mean_std_rad_s)
+        if isinstance(gyroscope.earth_rate, EarthRateEntry):
+            stds = [gyroscope.earth_rate.covariance_rad2_s2[i][i] ** 0.5 for i in range(3)]
+            yield from _vector(f"{name} Earth's rate", gyroscope.earth_rate.rate_rad_s, stds)
+
+
+def _of_attitudes(document: ResultDocument) -> Iterator[Number]:
+    for name, accelerometer in document.accelerometers.items():
+        for dwell in accelerometer.dwells:
+            yield from _vector(f"{name} acceleration in {dwell.index}", dwell.mean_m_s2, dwell.mean_std_m_s2)
+        if accelerometer.lever_arm_m is not None and accelerometer.lever_arm_std_m is not None:
+            yield from _vector(f"{name} lever arm", accelerometer.lever_arm_m, accelerometer.lever_arm_std_m)
+    for name, magnetometer in document.magnetometers.items():
+        if isinstance(magnetometer, MagnetometerEntry):
+            for seen in magnetometer.dwells:
+                yield from _vector(f"{name} field in {seen.index}", seen.mean_t, seen.mean_std_t)
+
+
+def _of_parameters(of: str, parameters: Iterable[Parameter]) -> Iterator[Number]:
+    for each in parameters:
+        yield f"{of}{each.name}", each.value, each.std
+        yield f"{of}u({each.name})", each.std, each.std
+        yield f"{of}s({each.name})", each.std_statistical, each.std_statistical
+
+
+def _of_comparison(name: str, compared: ComparisonEntry) -> Iterator[Number]:
+    rms = compared.movement.rms_rad_s
+    yield from ((f"{name} rms {axis}", size, size) for axis, size in zip("xyz", rms, strict=True))
+    for turn in compared.revolutions:
+        yield from _vector(f"{name} sweep {turn.sweep}", turn.error_rad_s, turn.std_rad_s)
+
+
+def _vector(name: str, values: Sequence[float], stds: Sequence[float]) -> Iterator[Number]:
+    for axis, value, std in zip("xyz", values, stds, strict=True):
+        yield f"{name} {axis}", value, std
+        yield f"{name} s({axis})", std, std

@@ -1,0 +1,80 @@
+"""Recordings of two gyroscopes on one board, computed: the one under test, raw or calibrated, and its reference."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.analysis.gyroscope.alignment import Calibration
+from rig.data.recording.run_file import RunData
+from rig.estimation.arrays import Array
+from support.recordings.recorded import with_channel
+from support.recordings.synthetic_run import (
+    BIAS_RAD_S,
+    SCALE,
+    SENSITIVITY,
+    Motion,
+    Setup,
+    readings,
+    run_data,
+    sample_times,
+    sizes_of,
+    true_rate,
+)
+
+REFERENCE = Setup(
+    scale=(1.002, 0.998, 1.001),
+    bias_rad_s=(0.0021, -0.0015, 0.0008),
+    noise_rad_s=0.001,
+    mounting_error_rad=(0.01, 0.02, -0.015),
+    sample_rate_hz=200.0,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """The calibration the board applies in calibrated mode; without an argument, the truth."""
+
+    scale: Array
+    bias_rad_s: Array
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) K."""
+        return np.diag(self.scale)
+
+
+TRUTH = Stored(np.array(SCALE), np.array(BIAS_RAD_S))
+
+
+def recording(
+    setup: Setup,
+    *,
+    stored: Calibration | None = None,
+    reference: Setup = REFERENCE,
+    lag_s: float = 0.0,
+    axes: Array | None = None,
+) -> RunData:
+    """Sensors `gyro` and `reference`; the board corrects the gyro's readings by `stored`; None leaves them raw.
+
+    The gyro's filter lags the reference's by `lag_s`; `axes` (3, 3) are what it feels in place of the flange's.
+    """
+    skew = {"gyro": np.eye(3) if axes is None else axes, "reference": np.eye(3)}
+    rng = np.random.default_rng(setup.seed)
+    motion = Motion(setup, rng)
+    runs = {}
+    for name, part in (("gyro", setup), ("reference", replace(reference, boot_s=setup.boot_s))):
+        board_s, controller_s = sample_times(part, motion)
+        felt = true_rate(motion, controller_s - (lag_s if name == "gyro" else 0.0))
+        runs[name] = run_data(setup, motion, board_s, readings(part, felt @ skew[name].T, rng))
+    run = runs["gyro"]
+    sensors = {**run.sensors, "reference": replace(run.sensors["gyro"], part="adis16465", rate_hz=200.0)}
+    samples = {**run.samples, "reference": runs["reference"].samples["gyro"]}
+    if stored is not None:
+        raw = samples["gyro"]["counts"] * SENSITIVITY
+        samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
+        corrected = with_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
+        sensors["gyro"] = replace(corrected, mode="calibrated")
+    known = run.settings.stated_uncertainty
+    sizes = sizes_of({name: sensor.part for name, sensor in sensors.items()})
+    settings = replace(run.settings, uncertainty=known.model_copy(update=sizes))
+    return replace(run, sensors=sensors, samples=samples, settings=settings)

@@ -1,0 +1,58 @@
+"""A relay between the arm's driver and the simulated controller, on an address of its own: a wire that can stall."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from support.laboratories.worlds import fresh_host
+
+PORTS = (29999, 30001, 30003, 30004, 8077)  # the last: a Robot API, where the tests have one
+
+
+class ArmRelay:
+    """Passes on what comes at `host`. While `stalled` is set it takes nothing more in, either way."""
+
+    def __init__(self, far_host: str, host: str | None = None) -> None:
+        self.host = host or fresh_host()
+        self.stalled = threading.Event()
+        self._far_host = far_host
+        self._sockets: list[socket.socket] = []
+        for port in PORTS:
+            listener = socket.create_server((self.host, port))
+            self._sockets.append(listener)
+            threading.Thread(target=self._accept, args=(listener, port), daemon=True).start()
+
+    def _accept(self, listener: socket.socket, port: int) -> None:
+        with suppress(OSError):
+            while True:
+                near, _ = listener.accept()
+                far = socket.create_connection((self._far_host, port))
+                self._sockets += [near, far]
+                for source, sink in ((near, far), (far, near)):
+                    source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                    threading.Thread(target=self._pass_on, args=(source, sink), daemon=True).start()
+
+    def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
+        with suppress(OSError):
+            while data := source.recv(65536):
+                while self.stalled.is_set():
+                    threading.Event().wait(0.005)
+                sink.sendall(data)
+        with suppress(OSError):
+            sink.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        for each in self._sockets:
+            with suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+
+@contextmanager
+def relay(far_host: str, host: str | None = None) -> Iterator[ArmRelay]:
+    running = ArmRelay(far_host, host)
+    try:
+        yield running
+    finally:
+        running.close()
