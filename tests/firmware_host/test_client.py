@@ -61,7 +61,8 @@ class BoardOnAWire(threading.Thread):
             if self.reset.is_set():
                 self.reset.clear()
                 self.board.core.board_reset()
-            now_us = int((time.monotonic() - start_s) * 1e6)
+            # Its time passes no conversion that is due, however late this thread is: a part is not silent for that.
+            now_us = min(int((time.monotonic() - start_s) * 1e6), (converted + 1) * PERIOD_US)
             try:
                 self.board.set_time(now_us)
                 self.board.receive(os.read(fd, 4096) if readable else b"")
