@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.check import Check, unsolved_checks
 from rig.analysis.clock import ClockCheck
 from rig.analysis.consistency.contradictions import contradictions, in_reference
-from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.consistency.detection_limits import ToldFrom
 from rig.analysis.estimators import Estimator, known_estimator
 from rig.analysis.gyroscope.board_averages import board_averages
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed

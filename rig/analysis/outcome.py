@@ -11,7 +11,7 @@ from rig.errors.attempts import Attempts
 if TYPE_CHECKING:
     from rig.analysis.check import Check
     from rig.analysis.clock import ClockCheck
-    from rig.analysis.consistency.told_from import ToldFrom
+    from rig.analysis.consistency.detection_limits import ToldFrom
     from rig.analysis.external.elsewhere import OfSensor
     from rig.analysis.gyroscope.calibration import SensorResult
     from rig.analysis.gyroscope.mounts import FoundMount

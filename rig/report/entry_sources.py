@@ -14,7 +14,7 @@ from pydantic import BaseModel
 from firmware_host.answers import BoardSolution
 from rig.analysis.check import Check
 from rig.analysis.clock import ClockCheck, ClockComparison
-from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.consistency.detection_limits import ToldFrom
 from rig.analysis.external.attitudes import InAttitudes
 from rig.analysis.external.increments import InIncrements
 from rig.analysis.gyroscope.alignment import RelativeRotation

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rig.analysis.check import Check, fitness
-from rig.analysis.consistency import consistency, readings
-from rig.analysis.consistency.allowance import allow, allowed
+from rig.analysis.consistency import gyroscope_checks, readings
+from rig.analysis.consistency.detection_limits import ToldFrom, of_gyroscope, of_reference
 from rig.analysis.consistency.frozen_axis import longest_frozen
 from rig.analysis.consistency.reference_contradictions import (
     DISTURBED_SWEEP,
@@ -17,8 +17,8 @@ from rig.analysis.consistency.reference_contradictions import (
     of_magnetometer,
     reference_statistics,
 )
-from rig.analysis.consistency.suspicion import Statistic
-from rig.analysis.consistency.told_from import ToldFrom, of_gyroscope, of_reference
+from rig.analysis.consistency.residual_tests import Statistic
+from rig.analysis.consistency.systematic_errors import allow, allowed
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
 from rig.analysis.gyroscope.mounts import observe_as_mounted
 from rig.analysis.gyroscope.segments import stack_segments, with_transfers
@@ -40,7 +40,7 @@ from rig.observation.observed_run import ObservedRun
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 NON_ORTHOGONALITY = "non_orthogonality"
 # Of a gyroscope: they share the false alarms. Other kinds of readings count as many.
-CHECKS = (*consistency.CHECKS, DISTURBED_SWEEP, *readings.CHECKS, NON_ORTHOGONALITY)
+CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *readings.CHECKS, NON_ORTHOGONALITY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ def contradictions(
         transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
         ways = with_transfers(segments, transfers, windows, explained)
         allowance = allow(known, segments, ways, matrix)
-        found = consistency.consistency(segments, matrix, rate, allowance)
+        found = gyroscope_checks.consistency(segments, matrix, rate, allowance)
         sensor = recordings[0].run.sensors[name]
         gyroscope = sensor.channel(RATE)
         counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]

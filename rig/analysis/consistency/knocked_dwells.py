@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rig.analysis.consistency.suspicion import Statistic
+from rig.analysis.consistency.residual_tests import Statistic
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.dwell_halves import compare_halves

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from rig.analysis.consistency.knocked_dwells import hold_halves_together
 from rig.analysis.consistency.readings import COUNTS, Digits, digits_of, judge_readings
-from rig.analysis.consistency.reference_consistency import reference_consistency
-from rig.analysis.consistency.reference_suspected import Read
-from rig.analysis.consistency.suspicion import Statistic
+from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_checks import reference_consistency
+from rig.analysis.consistency.residual_tests import Statistic
 from rig.analysis.reference.acceleration import AccelerometerResult
 from rig.analysis.reference.accelerometer_errors import pieces_of
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns

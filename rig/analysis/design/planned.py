@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency import reference_consistency
-from rig.analysis.consistency.allowance import allow, allowed_of, any_earth_rate
-from rig.analysis.consistency.consistency import would_tell
+from rig.analysis.consistency import reference_checks
+from rig.analysis.consistency.alternatives import DAMAGES
 from rig.analysis.consistency.contradictions import rate_of_each
-from rig.analysis.consistency.suspected import DAMAGES
-from rig.analysis.consistency.told_from import ToldFrom, of_reference
+from rig.analysis.consistency.detection_limits import ToldFrom, of_reference
+from rig.analysis.consistency.gyroscope_checks import would_tell
+from rig.analysis.consistency.systematic_errors import allow, allowed_of, any_earth_rate
 from rig.analysis.design.cut_plan import Planned, planned_segments
 from rig.analysis.design.planned_motion import PlannedRun, planned_run
 from rig.analysis.design.planned_reference import planned_accelerometers, planned_read
@@ -49,7 +49,7 @@ def planned_told_from(config: RigConfig, plan: Plan, turner: DenavitHartenberg) 
         rates = {name: _told_from(run, name, each, turned, rate) for name, each in config.to_calibrate.items()}
     on_arm = isinstance(config.turner, ArmSection) and run.plan.dwells
     read = {each.name: planned_read(each) for each in planned_accelerometers(config, run)} if on_arm else {}
-    found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
+    found = {name: reference_checks.would_tell(each, rate) for name, each in read.items()}
     return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.consistency.reference_alternatives import Read
 from rig.analysis.design.planned_motion import PlannedRun, Timed, planned_attitude, planned_turn, timed_of
 from rig.analysis.reference.acceleration import held_out, sweeps_of
 from rig.analysis.reference.accelerometer_errors import Piece, Sheet, errors_of, sheet_of

@@ -6,7 +6,7 @@ sensor's mean reading is as well known by the arm as in a sweep, about axes that
 
 No lines are sought in a transfer: it is short, and the servo's own vibration grows faster and slower in it. Where that
 passes the data rate it stands still in the samples, and their mean is off by more than their scatter tells: see
-`rig.analysis.consistency.consistency`.
+`rig.analysis.consistency.gyroscope_checks`.
 """
 
 from collections.abc import Iterator, Sequence

@@ -21,7 +21,7 @@ from rig.report.terminal.shortest_words import wish_words
 from rig.station.plain_text import LONG_S, duration_words, plain
 
 if TYPE_CHECKING:
-    from rig.analysis.consistency.told_from import ToldFrom
+    from rig.analysis.consistency.detection_limits import ToldFrom
     from rig.analysis.design.attitude_account import AttitudeAccount
     from rig.analysis.design.planned import Told
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.consistency.detection_limits import ToldFrom
 from rig.data.entries.result_types import DetectionLimitEntry
 from rig.report.entry import entry
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.consistency.contradictions import Contradictions, contradictions
-from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.consistency.detection_limits import ToldFrom
 from rig.analysis.design.planned import planned_told_from
 from rig.analysis.gyroscope.calibration import observe_recordings, solve_observed
 from rig.analysis.surroundings import surroundings_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.consistency.reference_alternatives import Read
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
 from rig.config.procedures.attitude_sets import MAGNETIC

@@ -3,7 +3,7 @@
 import pytest
 from rich.console import Console
 
-from rig.analysis.consistency.told_from import ToldFrom
+from rig.analysis.consistency.detection_limits import ToldFrom
 from rig.report.terminal.plan_table import _told_table
 from support.laboratories.commands import rig_here
 from support.paths import CONFIGS

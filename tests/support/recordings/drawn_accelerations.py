@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.reference_consistency import reference_consistency
-from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_checks import reference_consistency
 from rig.analysis.reference.accelerometer_errors import MILLI_G, STANDARD, Piece, Sheet, errors_of
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.reference.reference_budgets import accelerometer_budget

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rig.analysis.consistency.reference_consistency import reference_consistency
-from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_checks import reference_consistency
 
 RATES = np.concatenate([np.geomspace(1e-4, 0.02, 5), np.linspace(0.05, 0.95, 19)])
 

@@ -16,17 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.pieces_against_model import (
-    Scatter,
-    WhitenedSegments,
-    beyond_chance,
-    covariance_of,
-    together,
-    whiten,
-    whiten_segments,
-    whitening,
-)
-from rig.analysis.consistency.suspected import (
+from rig.analysis.consistency.alternatives import (
     DAMAGES,
     Means,
     changes,
@@ -38,7 +28,7 @@ from rig.analysis.consistency.suspected import (
     of_one_axis,
     of_sweep,
 )
-from rig.analysis.consistency.suspicion import (
+from rig.analysis.consistency.residual_tests import (
     Consistency,
     Statistic,
     Suspected,
@@ -46,6 +36,16 @@ from rig.analysis.consistency.suspicion import (
     explained,
     told_by,
     unlike_the_others,
+)
+from rig.analysis.consistency.whitened_segments import (
+    Scatter,
+    WhitenedSegments,
+    beyond_chance,
+    covariance_of,
+    together,
+    whiten,
+    whiten_segments,
+    whitening,
 )
 from rig.analysis.gyroscope.segments import Segments
 from rig.estimation.arrays import Array

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.reference_suspected import DAMAGES, Read, bias_over_time, of_piece, suspicions
-from rig.analysis.consistency.suspicion import (
+from rig.analysis.consistency.reference_alternatives import DAMAGES, Read, bias_over_time, of_piece, suspicions
+from rig.analysis.consistency.residual_tests import (
     Consistency,
     Statistic,
     basis,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.consistency import Allowance
+from rig.analysis.consistency.gyroscope_checks import Allowance
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.segments import Segments
 from rig.analysis.gyroscope.vector_inputs import WAVE_SHARE, unknown_of

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.consistency.suspicion import Damage, Suspicions
+from rig.analysis.consistency.residual_tests import Damage, Suspicions
 from rig.analysis.gyroscope.segments import Segments
 from rig.estimation.arrays import Array
 from rig.observation.consistency.raw_readings import REST

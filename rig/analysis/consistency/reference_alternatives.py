@@ -1,6 +1,6 @@
 """What might be wrong with readings of a constant reference: as columns of a suspicion, as damages of some size.
 
-As `rig.analysis.consistency.suspected`, of accelerometers and magnetometers.
+As `rig.analysis.consistency.alternatives`, of accelerometers and magnetometers.
 """
 
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.suspicion import Damage, Suspicions
+from rig.analysis.consistency.residual_tests import Damage, Suspicions
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import SECOND, Movement, cross, felt, jacobian
 from rig.estimation.reference.reading_errors import in_sweeps, of_pieces, of_sensor, per_axis

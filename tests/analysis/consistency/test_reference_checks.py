@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import ksone
 
-from rig.analysis.consistency.reference_consistency import reference_consistency
-from rig.analysis.consistency.reference_suspected import Read
+from rig.analysis.consistency.reference_alternatives import Read
+from rig.analysis.consistency.reference_checks import reference_consistency
 from rig.analysis.reference.arm_patterns import Known, Stood, arm_patterns
 from rig.config.procedures.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array

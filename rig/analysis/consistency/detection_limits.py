@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.consistency.reference_suspected import DAMAGES as REFERENCE_DAMAGES
-from rig.analysis.consistency.suspected import DAMAGES, Means
+from rig.analysis.consistency.alternatives import DAMAGES, Means
+from rig.analysis.consistency.reference_alternatives import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.gyroscope.calibration import SensorResult
 from rig.analysis.gyroscope.vector_inputs import unknown_of
 from rig.analysis.surroundings import Surroundings

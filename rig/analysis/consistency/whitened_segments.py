@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.consistency.suspected import each_axis, in_time
-from rig.analysis.consistency.suspicion import TOLD, Statistic, Suspected, basis, explained, told_from
+from rig.analysis.consistency.alternatives import each_axis, in_time
+from rig.analysis.consistency.residual_tests import TOLD, Statistic, Suspected, basis, explained, told_from
 from rig.analysis.gyroscope.segments import Segments
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.bias_process import BiasProcess
