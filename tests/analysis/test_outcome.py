@@ -13,7 +13,6 @@ import pytest
 from rig.analysis.analyses import calibrate, verify_calibration, verify_stored_calibrations
 from rig.data.recording.run_file import RunData, read_run
 from rig.errors import Fault, Refused
-from rig.estimation.gyroscope.vector_fit import explain
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
 from rig.observation.timebase import estimate_time_base
@@ -45,7 +44,7 @@ def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
 @pytest.mark.slow
 def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
-    with calls(ArmMotion.__init__, estimate_time_base, observe_sensor, explain) as counted:
+    with calls(ArmMotion.__init__, estimate_time_base, observe_sensor) as counted:
         calibration = calibrate(runs)
         outcome = verify_calibration(calibration, repeated)
     assert calibration.passed and outcome.passed
@@ -53,7 +52,6 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
         "ArmMotion.__init__": 2,  # one for each recording
         "estimate_time_base": 4,
         "observe_sensor": 4,
-        "explain": 2,  # one for each sensor
     }
     assert outcome.results is calibration.results
 

@@ -19,6 +19,7 @@ from rig.analysis.analyses import calibrate
 from rig.data.processes.silence import crowding
 from rig.data.recording.layout import Contents, lay_out
 from rig.data.recording.run_file import read_run
+from rig.data.recording.schema import SCHEMA, TEXTS
 from rig.errors import Fault, Refused
 from support.paths import RECORDINGS
 from support.processes.as_nobody import as_nobody
@@ -120,7 +121,8 @@ def test_a_sound_recording_is_read_however_little_of_a_processor_there_is() -> N
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who has opened what")
 def test_a_signal_ends_the_reading(recording: Path) -> None:
     with h5py.File(recording) as file:
-        whole = Contents(file.attrs["schema"], dict(file.attrs), {}, {}, file["states"][:], file["events"][:])
+        texts = {name: file.attrs[name] for name in TEXTS[SCHEMA]}
+        whole = Contents(SCHEMA, texts, {}, {}, file["states"][:], file["events"][:])
     lay_out(recording, whole, swmr=True)
     data = bytearray(recording.read_bytes())
     data[11] |= 0x05  # as one is left that is still being written

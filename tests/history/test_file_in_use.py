@@ -237,7 +237,7 @@ def test_what_is_not_there_when_it_is_read_back_is_not_told_as_entered(file: Pat
 IMPORTS = """
 import sys
 from pathlib import Path
-from rig.commands import history_answer, recall, remember
+from rig.commands.history import answer as history_answer, recall, remember
 from rig.config.judging.judging_sections import HistorySection
 from rig.config.load import load
 

@@ -50,7 +50,7 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
     assert arm[0] - 1 < time_s[0] < time_s[-1] < arm[-1] + 1
     sweep = next(swept(run.recorded.movement[0])).window
     middle = np.abs(time_s - (sweep.start_s + sweep.end_s) / 2) < 1
-    assert np.linalg.norm(rate_rad_s[middle], axis=1).mean() == pytest.approx(np.radians(150) / 1.144, rel=0.02)
+    assert np.linalg.norm(rate_rad_s[middle], axis=1).mean() == pytest.approx(np.radians(120) / 1.144, rel=0.02)
 
 
 def test_the_result_is_that_of_the_run(result: rig.Result) -> None:

@@ -303,7 +303,8 @@ def test_a_ros_2_bag_holds_the_readings(recordings: tuple[WithMotion, ...], tmp_
     np.testing.assert_allclose(np.diff(since_s), np.diff(stream.time_s), atol=1e-8)
     first: Any = messages[0]
     assert first.orientation_covariance[0] == first.linear_acceleration_covariance[0] == -1
-    noise = np.array([rest.noise_rad_s for rest in recordings[0].observed.sensors["gyro"].rests])
+    sensor = recordings[0].observed.sensors["gyro"]
+    noise = np.array([rest.noise_rad_s for rest in sensor.rests] or [np.zeros(3)])  # zero says that it is not known
     variance = first.angular_velocity_covariance.reshape(3, 3)
     np.testing.assert_allclose(np.diag(variance), np.mean(noise**2, axis=0))
     bag_s_own = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))["rosbag2_bagfile_information"]

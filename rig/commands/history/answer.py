@@ -18,7 +18,7 @@ ANSWER_S = 4.0  # docs/how-to/finished-runs/shared-history.md promises five unti
 # What is imported before the time begins, since on a busy computer this alone takes longer: for any question, and to
 # enter a run.
 TO_ASK = ("rig.history.store",)
-TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.registry", "rig.history.series")
+TO_ENTER = ("rig.history.entered.index", "rig.report.kinds.registry", "rig.history.series", "scipy.special")
 TO_CONNECT = {
     "file": ("sqlalchemy.dialects.sqlite.pysqlite",),
     "server": ("psycopg", "sqlalchemy.dialects.postgresql.psycopg"),

@@ -82,7 +82,10 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
 MICROTESLA = 1e-6
 NOT_UNIFORM, DRIFTS = "field_not_uniform", "field_drifts"  # a magnetometer's own tests refuse most of it
 FIELD_DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
-    "even nonlinearity of 0.2 % of v²/50 µT": (("even_term",), bent(lambda felt: 2e-3 * felt**2 / (50 * MICROTESLA))),
+    "even nonlinearity of 0.2 % of v²/50 µT": (
+        ("even_term", NOT_UNIFORM),
+        bent(lambda felt: 2e-3 * felt**2 / (50 * MICROTESLA)),
+    ),
     "asymmetry of 1 %": (("asymmetry", NOT_UNIFORM), bent(lambda felt: 1e-2 * np.abs(felt))),
     "bias changes by 0.3 µT half-way": (("bias_changed", DRIFTS), offset(0.3 * MICROTESLA, late)),
     "0.3 µT in one dwell": (("disturbed_dwell", NOT_UNIFORM), offset(0.3 * MICROTESLA, dwell_3)),

@@ -68,6 +68,7 @@ def result(folder: Path, **changes: Any) -> Path:
             "range_rad_s": radians(245 if name == "gyro" else 250),
             "temperature_c": 22.5,
             "scale": SCALE[name],
+            "correction_matrix": None,
             "bias_rad_s": BIAS[name],
         }
         for name in ("gyro", "other")
@@ -186,8 +187,8 @@ def failed(folder: Path) -> Path:
         (lambda folder: folder, "no_result", "result.json cannot be read"),
         (lambda folder: Path(__file__), "not_a_result", "JSON"),
         (lambda folder: Path(sys.executable), "not_a_result", "it is not text"),
-        (lambda folder: result(folder, scale=[1.1, 0.0, 1.1]), "not_a_result", "sensors.gyro.scale.1"),
-        (lambda folder: result(folder, bias_rad_s=[0.1, 0.2]), "not_a_result", "sensors.gyro.bias_rad_s"),
+        (lambda folder: result(folder, scale=[1.1, 0.0, 1.1]), "not_a_result", "gyroscopes.gyro.scale.1"),
+        (lambda folder: result(folder, bias_rad_s=[0.1, 0.2]), "not_a_result", "gyroscopes.gyro.bias_rad_s"),
         (failed, "verdict_failed", "(gyro.verification_reference)"),
     ],
 )

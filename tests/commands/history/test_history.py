@@ -50,11 +50,14 @@ def test_runs_are_imported_once_and_what_is_none_is_named(place: str, capsys: py
     bad = Path(place).parent / "bad"
     bad.mkdir()
     (bad / "result.json").write_text("{}", encoding="utf-8")
-    assert main(["history", "import", str(RECORDINGS), str(bad)]) == 1
+    runs = Path(place).parent / "runs"
+    for name in ("six_observation", "verified"):
+        shutil.copytree(RECORDINGS / name, runs / name)
+    assert main(["history", "import", str(runs), str(bad)]) == 1
     printed = capsys.readouterr()
     assert printed.out.splitlines()[-1] == "2 entered, 0 there already, 1 refused"
     assert f"{bad}: not_a_result" in printed.err
-    assert "0 entered, 2 there already, 0 refused" in told(capsys, "import", RECORDINGS)
+    assert "0 entered, 2 there already, 0 refused" in told(capsys, "import", runs)
     assert "LSM9DS1-CI" in told(capsys) and "ADIS16465-001" in told(capsys, "list")
 
 
@@ -169,7 +172,7 @@ def test_a_certificate_is_remembered_with_who_ran_the_rig(place: str, capsys: py
     assert capsys.readouterr().err == ""
     shown = " ".join(told(capsys, "show", "1").split())
     assert "operator: A. Person" in shown and "note: after [the] move" in shown
-    assert f"calibration record {first}, issued " in shown and f"replaces {first}; Simulated laboratory" in shown
+    assert f"calibration certificate {first}, issued " in shown and f"replaces {first}; Simulated laboratory" in shown
     assert shown.count("certificate.html of it: SHA-256") == 2 and shown.count(", replaced;") == 1
     (entry, _) = json.loads(told(capsys, "--json"))["calibrations"]
     assert (entry["operator"], entry["note"], entry["simulated"]) == ("A. Person", "after [the] move", True)

@@ -49,7 +49,7 @@ def shifted(document: ResultDocument) -> ResultDocument:
     gyro = document.gyroscopes["gyro"]
     (kx,) = (each for each in followed(document)[0].parameters if each.name == "kx")
     scale = (gyro.scale[0] + 0.5 * kx.expanded, *gyro.scale[1:])
-    return document.model_copy(update={"sensors": {"gyro": gyro.model_copy(update={"scale": scale})}})
+    return document.model_copy(update={"gyroscopes": {"gyro": gyro.model_copy(update={"scale": scale})}})
 
 
 @pytest.mark.slow
