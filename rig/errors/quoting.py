@@ -5,13 +5,18 @@ from typing import Any
 
 SHOWN_CHARACTERS = 60
 SHOWN_NAMES = 12
+NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
 def printable(text: str) -> str:
-    """The text with every character that is not seen, line ends too, written as Python does: `\\x1b`, `\\n`."""
+    """Return the text with every invisible character, line ends too, written as Python does: `\\x1b`, `\\n`.
+
+    A no-break space stays: it stands between a number and its power of ten or its unit.
+    """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    shows = (c.isprintable() or c == NO_BREAK_SPACE for c in text)
+    return "".join(c if s else c.encode("unicode_escape").decode("ascii") for c, s in zip(text, shows, strict=True))
 
 
 def printable_lines(text: str) -> str:

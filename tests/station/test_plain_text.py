@@ -25,6 +25,7 @@ SHOWN = "[/nope] [red]x[/] :skull: \\x1b]0;title\\x07 \\x9b31m"
 def test_what_is_printable_stays_and_the_rest_is_escaped() -> None:
     assert printable("µ = 3 °/s, ± 1σ – 试") == "µ = 3 °/s, ± 1σ – 试"
     assert printable(HOSTILE) == SHOWN
+    assert printable("5.7\u00a0×\u00a010⁻⁵\n") == "5.7\u00a0×\u00a010⁻⁵\\n"
     assert printable("a\nb\r") == "a\\nb\\r" and printable_lines("a\nb\r") == "a\nb\\r"
     assert printable("\u202e\ud800") == "\\u202e\\ud800"
 
