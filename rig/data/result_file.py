@@ -41,7 +41,7 @@ from rig.data.entries.result_types import (
 from rig.data.entries.temperature import OverTemperatureEntry
 from rig.data.installed_kinds import quantities
 from rig.data.key_meanings import meaning_of
-from rig.data.meaning import Meaning, completed_by_name, meaning_by_name
+from rig.data.meaning import Meaning
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
@@ -61,14 +61,14 @@ QuantityName = Annotated[str, AfterValidator(_known)]
 class CheckEntry(Entry):
     """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set.
 
-    Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor` (results of before do not say
-    it: 2), by how much the `decision_rule` has it stay below the limit (`guard_band`), and the probability that it is
-    accepted although it is beyond the limit.
+    Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor`, by how much the
+    `decision_rule` has it stay below the limit (`guard_band`), and the probability that it is accepted although it is
+    beyond the limit.
 
     `kind` says whether it holds a property of the item (conformity) or asks whether the measurement is fit for use;
     `sensor`, `quantity` and `parameter` what of which sensor is judged, where it is of a single one; `sweep` which
-    contradicts the others; `criterion` by what the quantity is judged. Results of before say none of these, or all but
-    `criterion`.
+    contradicts the others; `criterion` by what the quantity is judged, null where the package that made the check does
+    not say.
     """
 
     name: str
@@ -80,7 +80,7 @@ class CheckEntry(Entry):
     guard_band: float = 0.0
     false_acceptance_probability: float | None = None
     coverage_factor: float | None = None
-    kind: Kind | None = None
+    kind: Kind
     sensor: str | None = None
     quantity: str | None = None
     parameter: Parameter | None = None
@@ -89,11 +89,8 @@ class CheckEntry(Entry):
 
     @property
     def means(self) -> Meaning:
-        """What it says it is of; in results of before, what its name was taken to say."""
-        if self.kind is None:
-            return meaning_by_name(self.name)
-        said = Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.criterion)
-        return said if self.criterion is not None else completed_by_name(said, self.name)
+        """What it says it is of."""
+        return Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep, self.criterion)
 
 
 class StoredPolynomialsEntry(Entry):

@@ -53,6 +53,9 @@ FIXED = {
     *("from_utc", "to_utc", "mean_utc", "quantity", "parameter"),
     *("non_orthogonality_order", "covariance_order", "covariance_units"),
 }
+BEYOND_ITS_LIMIT = CheckEntry(
+    name="gyro.bias", value=0.2, limit=0.1, unit="rad/s", passed=False, uncertainty=0.01, kind="conformity"
+)
 
 
 def kinds() -> dict[str, ResultDocument]:
@@ -232,15 +235,14 @@ def test_what_a_gyroscopes_recording_would_have_told_stands_there() -> None:
 
 
 def test_a_measurement_that_contradicts_itself_is_not_valid() -> None:
-    spoilt = CheckEntry(name="gyro.stuck_bit", value=1.0, limit=0.0, unit="1", passed=False)
+    spoilt = CheckEntry(name="gyro.stuck_bit", value=1.0, limit=0.0, unit="1", passed=False, kind="fitness")
     found = certificate(result().model_copy(update={"checks": (*result().checks, spoilt)}))
     assert any("Not valid" in mark for mark in found.marks)
     assert "failed: gyro.stuck_bit" in read(found).text
 
 
 def test_a_value_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> None:
-    beyond = CheckEntry(name="gyro.bias", value=0.2, limit=0.1, unit="rad/s", passed=False, uncertainty=0.01)
-    found = certificate(result().model_copy(update={"checks": (*result().checks, beyond)}))
+    found = certificate(result().model_copy(update={"checks": (*result().checks, BEYOND_ITS_LIMIT)}))
     assert not found.marks
     assert re.search(r"gyro\.bias 0\.200 0\.010 0\.1 rad/s – fail", read(found).text)
 
@@ -257,9 +259,8 @@ def test_a_check_of_any_name_stands_where_it_says_it_belongs() -> None:
 
 @pytest.mark.parametrize(("guard", "words"), [(0.0, "simple acceptance"), (0.01, "guard band of w = U")])
 def test_the_decision_rule_is_said(guard: float, words: str) -> None:
-    check = CheckEntry(
-        name="gyro.bias", value=0.01, limit=0.1, unit="rad/s", passed=True, uncertainty=0.01, guard_band=guard
-    )
+    accepted = {"value": 0.01, "passed": True, "guard_band": guard}
+    check = BEYOND_ITS_LIMIT.model_copy(update=accepted)
     assert words in read(certificate(result().model_copy(update={"checks": (check,)}))).under["7.8.6"]
 
 
@@ -375,9 +376,7 @@ def test_biases_by_repeat_stand_there_with_what_they_share_and_without_where_the
 
 def test_a_drift_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> None:
     names = ("gyro.bias_drift", "gyro.acceleration_bias_drift")
-    beyond = [
-        CheckEntry(name=name, value=0.2, limit=0.1, unit="rad/s", passed=False, uncertainty=0.01) for name in names
-    ]
+    beyond = [BEYOND_ITS_LIMIT.model_copy(update={"name": name}) for name in names]
     found = certificate(everything().model_copy(update={"checks": tuple(beyond)}))
     assert [check.name for check in found.conformity] == list(names) and not found.marks
 

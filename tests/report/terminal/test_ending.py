@@ -203,8 +203,10 @@ def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.Capt
 def test_checks_that_failed_stand_first_and_rounding_is_not_printed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rounding = CheckEntry(name="gyro.board_scale", value=3.6e-20, limit=1e-4, unit="1", passed=True, sensor="gyro")
-    broken = CheckEntry(name="gyro.spikes", value=9.5, limit=8.0, unit="1", passed=False, sensor="gyro")
+    rounding = CheckEntry(
+        name="gyro.board_scale", value=3.6e-20, limit=1e-4, unit="1", passed=True, kind="fitness", sensor="gyro"
+    )
+    broken = CheckEntry(name="gyro.spikes", value=9.5, limit=8.0, unit="1", passed=False, kind="fitness", sensor="gyro")
     result = ONE.model_copy(update={"checks": (rounding, broken), "verdict": "fail"})
     (tmp_path / "result.json").write_text(result.text(), encoding="utf-8")
     assert main(["show", str(tmp_path), "--checks"]) == 0

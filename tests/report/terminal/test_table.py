@@ -28,9 +28,10 @@ def shown(document: ResultDocument) -> str:
 
 
 def test_the_checks_say_what_was_not_measured_and_what_was_not_set() -> None:
+    of = {"unit": "rad/s", "passed": False, "kind": "conformity", "sensor": "gyro", "quantity": "rate"}
     checks = (
-        CheckEntry(name="gyro.bias", value=None, limit=0.1, unit="rad/s", passed=False),
-        CheckEntry(name="gyro.verification_rms", value=0.001, limit=None, unit="rad/s", passed=False),
+        CheckEntry(name="gyro.bias", value=None, limit=0.1, criterion="bias", **of),
+        CheckEntry(name="gyro.verification_rms", value=0.001, limit=None, criterion="verification_rms", **of),
     )
     rows = shown(VERIFIED.model_copy(update={"checks": checks})).splitlines()
     assert any(" bias " in row and "not measured" in row and "FAILED" in row for row in rows)
