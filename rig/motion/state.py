@@ -1,7 +1,6 @@
 """What a turner says about itself: its states, of any number of joints, and the report a look at it gives.
 
-A robot arm's states say more than joints: those of Universal Robots stand here too, for recordings of before are read
-as them, and the page shows their modes.
+A robot arm's states say more than joints: those of Universal Robots stand here too, for the page shows their modes.
 """
 
 from collections.abc import Callable, Sequence

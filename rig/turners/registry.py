@@ -44,9 +44,9 @@ def kind_of(section: TurnerSection) -> AnyTurner:
     )
 
 
-def words_of(name: str | None) -> Words:
-    """How to speak of a kind of turner: in general terms of one that is not installed here. None: an arm, of before."""
-    known = installed().get(name or "ur")
+def words_of(name: str) -> Words:
+    """How to speak of a kind of turner: in general terms of one that is not installed here."""
+    known = installed().get(name)
     if known is not None:
         return known.words
     return Words(

@@ -24,7 +24,7 @@ JointName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]  # beco
 
 @dataclass(frozen=True)
 class RecordedTurner:
-    """A turner: its `kind`, by which it is registered, who made it and which model it is (None where not told).
+    """A turner: its `kind`, by which it is registered, who made it, and which model it is (None where not told).
 
     `joints` are the names of its n joints, 0 to `MAX_JOINTS`, the one on the ground first; `geometry` is what their
     angles are to be read with; `fields` are what its states tell beyond times and joints; `reading_std_rad` as of
@@ -32,7 +32,7 @@ class RecordedTurner:
     """
 
     kind: Kind
-    maker: Told | None
+    maker: Told
     model: Told | None
     joints: Annotated[tuple[JointName, ...], Field(max_length=MAX_JOINTS)]
     geometry: DenavitHartenberg

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from rig.analysis.clock import BY_COMPUTER
+from rig.data.absent import NO_ARM
 from rig.data.entries.budget import BudgetEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
 from rig.data.entries.result_types import ErrorEntry
@@ -144,16 +145,14 @@ class Certificate:
             return "a hand, which turned the items on a table"
         if found.motion_file is not None:
             return f"whatever the file {_named(found.motion_file)} tells the motion of"
-        if found.arm_model is None and found.turner_kind is None:
-            return "robot arm whose model was not recorded; it was taken for a Universal Robots UR10e"
         if found.arm_model is None:
             return f"{self.words.name} whose model was not recorded"
         return f"{self.words.name} {found.arm_maker} {found.arm_model}"
 
     @property
     def words(self) -> Words:
-        """How to speak of what turned the items."""
-        return words_of(self.provenance.turner_kind)
+        """How to speak of what turned the items; nothing did where the readings were recorded elsewhere."""
+        return words_of(self.provenance.turner_kind or NO_ARM)
 
     @property
     def procedure(self) -> str:
@@ -185,7 +184,7 @@ class Certificate:
 
     @property
     def temperature_source(self) -> str:
-        """What tells how warm the items were; of results of before, which do not say when, their thermometers do."""
+        """What tells how warm the items were: nothing where a file told their motion."""
         found = [each.sensor.bias_conditions for each in self.gyroscopes]
         found += [getattr(entry, "conditions", None) for each in self.held_still for entry in each.entries]
         dated = [when for when in found if when is not None]
@@ -288,7 +287,7 @@ def _title(result: ResultDocument) -> str:
 
 
 def _without_uncertainty(result: ResultDocument) -> Iterator[str]:
-    """Sensors of which noise alone is known: in recordings of before there was a budget, and by some estimators."""
+    """Sensors of which noise alone is known, by estimators that have no budget."""
     for _, show, finding in outlets(result, lambda kind: kind.shown):
         if not finding.known and (row := show(finding)).scale is not None and not row.combined:
             yield finding.sensor
@@ -317,11 +316,11 @@ def _marks(result: ResultDocument, stated: Stated, fitness: Sequence[CheckEntry]
 
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
-    """How far the sweeps went; those of results of before were whole turns."""
+    """How far the sweeps went; of those of a file that tells speeds it is not known."""
     for sensor in result.gyroscopes.values():
         yield from (each.angle_rad for each in sensor.observations if each.angle_rad is not None)
     for found in result.verification.values():
-        yield from (each.angle_rad for each in found.after.revolutions if each.angle_rad is not None)
+        yield from (each.angle_rad for each in found.after.revolutions)
 
 
 def _traceable(result: ResultDocument, stated: Stated) -> bool:

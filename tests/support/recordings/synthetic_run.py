@@ -50,6 +50,8 @@ PROVENANCE = Provenance(
     board_unique_id="0123",
     firmware_version="0.2.0",
     sensor_serial_numbers={"gyro": "LSM9DS1-001"},
+    arm_maker="Universal Robots",
+    turner_kind="ur",
 )
 UR = RecordedTurner("ur", "Universal Robots", "UR10e", JOINT_NAMES, NOMINAL, ARM_FIELDS)
 SCALE = (1.1771, 1.1554, 1.1440)
