@@ -109,18 +109,11 @@ def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     Where neither is known here, an installed one that reads what was recorded: to solve a recording needs no script.
     Raises Refused `another_script` when the script there is not the one it was recorded with, and as `kept_script`.
     """
-    procedures, corrected = installed(), _is_corrected(recording)
     if _by_installed(recording):
-        found = procedures[recording.settings.procedure]
-    elif (script := _script_of(run, recording)) is not None:
-        found = script.procedure
-        procedures = {**procedures, found.name: found}
-    else:
-        found = procedures[CORRECTED if corrected else RAW]
-    # Recordings of before there were phases name the procedure that the run began with.
-    if found.reads_corrected != corrected:
-        return found.following(procedures) or found
-    return found
+        return installed()[recording.settings.procedure]
+    if (script := _script_of(run, recording)) is not None:
+        return script.procedure
+    return installed()[CORRECTED if _is_corrected(recording) else RAW]
 
 
 def _by_installed(recording: RunData) -> bool:
