@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 
 
 class Solved(Protocol):
-    """A sensor's solution, g = M (m + b), just found or read from `result.json`; no `correction_matrix` means K."""
+    """A sensor's solution, g = M (m + b), just found or read from `result.json`."""
 
     @property
     def serial_number(self) -> str: ...
@@ -27,7 +27,7 @@ class Solved(Protocol):
     @property
     def correction(self) -> Literal["matrix", "diagonal"]: ...
     @property
-    def correction_matrix(self) -> Array | Sequence[Sequence[float]] | None: ...
+    def correction_matrix(self) -> Array | Sequence[Sequence[float]]: ...
     @property
     def bias_rad_s(self) -> Array | Sequence[float]: ...
 
@@ -60,7 +60,7 @@ def calibration_of(solved: Solved, entry: OverTemperatureEntry | None = None) ->
             f"the temperature of {solved.serial_number} during its calibration is not known",
             "Calibrate it again with its temperature recorded",
         )
-    matrix = np.diag(solved.scale) if solved.correction_matrix is None else np.array(solved.correction_matrix)
+    matrix = np.array(solved.correction_matrix)
     x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)
     bx, by, bz = map(float, solved.bias_rad_s)
     return Calibration(

@@ -188,7 +188,8 @@ class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
 
     `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_degrees_of_freedom` are those of
-    the standard deviations of that name, null where they have no end. Results of before have neither.
+    the standard deviations of that name, null where they have no end. Both are left out of a solution
+    without a budget, as that of sweeps of a file.
     """
 
     model: str
@@ -241,8 +242,7 @@ class AverageEntry(Entry):
 class ObservationEntry(Entry):
     """One revolution and the mean reading over it; of a joint, where an arm made it.
 
-    `angle_rad` is how far it turned: 2π, several of these, or an arc by the encoders. Results of before leave it out,
-    which know whole turns.
+    `angle_rad` is how far it turned: 2π, several of these, or an arc by the encoders; null of a file that tells speeds.
     """
 
     sweep: int
@@ -301,8 +301,7 @@ class GyroscopeEntry(Entry):
 
     - `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both
       are there where the vector model was chosen.
-    - `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings; results of before
-      have none, and it is K.
+    - `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings.
     - `speeds_rad_s` are those of the sweeps: found at one speed, either way, the calibration is valid at that speed,
       and there is no `nonlinearity`. `axis_rate_ranges_rad_s`: the smallest and the largest rate along each of the
       sensor's own axes in the sweeps that determine its scale factor.
@@ -344,8 +343,8 @@ class GyroscopeEntry(Entry):
     bias_process: BiasProcessEntry | None = None
     speeds_rad_s: tuple[float, ...] = ()
     nonlinearity: NonlinearityEntry | None = None
-    correction: Literal["matrix", "diagonal"] = "diagonal"
-    correction_matrix: Matrix3 | None = None
+    correction: Literal["matrix", "diagonal"]
+    correction_matrix: Matrix3
     earth_rate: EarthRateEntry | ErrorEntry | None = None
     scale_conditions: ConditionsEntry | None = None
     bias_conditions: ConditionsEntry | None = None
@@ -379,7 +378,7 @@ class DeviationEntry(Entry):
 class RevolutionErrorEntry(Entry):
     """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known.
 
-    Or over an arc: `angle_rad` is how far the joint turned, left out in results of before, which know whole turns.
+    Or over an arc: `angle_rad` is how far the joint turned.
 
     With gravity the flange's circling, which is felt as gravity is.
     """
@@ -390,7 +389,7 @@ class RevolutionErrorEntry(Entry):
     error_rad_s: Vector3
     std_rad_s: Vector3
     gravity_rad_s: Vector3 | None = None
-    angle_rad: float | None = None
+    angle_rad: float
 
 
 class ComparisonEntry(Entry):

@@ -84,7 +84,9 @@ class Calibration:
     def coverage_factors(self) -> Array:
         """(6,) coverage factors k of U in the order kx ky kz bx by bz: U = k u."""
         budget = self.entry.budget
-        return np.array(budget.factors) if budget is not None else np.full(len(self._expanded), COVERAGE_FACTOR)
+        return (
+            np.array(budget.coverage_factors) if budget is not None else np.full(len(self._expanded), COVERAGE_FACTOR)
+        )
 
     @property
     def covariance(self) -> Array:

@@ -15,13 +15,14 @@ from rig.report.exports.calibrations import calibrations
 from rig.report.exports.temperature import at_temperature
 from support.documents.certified import accelerometer, result
 
+ENDLESS = (None, None, None)
 SLOPE = (2e-4, -1e-4, 5e-5)  # per °C, of the readings
 
 
 def watched(range_c: tuple[float, float] = (18.0, 31.0), **changes: Any) -> ResultDocument:
     """A drift run's result, of the gyroscope that `result` calibrates at 22 °C and the accelerometer beside it."""
     zero = (0.0, 0.0, 0.0)
-    slope = SlopeEntry(slope=SLOPE, std=zero, range_c=range_c, correlation_with_time=0.1)
+    slope = SlopeEntry(slope=SLOPE, std=zero, range_c=range_c, correlation_with_time=0.1, degrees_of_freedom=ENDLESS)
     entry = DriftEntry(
         unit="",
         repeats=(),
@@ -32,6 +33,11 @@ def watched(range_c: tuple[float, float] = (18.0, 31.0), **changes: Any) -> Resu
         largest_change=zero,
         temperature_slope=slope,
         earth_rate_known=True,
+        degrees_of_freedom=ENDLESS,
+        part="lsm9ds1",
+        serial_number="LSM9DS1-001",
+        full_scale=4.276,
+        temperature_stated=False,
     ).model_copy(update=changes)
     return result().model_copy(update={"bias_drift": {"gyro": {"rate": entry, "acceleration": entry}}})
 

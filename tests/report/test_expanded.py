@@ -124,8 +124,10 @@ def test_where_nobody_counted_it_says_so_and_is_two_standard_deviations() -> Non
     assert factor_words(None) == "k = 2, degrees of freedom not counted"
     document = result()
     sensor = document.gyroscopes["gyro"]
-    before = sensor.vector_model.model_copy(update={"non_orthogonality_degrees_of_freedom": None})
-    document = document.model_copy(update={"gyroscopes": {"gyro": sensor.model_copy(update={"vector_model": before})}})
+    uncounted = sensor.vector_model.model_copy(update={"non_orthogonality_degrees_of_freedom": None})
+    document = document.model_copy(
+        update={"gyroscopes": {"gyro": sensor.model_copy(update={"vector_model": uncounted})}}
+    )
     assert "degrees of freedom not counted" in read(certificate(document)).text
     assert "degrees of freedom not counted" in terminal(document)
 

@@ -41,7 +41,7 @@ def document(*names: str, **changes: object) -> ResultDocument:
             "temperature_c": 22.04,
             "scale": tuple(SCALE),
             "bias_rad_s": tuple(BIAS_RAD_S),
-            "correction_matrix": None,
+            "correction_matrix": tuple(map(tuple, np.diag(SCALE).tolist())),
             **changes,
         }
     )

@@ -31,8 +31,8 @@ class AccelerationSolutionEntry(Entry):
 class DwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
 
-    `residual_std_m_s2` is what the solve expects that to scatter by, null in results of before. `attitude` takes a
-    vector of the arm's base frame into the flange's.
+    `residual_std_m_s2` is what the solve expects that to scatter by. `attitude` takes a vector of the
+    arm's base frame into the flange's.
     """
 
     index: int
@@ -45,7 +45,7 @@ class DwellEntry(Entry):
     samples: int
     duration_s: float
     temperature_c: float | None = None
-    residual_std_m_s2: Vector3 | None = None
+    residual_std_m_s2: Vector3
 
 
 class ValidationEntry(Entry):
@@ -67,7 +67,7 @@ class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
     - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
-      says what makes it up; null in results of before there was one. `gravity_m_s2` is what the scale is relative to.
+      says what makes it up. `gravity_m_s2` is what the scale is relative to.
     - With its `nonlinearity` in the `budget`, `scale` is that of the readings at 1 g up and 1 g down, `bias_m_s2` the
       reading at 0 g, whatever curve the sensor has between.
     - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
@@ -75,8 +75,7 @@ class AccelerometerEntry(Entry):
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
       the gyroscope, are there where sweeps were made.
     - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `conditions`: when scale and bias were read, and how warm it was then; `temperature_c` is that
-      temperature, in results of before the mean over the dwells.
+    - `conditions`: when scale and bias were read, and how warm it was then; `temperature_c` is that temperature.
     - `…_degrees_of_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
     - `placement`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
@@ -117,8 +116,8 @@ class AccelerometerEntry(Entry):
     other_methods: dict[str, AccelerationSolutionEntry | ErrorEntry]
     validation: ValidationEntry | None
     warnings: tuple[str, ...]
-    covariance_combined: Matrix6 | None = None
-    budget: BudgetEntry | None = None
+    covariance_combined: Matrix6 | None
+    budget: BudgetEntry | None
     conditions: ConditionsEntry | None = None
     non_orthogonality_degrees_of_freedom: Freedom3 | None = None
     second_order_degrees_of_freedom: Freedom3 | None = None

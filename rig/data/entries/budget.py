@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rig.data.entries.result_types import Entry, Vector6
-from rig.estimation.statistics.coverage import COVERAGE_FACTOR, covered
+from rig.estimation.statistics.coverage import COVERAGE_FACTOR
 
 IN_U = "how well is in u"  # ends the source of what was found, and of which no degrees of freedom are left to count
 # Infinite degrees of freedom are null.
@@ -36,8 +36,7 @@ class BudgetEntry(Entry):
     """What makes up `covariance_combined`; `expanded` is `coverage_factors` × `std`.
 
     These are Student's t of the effective `degrees_of_freedom`, so that each interval holds the true value with its
-    part of `coverage_probabilities`. `coverage_factor` is the largest of them: in results of before all are that one,
-    and it alone stands there.
+    part of `coverage_probabilities`. `coverage_factor` is the largest of them.
     """
 
     contributors: tuple[ContributorEntry, ...]
@@ -45,23 +44,13 @@ class BudgetEntry(Entry):
     coverage_factor: float
     expanded: Vector6
     degrees_of_freedom: Freedom6
-    coverage_factors: Vector6 | None = None
-    coverage_probabilities: Vector6 | None = None
-
-    @property
-    def factors(self) -> tuple[float, ...]:
-        """Coverage factor k of each parameter."""
-        return self.coverage_factors or (self.coverage_factor,) * 6
+    coverage_factors: Vector6
+    coverage_probabilities: Vector6
 
     @property
     def known(self) -> tuple[float, ...]:
         """Effective degrees of freedom of each, infinite ones too."""
         return tuple(math.inf if each is None else each for each in self.degrees_of_freedom)
-
-    @property
-    def probabilities(self) -> tuple[float, ...]:
-        """Probability with which each U covers the true value; of results of before by Student's t as well."""
-        return self.coverage_probabilities or tuple(covered(self.factors, self.known).tolist())
 
 
 def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:

@@ -38,7 +38,7 @@ class SlopeEntry(Entry):
     std: Vector3
     range_c: tuple[float, float]
     correlation_with_time: float
-    degrees_of_freedom: Freedom3 | None = None
+    degrees_of_freedom: Freedom3
 
 
 class DriftEntry(Entry):
@@ -46,12 +46,11 @@ class DriftEntry(Entry):
 
     - `common_std` is what all biases share beside their own; `scatter_ratio` how many times more the readings scatter
       from repeat to repeat than they do within a dwell.
-    - `degrees_of_freedom` are those of the standard deviations of `scale_fixed`, null where they have no end; results
-      of before do not count them.
+    - `degrees_of_freedom` are those of the standard deviations of `scale_fixed`, null where they have no end.
     - A steady bias has `steps` with the probability `false_alarm_probability`.
     - `temperature_slope` is the slope of the bias over temperature. Temperatures are `temperature_stated` where the
       sensor has no thermometer.
-    - Results of before do not say whose bias it is: `part`, `serial_number`, `full_scale` in the same unit.
+    - `part`, `serial_number` and `full_scale`, in the same unit, say whose bias it is.
     """
 
     unit: str
@@ -63,11 +62,11 @@ class DriftEntry(Entry):
     largest_change: Vector3
     temperature_slope: SlopeEntry | ErrorEntry
     earth_rate_known: bool
-    degrees_of_freedom: Freedom3 | None = None
-    part: str | None = None
-    serial_number: str | None = None
-    full_scale: float | None = None
-    temperature_stated: bool = False
+    degrees_of_freedom: Freedom3
+    part: str
+    serial_number: str
+    full_scale: float
+    temperature_stated: bool
 
     @property
     def range_c(self) -> tuple[float, float] | None:

@@ -11,7 +11,7 @@ class EarthRateEntry(Entry):
     - `vertical_fixed` says that its vertical part was not found but held to what a given latitude makes of it, for the
       sake of the g-sensitivity; then `latitude_rad` says how well the level part found fits that latitude.
     - `birge_ratio` is the ratio of the residuals to what was expected; above 1 it has inflated `covariance_rad2_s2`.
-    - `degrees_of_freedom` are those of the standard deviations; null where nobody counts, as in results of before.
+    - `degrees_of_freedom` are those of the standard deviations; null where they have no end.
     """
 
     rate_rad_s: Vector3
@@ -25,8 +25,8 @@ class EarthRateEntry(Entry):
     up: Vector3
     vertical_fixed: bool
     birge_ratio: float
-    degrees_of_freedom: float | None = None
+    degrees_of_freedom: Freedom
 
-    def freedoms(self, count: int) -> list[Freedom] | None:
-        """Degrees of freedom of `count` of the entry's numbers; None where nobody counts."""
-        return None if self.degrees_of_freedom is None else [self.degrees_of_freedom] * count
+    def freedoms(self, count: int) -> list[Freedom]:
+        """Degrees of freedom of `count` of the entry's numbers."""
+        return [self.degrees_of_freedom] * count

@@ -40,8 +40,8 @@ class FieldSolutionEntry(Entry):
 class FieldDwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
 
-    `residual_std_t` is what the solve expects that to scatter by, null in results of before. `attitude` takes a vector
-    of the arm's base frame into the flange's.
+    `residual_std_t` is what the solve expects that to scatter by. `attitude` takes a vector of the arm's base frame
+    into the flange's.
     """
 
     index: int
@@ -53,7 +53,7 @@ class FieldDwellEntry(Entry):
     residual_t: Vector3
     samples: int
     duration_s: float
-    residual_std_t: Vector3 | None = None
+    residual_std_t: Vector3
 
 
 class UniformityEntry(Entry):
@@ -88,7 +88,7 @@ class MagnetometerEntry(Entry):
     - `extension_m` is where it sits on the flange, `uniformity` whether the field was the same in all attitudes,
       `drift` whether it stayed the same, null where it was not tested.
     - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
-      says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
+      says what makes it up. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
     - `detection_limits`: what may happen while it is recorded, and from what size on that contradicts itself.
@@ -103,7 +103,7 @@ class MagnetometerEntry(Entry):
     range_t: float | None = None
     model: str
     estimator: Method
-    arm_field_in_bias: bool = True
+    arm_field_in_bias: bool
     extension_m: Vector3 = (0.0, 0.0, 0.0)
     uniformity: UniformityEntry | None = None
     drift: FieldDriftEntry | None = None
@@ -126,8 +126,8 @@ class MagnetometerEntry(Entry):
     correction_matrix: Matrix3
     other_methods: dict[str, FieldSolutionEntry | ErrorEntry]
     warnings: tuple[str, ...]
-    covariance_combined: Matrix6 | None = None
-    budget: BudgetEntry | None = None
+    covariance_combined: Matrix6 | None
+    budget: BudgetEntry | None
     conditions: ConditionsEntry | None = None
     non_orthogonality_degrees_of_freedom: Freedom3 | None = None
     detection_limits: tuple[DetectionLimitEntry, ...] = ()
@@ -153,7 +153,7 @@ class ReversalEntry(Entry):
     - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
     - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
     - `scale` and `correction_matrix` are the means of the runs'. `…_degrees_of_freedom` are those of the standard
-      deviations of that name, null where they have no end; files of before do not count them.
+      deviations of that name, null where they have no end.
     """
 
     part: str
@@ -171,9 +171,9 @@ class ReversalEntry(Entry):
     degrees_of_freedom: int
     limit: float
     runs: tuple[AsMountedEntry, ...]
-    scale_degrees_of_freedom: Freedom3 | None = None
-    bias_degrees_of_freedom: Freedom3 | None = None
-    arm_field_degrees_of_freedom: Freedom3 | None = None
+    scale_degrees_of_freedom: Freedom3
+    bias_degrees_of_freedom: Freedom3
+    arm_field_degrees_of_freedom: Freedom3
 
 
 class ReversalDocument(Entry):

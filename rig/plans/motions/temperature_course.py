@@ -32,7 +32,7 @@ class Course:
     warming: bool | None = None
 
     def begin(self, temperature_c: float) -> None:
-        """Choose the way: away from the end that is nearer, or that of before a run was interrupted."""
+        """Choose the way: away from the end that is nearer, or the one taken before a run was interrupted."""
         self.warming = temperature_c <= (self.from_c + self.to_c) / 2
         if self.sets:
             self.warming = self.sets[-1].warming

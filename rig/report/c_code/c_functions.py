@@ -4,8 +4,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from rig.data.entries.accelerometer import AccelerometerEntry
 from rig.data.entries.magnetometer import MagnetometerEntry
 from rig.data.result_file import GyroscopeEntry
@@ -56,13 +54,12 @@ def prefix_of(name: str) -> str:
 
 def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
     about = f"{sensor.part}, serial number {sensor.serial_number}{_warm(sensor.temperature_c)}"
-    whole = sensor.correction_matrix
     yield from (
         "",
         f"/* {_comment(about)}. */",
         f"static const float {prefix}_scale[3] = {_array(sensor.scale)};",
         f"static const float {prefix}_bias_rad_s[3] = {_array(sensor.bias_rad_s)};",
-        f"static const float {prefix}_matrix[3][3] = {c_rows(np.diag(sensor.scale) if whole is None else whole)};",
+        f"static const float {prefix}_matrix[3][3] = {c_rows(sensor.correction_matrix)};",
         "",
         f"static inline void {prefix}_calibrate(const float reading_rad_s[3], float rate_rad_s[3])",
         "{",

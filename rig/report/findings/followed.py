@@ -109,7 +109,7 @@ def scale_and_bias(
     axes, each_alone = len(entry.scale), np.eye(2 * len(entry.scale))
     mean = each_alone[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
-    factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
+    factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.coverage_factors)
     scale_limit, bias_limit = (limit_held(document.checks, sensor, quantity.name, of) for of in HELD)
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", each_alone[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]

@@ -109,11 +109,9 @@ def _shown(finding: Finding[DriftEntry]) -> Shown:
     return row_of(LARGEST_CHANGE.of(finding), finding.quantity.beside(finding.sensor))
 
 
-def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed | None:
-    """What is followed of a drift, in results that say whose bias it is."""
+def _followed(finding: Finding[DriftEntry], document: ResultDocument) -> Followed:
+    """What is followed of a drift."""
     entry = finding.entry
-    if entry.part is None or entry.serial_number is None or entry.full_scale is None:
-        return None
     warm = [repeat.temperature_c for repeat in entry.repeats if repeat.temperature_c is not None]
     return Followed(
         finding.sensor,

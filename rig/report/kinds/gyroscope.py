@@ -146,7 +146,7 @@ def _beside(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
     if not isinstance(vector, ErrorEntry):
         if sensor.range_rad_s is None and sensor.budget is not None:  # of readings from elsewhere F is what is wanted
             covariance = np.array(vector.matrix_covariance)[:9, :9]
-            yield from matrix_lines(np.array(vector.matrix), covariance, max(sensor.budget.factors[:3]))
+            yield from matrix_lines(np.array(vector.matrix), covariance, max(sensor.budget.coverage_factors[:3]))
         else:
             yield line_of(NON_ORTHOGONALITY.of(finding), "non-orthogonality yz zx xy", "+.3f")
         yield from (f"warning: {warning}" for warning in vector.warnings)

@@ -14,7 +14,7 @@ from rig.station.plain_text import plain
 
 def expanded_heading(budget: BudgetEntry | None) -> str:
     """The heading of a column of U by a budget; without one U is two standard deviations."""
-    return heading_of((COVERAGE_FACTOR,) if budget is None else budget.factors)
+    return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 
 def heading_of(factors: Sequence[float]) -> str:

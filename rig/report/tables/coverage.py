@@ -13,7 +13,7 @@ QUANTITIES = ("scale factors", "biases")
 
 def factor_note(budget: BudgetEntry) -> str:
     """What stands beside ± U: k where it is one number for all values, as it is printed."""
-    printed = {f"{each:.2f}" for each in budget.factors}
+    printed = {f"{each:.2f}" for each in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 
 
@@ -23,8 +23,8 @@ def coverage_sentence(budget: BudgetEntry) -> str:
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"
     )
-    factors = [f"{each:.2f}" for each in budget.factors]
-    covers = min(budget.probabilities)
+    factors = [f"{each:.2f}" for each in budget.coverage_factors]
+    covers = min(budget.coverage_probabilities)
     if len(set(factors)) > 1:
         groups = [_group(budget, factors, 3 * i, name) for i, name in enumerate(QUANTITIES)]
         return (

@@ -99,7 +99,7 @@ def bias_drift(entry: DriftEntry, of: Quantity) -> Iterator[Element]:
         )
         said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
 deviation of {entry.common_std[i]!r} {entry.unit}. ± U of what differs"
-        freedom = None if entry.degrees_of_freedom is None else [entry.degrees_of_freedom[i]] * len(labels)
+        freedom = [entry.degrees_of_freedom[i]] * len(labels)
         yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), of.d_si)
 
 
@@ -166,7 +166,7 @@ def _known_whole(entry: GyroscopeEntry | AccelerometerEntry | MagnetometerEntry)
 
 
 def _at(when: ConditionsEntry | None) -> str:
-    """When it was read, and how warm it was; of results of before the temperature is a condition alone."""
+    """When it was read, and how warm it was; nothing of readings of a file, whose times nobody knows."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
 
@@ -185,7 +185,7 @@ def _speed(sensor: GyroscopeEntry) -> str:
 
 def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
     """The expanded uncertainties of scale factors and of biases."""
-    of = budget.expanded, budget.factors, budget.probabilities
+    of = budget.expanded, budget.coverage_factors, budget.coverage_probabilities
     return Expanded(*(each[:3] for each in of)), Expanded(*(each[3:] for each in of))
 
 

@@ -54,14 +54,14 @@ def _lines(reversal: ReversalEntry) -> Iterator[str]:
 
 def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
     std = np.sqrt(np.diag(reversal.found.covariance))
-    scale, both = of_reversal(reversal) or (None, None)
+    scale, both = of_reversal(reversal)
     return entry(
         ReversalEntry, reversal.found, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],
         arm_field_std_t=std[3:],
         scale_degrees_of_freedom=counted(scale),
-        bias_degrees_of_freedom=None if both is None else counted(both[:3]),
-        arm_field_degrees_of_freedom=None if both is None else counted(both[3:]),
+        bias_degrees_of_freedom=counted(both[:3]),
+        arm_field_degrees_of_freedom=counted(both[3:]),
         runs=tuple(map(_as_mounted, reversal.runs)),
     )  # fmt: skip
 

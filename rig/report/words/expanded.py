@@ -19,7 +19,7 @@ class Expanded:
 
 
 def expanded(stds: Sequence[float], freedom: Sequence[Freedom] | None) -> Expanded:
-    """U = k u of each by Student's t; two standard deviations where nobody counted, as in results of before."""
+    """U = k u of each by Student's t; two standard deviations where nobody counted."""
     known = [np.inf if each is None else each for each in freedom or [None] * len(stds)]
     factors = coverage_factors(known)
     return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), covered(factors, known).tolist())

@@ -105,7 +105,7 @@ def _column(budget: BudgetEntry, place: int, size: _Size) -> Column:
         size.unit,
         size.text(budget.std[place]),
         freedom_text(budget.known[place]),
-        f"{budget.factors[place]:.2f}",
+        f"{budget.coverage_factors[place]:.2f}",
         size.text(budget.expanded[place]),
     )
 
@@ -126,7 +126,7 @@ def _line(line: ContributorEntry, places: tuple[int, int], sizes: Sequence[_Size
 
 
 def _uncounted(line: ContributorEntry) -> str:
-    """Why there is no number: it is known, it is in u already, or nobody counted it, as in results of before."""
+    """Why there is no number: it is known, it is in u already, or nobody counted it."""
     if line.kind == "B":
         return "∞"
     return "in u" if line.source.endswith(IN_U) else "–"

@@ -29,7 +29,7 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """What tells a temperature, in words; results of before, which do not say when, read it."""
+    """What tells a temperature, in words; where nobody knows when, the item's thermometer did if anything."""
     if when is not None and when.temperature_c is None:
         return "of which the item provided no temperature, and nobody stated one"
     if when is not None and when.temperature_stated:

@@ -180,7 +180,7 @@ def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counte
     assert len(tables) == len(stated) > 0
     for rows, budget in zip(tables, stated, strict=True):
         check_adds_up(rows, budget)
-        np.testing.assert_allclose(budget.factors, coverage_factors(budget.known))
+        np.testing.assert_allclose(budget.coverage_factors, coverage_factors(budget.known))
         freedom = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
         assert all(number == "∞" for kind, number in freedom.values() if kind == "B")
         assert all(number == "in u" or float(number) >= 1 for kind, number in freedom.values() if kind == "A")
@@ -254,15 +254,15 @@ def test_each_value_has_the_coverage_factor_of_its_degrees_of_freedom() -> None:
     document = document_of(judged(run, DEFAULT_ESTIMATOR))
     by_freedom = document.gyroscopes["kvh"].budget
     assert by_freedom is not None
-    np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.factors, by_freedom.std), rtol=1e-9)
-    assert by_freedom.factors == pytest.approx(coverage_factors(by_freedom.known))
-    assert 2.0 < by_freedom.factors[0] < 2.01 and by_freedom.factors[4] > 2.1
+    np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.coverage_factors, by_freedom.std), rtol=1e-9)
+    assert by_freedom.coverage_factors == pytest.approx(coverage_factors(by_freedom.known))
+    assert 2.0 < by_freedom.coverage_factors[0] < 2.01 and by_freedom.coverage_factors[4] > 2.1
     noise = {each.name: each.degrees_of_freedom for each in by_freedom.contributors}["noise"]
     assert noise is not None and 20 < noise < 1e6
     for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
         check_adds_up(rows, budget)
     bias = next(check for check in document.checks if check.name == "kvh.bias")
-    assert bias.uncertainty in by_freedom.expanded[3:] and bias.coverage_factor in by_freedom.factors[3:]
+    assert bias.uncertainty in by_freedom.expanded[3:] and bias.coverage_factor in by_freedom.coverage_factors[3:]
 
 
 def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]

@@ -73,7 +73,13 @@ def accelerometer(
     none: Vector3 = (0.0, 0.0, 0.0)
     covariance = tuple(tuple(1e-8 * (i == j) * (1 if i < 3 else 100) for j in range(6)) for i in range(6))
     dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_m_s2": none, "mean_std_m_s2": none}
-    dwell |= {"noise_m_s2": (0.01, 0.02, 0.01), "residual_m_s2": none, "samples": 600, "duration_s": 3.0}
+    dwell |= {
+        "noise_m_s2": (0.01, 0.02, 0.01),
+        "residual_m_s2": none,
+        "residual_std_m_s2": none,
+        "samples": 600,
+        "duration_s": 3.0,
+    }
     found = AccelerometerEntry.model_validate(
         {
             "part": "lsm9ds1",
@@ -105,6 +111,8 @@ def accelerometer(
             "correction_matrix": correction,
             "other_methods": {},
             "warnings": (),
+            "covariance_combined": None,
+            "budget": None,
         }
     )
     return _budgeted(found, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
@@ -140,7 +148,13 @@ def magnetometer() -> MagnetometerEntry:
     size = np.array([2e-4, 2e-4, 2e-4, 5e-9, 5e-9, 5e-9])
     covariance = (0.9 * np.eye(6) + 0.1) * np.outer(size, size)
     dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_t": none, "mean_std_t": (2e-8, 2e-8, 2e-8)}
-    dwell |= {"noise_t": (3e-7, 3e-7, 3e-7), "residual_t": (1e-8, -3e-8, 0.0), "samples": 160, "duration_s": 2.0}
+    dwell |= {
+        "noise_t": (3e-7, 3e-7, 3e-7),
+        "residual_t": (1e-8, -3e-8, 0.0),
+        "residual_std_t": (2e-8, 2e-8, 2e-8),
+        "samples": 160,
+        "duration_s": 2.0,
+    }
     test = {"change_t": (1e-8, 0.0, 0.0), "std_t": (2e-8, 2e-8, 2e-8), "chi_square": 1.0, "limit": 16.0}
     alike = {"chi_square": 70.0, "degrees_of_freedom": 64, "limit": 104.0, "attitude_error_rad": 2e-4}
     found = MagnetometerEntry.model_validate(
@@ -150,6 +164,7 @@ def magnetometer() -> MagnetometerEntry:
             "range_t": 4e-4,
             "model": "m = F B + b",
             "estimator": "attitude_weighted",
+            "arm_field_in_bias": True,
             "extension_m": (0.0, 0.0, 0.3),
             "uniformity": alike,
             "drift": test,
@@ -172,6 +187,8 @@ def magnetometer() -> MagnetometerEntry:
             "correction_matrix": IDENTITY,
             "other_methods": {},
             "warnings": (),
+            "covariance_combined": None,
+            "budget": None,
         }
     )
     return _budgeted(found, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
@@ -198,6 +215,7 @@ def reversal(document: ResultDocument) -> ReversalEntry:
             "chi_square": 1.4,
             "degrees_of_freedom": 2,
             "limit": 10.8,
+            **dict.fromkeys((f"{name}_degrees_of_freedom" for name in ("scale", "bias", "arm_field")), (None,) * 3),
             "runs": [{"run": f"run {i}", "started_utc": each, **as_mounted} for i, each in enumerate(began)],
         }
     )
@@ -208,6 +226,7 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
     biases = ((3e-6, 1e-6, 0.0), (1e-6, 2e-6, 0.0), (9e-6, 3e-6, 1e-6))
     stds = ((3e-7,) * 3, (4e-7,) * 3, (5e-7,) * 3)
     found = {"slope": (2e-6, 6e-7, 2e-7), "std": (2e-7,) * 3, "range_c": (22.0, 26.0), "correlation_with_time": 0.4}
+    found["degrees_of_freedom"] = (None,) * 3
     return DriftEntry.model_validate(
         {
             "unit": unit,
@@ -227,6 +246,11 @@ def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
             "largest_change": (8e-6, 2e-6, 1e-6),
             "temperature_slope": found if slope else {"error": "temperature_range_too_small: 1 °C"},
             "earth_rate_known": False,
+            "degrees_of_freedom": (None,) * 3,
+            "part": "lsm9ds1",
+            "serial_number": "LSM9DS1-001",
+            "full_scale": 4.276 if unit == "rad/s" else 19.6,
+            "temperature_stated": False,
         }
     )
 
@@ -286,6 +310,7 @@ def everything() -> ResultDocument:
         up=(0.0, 0.0, 1.0),
         vertical_fixed=False,
         birge_ratio=0.8,
+        degrees_of_freedom=None,
     )
     seen = {"vector_model": sensor.vector_model.model_copy(update=felt), "earth_rate": turning}
     drifts = {"rate": bias_drift("rad/s", slope=True), "acceleration": bias_drift("m/s²", slope=False)}
