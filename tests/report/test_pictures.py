@@ -18,9 +18,9 @@ from rig.report.certificate.plots import (
 )
 from rig.report.document import document_of
 from rig.report.findings.finding import Finding
-from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_ATTITUDES, OF_SAMPLES
+from rig.report.findings.unexplained import EXPECTED, EXPECTED_IN_ATTITUDES, OF_SAMPLES
 from rig.report.words.printed_budget import printed_budget
-from support.documents.certified import accelerometer, certificate, everything, magnetometer, read, result
+from support.documents.certified import certificate, everything, read, result
 from support.paths import RECORDINGS
 
 
@@ -42,7 +42,7 @@ def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
     assert EXPECTED in read(certificate()).text
 
 
-def test_bars_of_results_without_a_model_of_their_scatter_are_called_what_they_are() -> None:
+def test_bars_of_solutions_without_a_model_of_their_scatter_are_called_what_they_are() -> None:
     sensor = read_result(RECORDINGS / "imu").gyroscopes["gyro"]
     assert isinstance(sensor.vector_model, VectorEntry)
     alone = sensor.vector_model.model_copy(update={"residuals_std_rad_s": None})
@@ -51,23 +51,8 @@ def test_bars_of_results_without_a_model_of_their_scatter_are_called_what_they_a
     assert "which holds vibration" in picture.of
 
 
-def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_along_it() -> None:
-    found = accelerometer()
-    noise, off = 1e-4, found.attitude_error_rad
-    one = found.dwells[0].model_copy(
-        update={"mean_m_s2": (9.81 + 0.3, -0.2, 0.1), "mean_std_m_s2": (noise, noise, noise)}
-    )
-    picture = attitude_residuals(Finding("imu", ACCELERATION, found.model_copy(update={"dwells": (one,)})))
-    assert picture.of == OF_ATTITUDES and picture.unit == "mm/s²"
-    assert off is not None
-    across = 2e3 * np.hypot(noise, 9.81 * off)
-    np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
-    field = magnetometer()
-    assert attitude_residuals(Finding("imu", FIELD, field)).of == OF_ATTITUDES
-
-
 @pytest.mark.slow
-def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so() -> None:
+def test_bars_of_attitudes_are_what_the_solve_expects_of_them() -> None:
     document = document_of(judged(open_run(RECORDINGS / "magnetometer"), DEFAULT_ESTIMATOR))
     (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
     assert isinstance(field, MagnetometerEntry)

@@ -116,8 +116,8 @@ class AccelerometerEntry(Entry):
     other_methods: dict[str, AccelerationSolutionEntry | ErrorEntry]
     validation: ValidationEntry | None
     warnings: tuple[str, ...]
-    covariance_combined: Matrix6 | None
-    budget: BudgetEntry | None
+    covariance_combined: Matrix6
+    budget: BudgetEntry
     conditions: ConditionsEntry | None = None
     non_orthogonality_degrees_of_freedom: Freedom3 | None = None
     second_order_degrees_of_freedom: Freedom3 | None = None

@@ -126,8 +126,8 @@ class MagnetometerEntry(Entry):
     correction_matrix: Matrix3
     other_methods: dict[str, FieldSolutionEntry | ErrorEntry]
     warnings: tuple[str, ...]
-    covariance_combined: Matrix6 | None
-    budget: BudgetEntry | None
+    covariance_combined: Matrix6
+    budget: BudgetEntry
     conditions: ConditionsEntry | None = None
     non_orthogonality_degrees_of_freedom: Freedom3 | None = None
     detection_limits: tuple[DetectionLimitEntry, ...] = ()

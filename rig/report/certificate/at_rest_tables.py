@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.entries.accelerometer import AccelerometerEntry
-from rig.data.entries.budget import expanded_uncertainties
 from rig.data.entries.drift import DriftEntry
 from rig.data.entries.magnetometer import MagnetometerEntry, ReversalEntry
 from rig.data.entries.result_types import ErrorEntry
@@ -42,13 +41,12 @@ class DriftRow:
 
 def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
     """An accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
-    spread = expanded_uncertainties(entry.budget, entry.covariance)
-    return rows_of(entry.scale, entry.bias_m_s2, spread, too=1000 / entry.gravity_m_s2)
+    return rows_of(entry.scale, entry.bias_m_s2, entry.budget.expanded, too=1000 / entry.gravity_m_s2)
 
 
 def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
     """A magnetometer's axes with U; the bias in µT."""
-    return rows_of(entry.scale, entry.bias_t, expanded_uncertainties(entry.budget, entry.covariance), size=MICRO)
+    return rows_of(entry.scale, entry.bias_t, entry.budget.expanded, size=MICRO)
 
 
 def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:

@@ -55,8 +55,8 @@ def triad_entry(
     budget, dwells = result.budget, tuple[DwellReading | Held, ...](result.dwells)
     return entry(
         models.sensor, result, sensor, result.triad, result.solution,
-        covariance_combined=None if budget is None else budget.covariance,
-        budget=None if budget is None else budget_entry(budget),
+        covariance_combined=budget.covariance,
+        budget=budget_entry(budget),
         covariance_order=PARAMETERS,
         covariance_units=models.quantity.parameter_units,
         **_attitude_error(result.solution.attitude_error),

@@ -20,7 +20,6 @@ EXPECTED_IN_ATTITUDES = {
 }
 EXPECTED_OF_FILES = "what noise and the file's attitudes are expected to leave"
 OF_SAMPLES = "the samples' scatter over the root of their number, which holds vibration that a mean leaves out"
-OF_ATTITUDES = "noise and of the arm's attitudes"
 OF_REPEATS = "what differs between repeats"
 FROM_MEAN = "less its mean"
 
@@ -64,14 +63,9 @@ def of_attitudes(finding: Finding[Any]) -> Unexplained:
     def of(dwell: object, what: str) -> Any:
         return getattr(dwell, quantity.named(what))
 
-    labels, left = [each.name for each in dwells], np.array([of(dwell, "residual") for dwell in dwells])
-    expected = [told for dwell in dwells if (told := of(dwell, "residual_std")) is not None]
-    if len(expected) == len(left):
-        what = EXPECTED_OF_FILES if entry.placement is not None else EXPECTED_IN_ATTITUDES[quantity]
-        return Unexplained(quantity, labels, left, np.array(expected), what)
-    std, mean = (np.array([of(dwell, name) for dwell in dwells]) for name in ("mean_std", "mean"))
-    turned = _turned(np.array(entry.matrix), mean - np.array(of(entry, "bias")), entry.attitude_error_rad)
-    return Unexplained(quantity, labels, left, np.hypot(std, turned), OF_ATTITUDES)
+    left, stds = (np.array([of(dwell, name) for dwell in dwells]) for name in ("residual", "residual_std"))
+    what = EXPECTED_OF_FILES if entry.placement is not None else EXPECTED_IN_ATTITUDES[quantity]
+    return Unexplained(quantity, [each.name for each in dwells], left, stds, what)
 
 
 def of_repeats(finding: Finding[DriftEntry]) -> Unexplained:
@@ -81,11 +75,3 @@ def of_repeats(finding: Finding[DriftEntry]) -> Unexplained:
     std = np.array([each.scale_fixed.std for each in repeats])
     labels = [f"repeat {number}" for number in range(1, len(repeats) + 1)]
     return Unexplained(finding.quantity, labels, bias - bias.mean(axis=0), std, OF_REPEATS, shown=FROM_MEAN)
-
-
-def _turned(matrix: Array, readings: Array, attitude_error_rad: float | None) -> Array:
-    """(n, 3) what readings (n, 3), the bias taken out, change by for attitudes off by that about each axis."""
-    reference = readings @ np.linalg.inv(matrix).T  # in the sensor's own frame
-    turns = (attitude_error_rad or 0.0) * np.cross(np.eye(3)[None], reference[:, None])  # (n, 3 axes, 3)
-    found: Array = np.linalg.norm(turns @ matrix.T, axis=1)
-    return found

@@ -23,9 +23,9 @@ def heading_of(factors: Sequence[float]) -> str:
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 
 
-def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
+def assumed_lines(budget: BudgetEntry) -> Iterator[str]:
     """What was assumed because the configuration does not say it."""
-    for line in () if budget is None else budget.contributors:
+    for line in budget.contributors:
         if line.half_width is not None and line.source.endswith(NOT_GIVEN):
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed, for {line.source}"
 

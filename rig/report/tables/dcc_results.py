@@ -146,15 +146,14 @@ def earth_rate(entry: EarthRateEntry) -> Iterator[Element]:
 def _relative(
     entry: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, statement: str, how: str = ""
 ) -> Iterator[Element]:
-    budget, covariance = _known_whole(entry)
-    statement = f"{statement} {_at(entry.conditions)}{_told(entry.detection_limits)}{coverage_sentence(budget)}"
-    scale, bias = _expanded(budget)
+    covered, (scale, bias) = coverage_sentence(entry.budget), _expanded(entry.budget)
+    statement = f"{statement} {_at(entry.conditions)}{_told(entry.detection_limits)}{covered}"
     yield _result(f"scale factor{how}", statement, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", statement, real_list(AXES, numbers[3:], [unit], expanded=bias))
-    yield _joint(numbers, covariance, unit, how)
+    yield _joint(numbers, entry.covariance_combined, unit, how)
 
 
-def _known_whole(entry: GyroscopeEntry | AccelerometerEntry | MagnetometerEntry) -> tuple[BudgetEntry, Matrix6]:
+def _known_whole(entry: GyroscopeEntry) -> tuple[BudgetEntry, Matrix6]:
     """The budget and the covariance that combines it. Raises Refused `no_digital_certificate` where one is missing."""
     if entry.budget is None or entry.covariance_combined is None:
         raise Refused(

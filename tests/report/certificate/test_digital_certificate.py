@@ -261,10 +261,10 @@ def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid()
 
 def half_known() -> ResultDocument:
     """A result that says which parts its uncertainty has, and not what they come to."""
-    document = with_accelerometer()
-    of_all = document.accelerometers.items()
+    document = result()
+    of_all = document.gyroscopes.items()
     halves = {name: each.model_copy(update={"covariance_combined": None}) for name, each in of_all}
-    return document.model_copy(update={"accelerometers": halves})
+    return document.model_copy(update={"gyroscopes": halves})
 
 
 @pytest.mark.parametrize(

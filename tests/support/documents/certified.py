@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from html.parser import HTMLParser
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from support.recordings.synthetic_run import Setup, synthetic_run
 
 CELLS = {"td", "th", "p", "div", "dd", "dt", "li", "h1", "h2", "h3", "caption"}
 VOID = {"meta", "br", "link", "img", "input", "hr", "base", "embed", "source"}
-EntryT = TypeVar("EntryT", AccelerometerEntry, MagnetometerEntry)
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LABORATORY = Stated(
     SiteSection(
@@ -80,51 +79,49 @@ def accelerometer(
         "samples": 600,
         "duration_s": 3.0,
     }
-    found = AccelerometerEntry.model_validate(
-        {
-            "part": "lsm9ds1",
-            "serial_number": "LSM9DS1-001",
-            "range_m_s2": 19.6,
-            "role": "calibrate",
-            "model": "m = F s + b",
-            "estimator": "attitude_weighted",
-            "gravity_m_s2": 9.81,
-            "scale": (1.012345, 0.987654, 1.0),
-            "bias_m_s2": (0.3, -0.2, 0.1),
-            "covariance": covariance,
-            "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
-            "covariance_units": ("1", "1", "1", "m/s²", "m/s²", "m/s²"),
-            "matrix": IDENTITY,
-            "non_orthogonality_rad": (4e-3, -7e-3, 5e-3),
-            "non_orthogonality_std_rad": (4e-5, 5e-5, 6e-5),
-            "second_order_s2_m": None,
-            "second_order_std_s2_m": None,
-            "reference_m_s2": (0.0, 0.0, 9.81),
-            "attitude_error_rad": 5e-4,
-            "attitude_error_std_rad": 1e-4,
-            **dict.fromkeys(("lever_arm_m", "lever_arm_std_m", "delay_s", "delay_std_s", "alignment", "validation")),
-            "dwells": ({**dwell, "temperature_c": 22.0},),
-            "sweeps": 6,
-            "rank": 14,
-            "condition": 1.9,
-            "temperature_c": 22.0,
-            "correction_matrix": correction,
-            "other_methods": {},
-            "warnings": (),
-            "covariance_combined": None,
-            "budget": None,
-        }
+    said: dict[str, Any] = {
+        "part": "lsm9ds1",
+        "serial_number": "LSM9DS1-001",
+        "range_m_s2": 19.6,
+        "role": "calibrate",
+        "model": "m = F s + b",
+        "estimator": "attitude_weighted",
+        "gravity_m_s2": 9.81,
+        "scale": (1.012345, 0.987654, 1.0),
+        "bias_m_s2": (0.3, -0.2, 0.1),
+        "covariance": covariance,
+        "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
+        "covariance_units": ("1", "1", "1", "m/s²", "m/s²", "m/s²"),
+        "matrix": IDENTITY,
+        "non_orthogonality_rad": (4e-3, -7e-3, 5e-3),
+        "non_orthogonality_std_rad": (4e-5, 5e-5, 6e-5),
+        "second_order_s2_m": None,
+        "second_order_std_s2_m": None,
+        "reference_m_s2": (0.0, 0.0, 9.81),
+        "attitude_error_rad": 5e-4,
+        "attitude_error_std_rad": 1e-4,
+        **dict.fromkeys(("lever_arm_m", "lever_arm_std_m", "delay_s", "delay_std_s", "alignment", "validation")),
+        "dwells": ({**dwell, "temperature_c": 22.0},),
+        "sweeps": 6,
+        "rank": 14,
+        "condition": 1.9,
+        "temperature_c": 22.0,
+        "correction_matrix": correction,
+        "other_methods": {},
+        "warnings": (),
+    }
+    return AccelerometerEntry.model_validate(
+        _budgeted(said, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
     )
-    return _budgeted(found, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
 
 
-def _budgeted(found: EntryT, size: KnownSize) -> EntryT:
+def _budgeted(said: Mapping[str, Any], size: KnownSize) -> dict[str, Any]:
     """The same with a budget of its noise and of how well the reference's size is known."""
-    noise = np.linalg.cholesky(np.array(found.covariance))
+    noise = np.linalg.cholesky(np.array(said["covariance"]))
     exact = AttitudeError(0.0, 0.0)
     spread = Spread(
-        np.array(found.scale),
-        np.array(found.covariance),
+        np.array(said["scale"]),
+        np.array(said["covariance"]),
         noise,
         np.eye(6),
         exact,
@@ -133,8 +130,7 @@ def _budgeted(found: EntryT, size: KnownSize) -> EntryT:
         noise_freedom=np.full(6, np.inf),
     )
     budget = reference_budget(spread, size)
-    combined = tuple(map(tuple, budget.covariance.tolist()))
-    return found.model_copy(update={"covariance_combined": combined, "budget": budget_entry(budget)})
+    return {**said, "covariance_combined": budget.covariance.tolist(), "budget": budget_entry(budget)}
 
 
 def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
@@ -157,41 +153,39 @@ def magnetometer() -> MagnetometerEntry:
     }
     test = {"change_t": (1e-8, 0.0, 0.0), "std_t": (2e-8, 2e-8, 2e-8), "chi_square": 1.0, "limit": 16.0}
     alike = {"chi_square": 70.0, "degrees_of_freedom": 64, "limit": 104.0, "attitude_error_rad": 2e-4}
-    found = MagnetometerEntry.model_validate(
-        {
-            "part": "lsm9ds1_magnetometer",
-            "serial_number": "COMPASS-7",
-            "range_t": 4e-4,
-            "model": "m = F B + b",
-            "estimator": "attitude_weighted",
-            "arm_field_in_bias": True,
-            "extension_m": (0.0, 0.0, 0.3),
-            "uniformity": alike,
-            "drift": test,
-            "field_t": 48e-6,
-            "scale": (1.029923, 0.980027, 1.019991),
-            "bias_t": (21.003e-6, -34.004e-6, 15.218e-6),
-            "covariance": covariance.tolist(),
-            "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
-            "covariance_units": ("1", "1", "1", "T", "T", "T"),
-            "matrix": IDENTITY,
-            "hard_iron_t": none,
-            "non_orthogonality_rad": (0.0109, -0.0086, 0.0138),
-            "non_orthogonality_std_rad": (2.7e-4, 2.6e-4, 2.8e-4),
-            "field_base_t": (2e-5, 0.0, -4e-5),
-            "attitude_error_rad": 2e-4,
-            "attitude_error_std_rad": 1e-4,
-            "dwells": (dwell,),
-            "rank": 14,
-            "condition": 2.0,
-            "correction_matrix": IDENTITY,
-            "other_methods": {},
-            "warnings": (),
-            "covariance_combined": None,
-            "budget": None,
-        }
+    said: dict[str, Any] = {
+        "part": "lsm9ds1_magnetometer",
+        "serial_number": "COMPASS-7",
+        "range_t": 4e-4,
+        "model": "m = F B + b",
+        "estimator": "attitude_weighted",
+        "arm_field_in_bias": True,
+        "extension_m": (0.0, 0.0, 0.3),
+        "uniformity": alike,
+        "drift": test,
+        "field_t": 48e-6,
+        "scale": (1.029923, 0.980027, 1.019991),
+        "bias_t": (21.003e-6, -34.004e-6, 15.218e-6),
+        "covariance": covariance.tolist(),
+        "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
+        "covariance_units": ("1", "1", "1", "T", "T", "T"),
+        "matrix": IDENTITY,
+        "hard_iron_t": none,
+        "non_orthogonality_rad": (0.0109, -0.0086, 0.0138),
+        "non_orthogonality_std_rad": (2.7e-4, 2.6e-4, 2.8e-4),
+        "field_base_t": (2e-5, 0.0, -4e-5),
+        "attitude_error_rad": 2e-4,
+        "attitude_error_std_rad": 1e-4,
+        "dwells": (dwell,),
+        "rank": 14,
+        "condition": 2.0,
+        "correction_matrix": IDENTITY,
+        "other_methods": {},
+        "warnings": (),
+    }
+    return MagnetometerEntry.model_validate(
+        _budgeted(said, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
     )
-    return _budgeted(found, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
 
 
 def reversal(document: ResultDocument) -> ReversalEntry:
