@@ -11,6 +11,7 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -68,7 +69,7 @@ def result(folder: Path, **changes: Any) -> Path:
             "range_rad_s": radians(245 if name == "gyro" else 250),
             "temperature_c": 22.5,
             "scale": SCALE[name],
-            "correction_matrix": None,
+            "correction_matrix": np.diag(SCALE[name]).tolist(),
             "bias_rad_s": BIAS[name],
         }
         for name in ("gyro", "other")
