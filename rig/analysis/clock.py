@@ -18,7 +18,6 @@ from rig.observation.timebase import NOMINAL_DRIFT
 
 # A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
-LOCKED, REAL_TIME = 150e-6, 1e-3  # beyond these no comparison was made, before what contradicts was told
 CERTAIN = 4.0  # standard deviations of what is found beside what is stated
 PPM = 1e-6
 

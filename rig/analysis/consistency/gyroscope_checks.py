@@ -41,8 +41,6 @@ from rig.analysis.consistency.whitened_segments import (
     Scatter,
     WhitenedSegments,
     beyond_chance,
-    covariance_of,
-    together,
     whiten,
     whiten_segments,
     whitening,
@@ -186,7 +184,7 @@ def _jumped(segments: Segments, felt: Array, scatter: Scatter, rate: float) -> S
 
     def told(step: Array, beside: Array) -> float:
         bias = _wandering(segments, felt, beside, scatter)
-        white = whitening(covariance_of(segments, scatter, bias), segments.variances_rad2_s2.min())
+        white = whitening(segments, scatter, bias)
         seen = whiten(white, (segments.means_rad_s - felt).T[:, :, None])[:, 0]
         return explained(seen, whiten(white, each_axis(steady)), whiten(white, each_axis(step)))[0]
 
@@ -207,8 +205,7 @@ def _beyond_jumps(places: int, rate: float) -> float:
 
 def _wandering(segments: Segments, felt: Array, steady: Array, scatter: Scatter) -> BiasProcess:
     """How the bias wanders, by what `steady` (N, k), orthonormal columns, leaves of the readings."""
-    each, count = np.arange(3), len(segments.sweep)
-    common = scatter.common_rad2_s2.reshape(3, count, 3, count)[each, :, each]
+    common = scatter.common_rad2_s2
     left = segments.means_rad_s - felt
     known = scatter.instability_rad_s
     return bias_process(
@@ -218,7 +215,7 @@ def _wandering(segments: Segments, felt: Array, steady: Array, scatter: Scatter)
 
 def _allowed(segments: Segments, off_rad_s: Array, allowance: Allowance) -> Scatter:
     """What is known of arm and sensor."""
-    return Scatter(segments.variances_rad2_s2, together(off_rad_s), allowance.instability_rad_s)
+    return Scatter(segments.variances_rad2_s2, off_rad_s, allowance.instability_rad_s)
 
 
 def _steady(segments: Segments) -> Array:

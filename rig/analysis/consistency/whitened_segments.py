@@ -14,12 +14,18 @@ from rig.estimation.statistics.bias_process import BiasProcess
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Scatter of means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have
-    in common, `common_rad2_s2` (3 N, 3 N); `instability_rad_s` is that of the bias, as far as it is known."""
+    """Scatter of means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and the errors that
+    they share, independent patterns `shared_rad_s` (P, N, 3); `instability_rad_s` is that of the bias, if known."""
 
     variances_rad2_s2: Array
-    common_rad2_s2: Array
+    shared_rad_s: Array
     instability_rad_s: float = 0.0
+
+    @property
+    def common_rad2_s2(self) -> Array:
+        """(3, N, N) covariance of each axis' means by the errors that they share."""
+        by_axis = np.moveaxis(self.shared_rad_s, -1, 0)
+        return np.asarray(np.swapaxes(by_axis, 1, 2) @ by_axis, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,24 +86,9 @@ def beyond_chance(rate: float) -> Callable[[int], float]:
 
 
 def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> WhitenedSegments:
-    white = whitening(covariance_of(segments, scatter, bias), segments.variances_rad2_s2.min())
+    white = whitening(segments, scatter, bias)
     seen = whiten(white, segments.means_rad_s.T[:, :, None])[:, 0]
     return WhitenedSegments(white, seen, whiten(white, each_axis(_known(segments))))
-
-
-def covariance_of(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:
-    """(3 N, 3 N) covariance of the segments' means, axis by axis: their scatter, and a bias that wanders."""
-    each, count = np.arange(3), len(segments.sweep)
-    covariance = scatter.common_rad2_s2.reshape(3, count, 3, count).copy()
-    noise = np.array([np.diag(each) for each in scatter.variances_rad2_s2.T])
-    covariance[each, :, each] += noise + bias.covariance(segments.times_s)
-    return covariance.reshape(3 * count, 3 * count)
-
-
-def together(off: Array) -> Array:
-    """(3 N, 3 N) covariance of independent patterns (P, N, 3)."""
-    columns = np.moveaxis(off, 0, -1).swapaxes(0, 1).reshape(-1, len(off))
-    return np.asarray(columns @ columns.T, dtype=np.float64)
 
 
 def _known(segments: Segments) -> Array:
@@ -106,13 +97,24 @@ def _known(segments: Segments) -> Array:
     return np.column_stack([segments.rates_rad_s, ones, segments.gravity_m_s2, in_time(segments)])
 
 
-def whitening(covariance: Array, least: float) -> Array:
-    """(3 N, 3 N) what makes noise of that covariance one and independent; no variance is below `least`.
+def whitening(segments: Segments, scatter: Scatter, bias: BiasProcess) -> Array:
+    """Return W (3 N, 3 N), which makes the means' errors independent and of variance 1, axis by axis.
 
-    Windows overlap when a computer's clock was put back between two recordings, and what is computed is no covariance.
+    First the noise of each axis and a bias that wanders, then the errors that means share. These may be 10⁵ times the
+    noise (a curve that is free on the ways), and one decomposition of both would lose the noise to rounding. No
+    variance of the former is below the smallest noise: windows overlap when a computer's clock was put back between two
+    recordings, and what is computed is no covariance.
     """
-    variances, directions = np.linalg.eigh(covariance)
-    return np.asarray(directions.T / np.sqrt(np.maximum(variances, least))[:, None], dtype=np.float64)
+    count, wandering = len(segments.sweep), bias.covariance(segments.times_s)
+    own, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()
+    for axis, noise in enumerate(scatter.variances_rad2_s2.T):
+        variances, directions = np.linalg.eigh(np.diag(noise) + wandering)
+        own[axis, :, axis] = directions.T / np.sqrt(np.maximum(variances, least))[:, None]
+    white = own.reshape(3 * count, 3 * count)
+    shared = whiten(white, np.moveaxis(scatter.shared_rad_s, 0, -1).swapaxes(0, 1))
+    directions, sizes, _ = np.linalg.svd(shared, full_matrices=False)
+    kept = 1 / np.hypot(1.0, sizes)
+    return np.asarray(white - directions @ ((1 - kept)[:, None] * (directions.T @ white)), dtype=np.float64)
 
 
 def whiten(white: Array, columns: Array) -> Array:
