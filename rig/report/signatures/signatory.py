@@ -125,7 +125,7 @@ def _of_token(key: TokenKey) -> Iterator[Signatory]:
 
     try:
         session = open_pkcs11_session(
-            key.library, token_criteria=TokenCriteria(label=key.token), user_pin=os.environ.get(PASSPHRASE)
+            key.module_path, token_criteria=TokenCriteria(label=key.token), user_pin=os.environ.get(PASSPHRASE)
         )
         with session:
             all_there = PKCS11Signer(session, cert_label=key.name, key_label=key.name, other_certs_to_pull=None)

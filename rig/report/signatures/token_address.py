@@ -16,11 +16,11 @@ _PIN = re.compile(r"pin[\W_]*(value|source)|(^|[\W_])pin[\W_]*=")
 
 @dataclass(frozen=True, slots=True)
 class TokenKey:
-    """The key with the label `name` in the `token` (None: the only one), to which the file `library` speaks."""
+    """The key labelled `name` in the `token` (None: the only one), which the module at `module_path` reaches."""
 
     token: str | None
     name: str
-    library: str
+    module_path: str
 
     @property
     def label(self) -> str:
