@@ -97,7 +97,7 @@ def consistency(segments: Segments, matrix: Array, rate: float, allowance: Allow
     scatter = _allowed(segments, allowance.off_rad_s, allowance)
     bias = _wandering(segments, felt, _steady(segments), scatter)
     here = _Look(segments, felt, whiten_segments(segments, scatter, bias))
-    later = _on_ways(matrix, _contradicting(here, matrix, allowance, bias), bias)
+    later = _on_contradicting_ways(here, matrix, allowance, bias)
     found = told_by(later.held, changes(later.segments, later.felt), rate)
     found |= told_by(here.held, differences(segments, felt, each_axis(here.means.sweeps)), rate)
     if told := later.held.most_by_one(of_one_axis(later.segments, later.felt), rate):
@@ -119,19 +119,19 @@ def would_tell(segments: Segments, matrix: Array, rate: float, allowance: Allowa
     return dict(_told_from(here, _on_ways(matrix, allowance, bias), rate))
 
 
-def _contradicting(here: _Look, matrix: Array, allowance: Allowance, bias: BiasProcess) -> Allowance:
-    """The allowance with what is unexplained of the ways as large as they contradict each other, up to `MOST` times.
+def _on_contradicting_ways(here: _Look, matrix: Array, allowance: Allowance, bias: BiasProcess) -> _Look:
+    """Return `_on_ways` with what is unexplained of these as large as they contradict each other, up to `MOST` times.
 
     χ² of all segments less that of those without the ways is theirs: it is to be as they are many.
     """
     ways, (own, freedom) = allowance.ways, _unexplained(here)
     for ratio in np.geomspace(1.0, MOST, TRIED):
         variances = ways.variances_rad2_s2 + (ratio - 1) * ways.unexplained_rad2_s2
-        allowance = replace(allowance, ways=replace(ways, variances_rad2_s2=variances))
-        whole, whole_freedom = _unexplained(_on_ways(matrix, allowance, bias))
+        later = _on_ways(matrix, replace(allowance, ways=replace(ways, variances_rad2_s2=variances)), bias)
+        whole, whole_freedom = _unexplained(later)
         if whole - own <= whole_freedom - freedom:
             break
-    return allowance
+    return later
 
 
 def _unexplained(look: _Look) -> tuple[float, int]:
