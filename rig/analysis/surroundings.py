@@ -19,7 +19,7 @@ class Surroundings:
 
     `extension_m` (3,) is where the sensors sit, from the flange, in its frame.
     `clock` is the one that speeds are corrected by, `clocks` what every recording that is held against others says.
-    `finds_earth_rate` says that the site is not asked for the Earth's rate,
+    `finds_earth_rate` says that the site is not asked for the Earth's rate.
     """
 
     site: Site

@@ -29,8 +29,7 @@ class AccelerometerErrors:
 
     Beside these, as the readings themselves say: `walk_m_s2_sqrt_s`, what w walks in a second; `louder` (K',), the
     variance of a dwell or sweep that was disturbed for itself, in that of its noise; `turning_m_s2`, by how much the
-    bias is another in all sweeps. Before they say it, `disturbed_odds` are those of one disturbed dwell or sweep in
-    a run against none, `turning_odds` those of another bias in all sweeps.
+    bias is another in all sweeps.
     """
 
     even_s2_m: float
@@ -45,8 +44,6 @@ class AccelerometerErrors:
     walk_m_s2_sqrt_s: float = 0.0
     louder: Array | None = None
     turning_m_s2: float = 0.0
-    disturbed_odds: float = 1 / 19
-    turning_odds: float = 1 / 19
 
     def without(self, piece: int) -> "AccelerometerErrors":
         """The errors in all but one dwell or sweep."""

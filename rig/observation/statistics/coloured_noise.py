@@ -58,11 +58,6 @@ def left_of(residuals: Array, memories: Sequence[int] = MEMORIES) -> Left:
     return Left(spectrum_at_zero / float(np.mean(centred**2)), _freedom(centred, memory))
 
 
-def left_by_correlations(residuals: Array) -> Left:
-    """The factor of `widening` on the variance of a mean of residuals (n,), whose freedom nobody counts."""
-    return Left(widening(residuals), np.inf)
-
-
 def _freedom(centred: Array, memory: int) -> float:
     products, count = _products(centred, memory), len(centred) - memory
     coefficients, power = _predicted(products)

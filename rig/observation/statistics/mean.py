@@ -1,6 +1,6 @@
 """Means of readings in any unit, with the variance of the mean: where nothing passes, where the arm shakes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -11,7 +11,7 @@ from rig.data.quantity import Quantity
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import even_groups
 from rig.estimation.statistics.rounding import Steps, rounding_left
-from rig.observation.statistics.coloured_noise import Left, left_of
+from rig.observation.statistics.coloured_noise import left_of
 from rig.observation.statistics.tapered_weights import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
@@ -126,15 +126,15 @@ def whole(readings: Array) -> Array:
     return even_groups(np.zeros(len(readings), dtype=np.intp), 1)
 
 
-def even_mean(readings: Array, steps: Steps, left: Callable[[Array], Left] = left_of) -> Mean:
+def even_mean(readings: Array, steps: Steps) -> Mean:
     """The mean of readings (n, 3) in these steps in which nothing passes: all of them count alike.
 
     The noise is their scatter, and never below the rounding to steps; the variance of the mean allows for readings that
-    are not white, which `left` tells of each axis. What rounding leaves in a mean however many samples there are is
+    are not white, which `left_of` tells of each axis. What rounding leaves in a mean however many samples there are is
     added.
     """
     variance = np.maximum(readings.var(axis=0, ddof=1), steps.variance)
-    coloured = [left(axis) for axis in (readings - readings.mean(axis=0)).T]
+    coloured = [left_of(axis) for axis in (readings - readings.mean(axis=0)).T]
     noise = Noise(
         scatter=variance,
         in_a_mean=variance * np.array([axis.factor for axis in coloured]),
