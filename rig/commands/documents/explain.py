@@ -60,11 +60,11 @@ def _error(name: str) -> Iterator[str]:
 
 
 def _word(name: str) -> Iterator[str]:
-    from rig.report.words.glossary import words_called
+    from rig.report.words.glossary import find_words
 
-    found = [*words_called(name)]
+    found = [*find_words(name)]
     for word in found:
-        yield f"{word.names}: {word.plain}"
+        yield f"{word.names}: {word.plain_meaning}"
     if found:
         yield "More: docs/glossary.md"
 
@@ -75,5 +75,5 @@ def _names() -> list[str]:
     from rig.report.words.check_words import check_words
     from rig.report.words.glossary import glossary
 
-    words = (name for word in glossary() for name in word.each)
+    words = (name for word in glossary() for name in word.synonyms)
     return [*check_words(), *LIMITS, *(entry.name for entry in catalogue()), *words]

@@ -1,50 +1,53 @@
-"""The words of the field and of this project: the table glossary.txt."""
+"""Words of the field (glossary.txt) and of this project (`house` in words.toml), for `rig explain` and the glossary."""
 
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-WHOSE = ("field", "machine", "project")
+OWNERS = ("field", "machine", "project")
 TABLE = Path(__file__).with_name("glossary.txt")
+OWN_WORDS = Path(__file__).with_name("words.toml")
 LINK = re.compile(r"\[([^]]+)\]\(([^)#]+)[^)]*\)")
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """Names that mean one thing, whose they are (one of `WHOSE`), and what they mean, in Markdown of docs/."""
+    """Names with one meaning, their owner (one of `OWNERS`), and the meaning, in Markdown of docs/."""
 
-    whose: str
+    owner: str
     names: str
-    means: str
+    meaning: str
 
     @property
-    def each(self) -> tuple[str, ...]:
-        """Every name alone: of `coverage factor, k = 2` too the letter."""
+    def synonyms(self) -> tuple[str, ...]:
+        """Every name alone: of `coverage factor, k = 2` also the letter."""
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
     @property
-    def plain(self) -> str:
-        """What it means, for a terminal."""
-        return LINK.sub(r"\1: docs/\2", self.means).replace("`", "")
+    def plain_meaning(self) -> str:
+        """The meaning without Markdown, for a terminal."""
+        return LINK.sub(r"\1: docs/\2", self.meaning).replace("`", "")
 
 
 @cache
 def glossary() -> tuple[Word, ...]:
-    """Every word, as the table has them. Raises ValueError for a line of another form than `whose | names | means`."""
-    found = []
+    """Return every word. Raise ValueError for a line of another form than `owner | names | meaning`."""
+    words = []
     for number, line in enumerate(TABLE.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("#"):
             continue
         cells = line.split(" | ")
-        if len(cells) != 3 or cells[0] not in WHOSE:
-            raise ValueError(f"{TABLE.name}, line {number}: not `whose | names | what it means`")
-        found.append(Word(*cells))
-    return tuple(found)
+        if len(cells) != 3 or cells[0] not in OWNERS:
+            raise ValueError(f"{TABLE.name}, line {number}: not `owner | names | meaning`")
+        words.append(Word(*cells))
+    house = tomllib.loads(OWN_WORDS.read_text(encoding="utf-8"))["house"]
+    return (*words, *(Word("project", names, meaning) for names, meaning in house.items()))
 
 
-def words_called(name: str) -> Iterator[Word]:
-    """The words of that name; U and u are two, and only where there is none are capitals no matter."""
-    same = [word for word in glossary() if name in word.each]
-    yield from same or [word for word in glossary() if name.casefold() in map(str.casefold, word.each)]
+def find_words(name: str) -> Iterator[Word]:
+    """Yield the words of that name. U and u differ; capitals are ignored only if no word has exactly that name."""
+    matches = [word for word in glossary() if name in word.synonyms]
+    yield from matches or [word for word in glossary() if name.casefold() in map(str.casefold, word.synonyms)]

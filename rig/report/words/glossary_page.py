@@ -1,4 +1,4 @@
-"""Prints the words for people, docs/glossary.md: `python -m rig.report.words.glossary_page > docs/glossary.md`."""
+"""The page of words, docs/glossary.md: `python -m rig.report.words.glossary_page > docs/glossary.md`."""
 
 from collections.abc import Iterator
 
@@ -12,25 +12,26 @@ SECTIONS = {
 
 
 def page_text() -> str:
-    """The table as Markdown, in three sections."""
+    """Return the table as Markdown, in three sections."""
     lines = [
         "# Glossary",
         "",
-        "Generated from [`rig/report/words/glossary.txt`](../rig/report/words/glossary.txt) by",
-        "`python -m rig.report.words.glossary_page > docs/glossary.md`: change the table, not this page.",
+        "Generated from [`rig/report/words/glossary.txt`](../rig/report/words/glossary.txt) and, for the words of this",
+        "project, [`words.toml`](../rig/report/words/words.toml) by `python -m rig.report.words.glossary_page >",
+        "docs/glossary.md`: change these tables, not this page.",
         "",
         "Words that the pages, the terminal and the certificate use. For people of other fields, and for readers whose",
         "second language is English. `rig explain WORD` says what stands here.",
     ]
-    for whose, (title, heading) in SECTIONS.items():
-        lines += ["", f"## {title}", "", f"| word | {heading} |", "| --- | --- |", *_rows(whose)]
+    for owner, (title, heading) in SECTIONS.items():
+        lines += ["", f"## {title}", "", f"| word | {heading} |", "| --- | --- |", *_rows(owner)]
     return "\n".join(lines) + "\n"
 
 
-def _rows(whose: str) -> Iterator[str]:
+def _rows(owner: str) -> Iterator[str]:
     for word in glossary():
-        if word.whose == whose:
-            yield f"| {word.names} | {word.means.replace('|', chr(92) + '|')} |"
+        if word.owner == owner:
+            yield f"| {word.names} | {word.meaning.replace('|', chr(92) + '|')} |"
 
 
 if __name__ == "__main__":
