@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from rig.config.judging.station_section import StationSection
-from rig.config.sensors.sensor_sections import checked_serial_number
+from rig.config.sensors.sensor_sections import check_serial_number
 
 Outcome = Literal["pass", "fail", "refused", "fault"]
 Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a name, which leads nowhere else
@@ -171,7 +171,7 @@ class Doubt:
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
     """What speaks against running that number now; `today` tells of a run of today that the history knows."""
     try:
-        checked_serial_number(serial)
+        check_serial_number(serial)
     except ValueError as error:
         return Doubt(f"{serial} is no serial number: {error}", final=True)
     if re.fullmatch(section.serial_pattern, serial, re.ASCII) is None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rig.batch.batch import Batch, BatchEnded, Begun, Entry, PartBegun, PartEnded, after, state_of
 from rig.config.files.regular_file import UnfitFile, read_regular_file
-from rig.config.files.written_file import opened_to_append
+from rig.config.files.written_file import open_to_append
 from rig.data.checked import checked, parsed
 from rig.data.run_folder import empty_folder, folder_of_its_own, refuse_links
 from rig.errors import Refused
@@ -101,7 +101,7 @@ def _entries(text: bytes) -> Iterator[Entry]:
 def _append(path: Path, entry: Entry) -> None:
     line = json.dumps({"entry": _NAMES[type(entry)], **asdict(entry)}, ensure_ascii=False) + "\n"
     try:
-        with os.fdopen(opened_to_append(path), "ab") as file:
+        with os.fdopen(open_to_append(path), "ab") as file:
             file.write(line.encode())
             file.flush()
             os.fsync(file.fileno())

@@ -1,4 +1,4 @@
-"""Which columns of somebody else's files hold what, and in which units: the file that `--columns` names."""
+"""The columns of external files and their units: the file that `--columns` names."""
 
 from typing import Annotated, Literal, Self
 
@@ -8,7 +8,7 @@ from rig.config.section import Positive, Section
 from rig.config.units import ACCELERATION, ANGLE, FIELD, NUMBER, PRESSURE, RATE, TEMPERATURE, TIME, UNITS
 
 # Files tell no pressure, and a column of theirs is multiplied by its unit alone.
-ALLOWED = tuple(name for name, unit in UNITS.items() if unit.of != PRESSURE and not unit.zero)
+ALLOWED = tuple(name for name, unit in UNITS.items() if unit.quantity != PRESSURE and not unit.zero)
 SUFFIXES = (
     ("_rad_s", RATE),
     ("_m_s2", ACCELERATION),
@@ -17,7 +17,7 @@ SUFFIXES = (
     ("_t", FIELD),
     ("_c", TEMPERATURE),
 )
-Along = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+AxisDirection = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 class ColumnSection(Section):
@@ -28,28 +28,30 @@ class ColumnSection(Section):
 
     @field_validator("unit")
     @classmethod
-    def known(cls, value: str) -> str:
-        """A unit that is not known is no unit to convert from."""
+    def unit_exists(cls, value: str) -> str:
+        """Refuse a unit that is not in the table, as nothing can be converted from it."""
         if value not in ALLOWED:
-            raise ValueError(f"no unit that is known here; allowed: {', '.join(ALLOWED)}")
+            raise ValueError(f"this unit is not known; allowed: {', '.join(ALLOWED)}")
         return value
 
     @property
     def factor(self) -> float:
-        """What takes its numbers to SI units."""
+        """The factor that converts its numbers to SI units."""
         return UNITS[self.unit].size
 
 
 class AxisSection(Section):
-    """One axis of the table, of the log's columns that tell it."""
+    """One axis of the table, with the log's columns of its angle and rate."""
 
-    along: Along = Field(description="the axis of the item it lies along where all angles are zero, by the right hand")
+    along: AxisDirection = Field(
+        description="the axis of the item it lies along where all angles are zero, by the right hand"
+    )
     angle: ColumnSection
     rate: ColumnSection | None = None
 
     @model_validator(mode="after")
     def units_fit(self) -> Self:
-        """An angle is no rate."""
+        """Refuse units of another quantity than angle and rate."""
         _fit("angle", self.angle, ANGLE)
         if self.rate is not None:
             _fit("rate", self.rate, RATE)
@@ -66,8 +68,8 @@ class TableSection(Section):
     )
 
     @model_validator(mode="after")
-    def told_alike(self) -> Self:
-        """The item's rate is known where every axis tells its own."""
+    def rates_of_all_axes_or_none(self) -> Self:
+        """Refuse rates of some axes only: the item's rate needs those of all."""
         _fit("time", self.time, TIME)
         if len({axis.rate is None for axis in self.axes}) > 1:
             raise ValueError("give the rate of every axis, or of none")
@@ -75,10 +77,10 @@ class TableSection(Section):
 
 
 class ColumnMap(Section):
-    """What stands where: `samples` of the readings' file; `motion` of the sweeps' or attitudes', or a `table`'s log.
+    """The columns of files: `samples` of the readings; `motion` of sweeps or attitudes, or the log of a `table`.
 
     The keys of `samples` and `motion` are the rig's own names of columns. A column that already has such a name need
-    not be named; columns that nobody names are left out. `…_skip_lines` stand before the heading.
+    not be named; columns that are not named are left out. `…_skip_lines` precede the heading.
     """
 
     samples: dict[str, ColumnSection] = Field(default_factory=dict)
@@ -89,7 +91,7 @@ class ColumnMap(Section):
 
     @model_validator(mode="after")
     def fits_together(self) -> Self:
-        """The unit that a name carries is what the column is converted to."""
+        """Refuse a column whose unit is of another quantity than the unit in its name."""
         for section in (self.samples, self.motion):
             for name, column in section.items():
                 _fit(name, column, next((what for suffix, what in SUFFIXES if name.endswith(suffix)), NUMBER))
@@ -99,9 +101,9 @@ class ColumnMap(Section):
 
 
 def _fit(name: str, column: ColumnSection, wanted: str) -> None:
-    found = UNITS[column.unit].of
-    if found != wanted:
-        raise ValueError(f"{name} is {_one(wanted)}, and {column.unit} is the unit of {_one(found)}")
+    quantity = UNITS[column.unit].quantity
+    if quantity != wanted:
+        raise ValueError(f"{name} is {_one(wanted)}, and {column.unit} is the unit of {_one(quantity)}")
 
 
 def _one(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Reads a configuration file, and says everything that is wrong with it at once."""
+"""The reading of a configuration file, which reports all of its errors at once."""
 
 import difflib
 import ipaddress
@@ -14,8 +14,8 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from rig.config.files.as_written import take_text_as_written
-from rig.config.files.layers import BASE, SET, Layered, Places, put_together, read_layers
-from rig.config.files.yaml_text import Location, Unreadable, dotted
+from rig.config.files.layers import BASE, SET, Layered, Places, merge_layers, read_layers
+from rig.config.files.yaml_text import Location, Unreadable, dotted_path
 from rig.config.models import ArmSection, ProcedureSection, RigConfig, SensorsConfig, StatementConfig, TurnerSection
 from rig.config.procedures.hand_sections import HandSection
 from rig.config.procedures.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
@@ -24,8 +24,8 @@ from rig.config.procedures.shortest_procedure import (
     CARRIED_OUT,
     SHORTEST,
     TargetUncertaintySection,
-    turned_otherwise,
-    written_out,
+    alternative_procedure,
+    expand_procedure,
 )
 from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
@@ -44,10 +44,9 @@ PROBLEMS_SHOWN = 25
 class Loaded:
     """A valid configuration.
 
-    `simulated` says that the file has a `world:` section; what the section says is text here, for the simulated
-    laboratory to read. `flash_file` is where that keeps the simulated board's memory, None for nowhere. `text` is the
-    file as used (built on its base, overrides applied), `rig_text` the same without its `world:` section: that is
-    what a recording keeps.
+    `simulated`: the file has a `world:` section, which only the simulated laboratory reads, from `text`. `flash_file`:
+    the file with the simulated board's memory, or None. `text`: the file as used (merged with its base, overrides
+    applied). `rig_text`: the same without the `world:` section, as a recording keeps it.
     """
 
     config: RigConfig
@@ -58,16 +57,16 @@ class Loaded:
 
     @property
     def laboratory(self) -> str | None:
-        """The file as used, where it has a `world:` section."""
+        """The file as used if it has a `world:` section, else None."""
         return self.text if self.simulated else None
 
 
 class ConfigurationRefused(Refused):
-    """The configuration is not valid; `problems` has one line for each error found."""
+    """A configuration that is not valid; `problems` has one line for each error."""
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
-        what = "command line" if all(f"{SET} " in each or f"({SET})" in each for each in problems) else "file"
+        what = "command line" if all(f"{SET} " in problem or f"({SET})" in problem for problem in problems) else "file"
         remedy = f"Correct the {what} and run again; nothing has moved"
         super().__init__("configuration", f"{printable(source)} has {count}", remedy)
         self.problems = tuple(printable(problem) for problem in problems)
@@ -87,21 +86,21 @@ def load(
     with what its `procedure:` section holds, `turners` the same of the kinds of turners. Raises `ConfigurationRefused`
     listing every error with its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
-    return _validated(_layered(path, overrides), str(path), sections, turners)
+    return _validate_all(_read(path, overrides), str(path), sections, turners)
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
-    """A configuration for who only reads sensors, and the file as used where it has a `world:` section, else None.
+    """Read the sensors' part of a configuration, and the file as used if it has a `world:` section, else None.
 
-    Such a file has to be whole, because the laboratory simulates all of it. Raises `ConfigurationRefused` as `load`.
+    A file with that section must be complete, as the laboratory simulates all of it. Raise `ConfigurationRefused`.
     """
-    layered = _layered(path, overrides)
+    layered = _read(path, overrides)
     if "world" in layered.document:
-        loaded = _validated(layered, str(path), None, None)
+        loaded = _validate_all(layered, str(path), None, None)
         return loaded.config, loaded.text
     rest = {key: value for key, value in layered.document.items() if key not in TURNS}
-    said = TURNS & layered.document.keys()
-    _, turner_problems = _validate_turner(layered.document, None, layered) if said else (None, [])
+    turner_keys = TURNS & layered.document.keys()
+    _, turner_problems = _validate_turner(layered.document, None, layered) if turner_keys else (None, [])
     config, problems = _validate(SensorsConfig, rest, (), layered)
     if layered.problems or turner_problems or config is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *turner_problems, *problems])
@@ -109,9 +108,9 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
 
 
 def load_statement(overrides: Sequence[str]) -> StatementConfig:
-    """What `path.to.key=value` say of site and certificate by themselves. Raises `ConfigurationRefused` as `load`."""
+    """Parse overrides of site and certificate without a file. Raise `ConfigurationRefused` as `load`."""
     try:
-        layered = put_together("{}", None, overrides)
+        layered = merge_layers("{}", None, overrides)
     except Unreadable as error:
         raise ConfigurationRefused("--set", [str(error)]) from None
     config, problems = _validate(StatementConfig, layered.document, (), layered)
@@ -121,15 +120,15 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
 
 
 def load_as(model: type[Model], path: str | Path) -> Model:
-    """A file that holds one section alone, of this `model`. Raises `ConfigurationRefused` as `load`."""
-    layered = _layered(path, ())
-    found, problems = _validate(model, layered.document, (), layered)
-    if layered.problems or found is None:
+    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load`."""
+    layered = _read(path, ())
+    section, problems = _validate(model, layered.document, (), layered)
+    if layered.problems or section is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *problems])
-    return found
+    return section
 
 
-def _layered(path: str | Path, overrides: Sequence[str]) -> Layered:
+def _read(path: str | Path, overrides: Sequence[str]) -> Layered:
     try:
         return read_layers(Path(path), overrides)
     except Unreadable as error:
@@ -143,15 +142,15 @@ def parse(
     sections: Sections = STOCK_SECTIONS,
     turners: Turners = None,
 ) -> Loaded:
-    """The configuration in a text, as `load` has it; it cannot build on a file."""
+    """Validate the configuration in a text as `load` does; it cannot build on a file."""
     try:
-        layered = put_together(text, None, overrides)
+        layered = merge_layers(text, None, overrides)
     except Unreadable as error:
         raise ConfigurationRefused(source, [str(error)]) from None
-    return _validated(layered, source, sections, turners)
+    return _validate_all(layered, source, sections, turners)
 
 
-def _validated(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
+def _validate_all(layered: Layered, source: str, sections: Sections, turners: Turners) -> Loaded:
     document = layered.document
     rig_part = {key: value for key, value in document.items() if key != "world"}
     config, rig_problems = _validate_rig(rig_part, sections, turners, layered)
@@ -180,7 +179,7 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
-    """The rig's part: the procedure and the turner by the sections that name and kind choose, and the rest."""
+    """Validate all but the world: procedure and turner by the models that name and kind choose, and the rest."""
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
@@ -193,27 +192,27 @@ def _validate_rig(
 
 
 def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
-    """A name that is not known is one problem; the other keys are then judged as those of the nearest name."""
+    """Validate the procedure's section. If its name is unknown, its other keys are compared with the nearest name's."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
-    place = ("procedure", "name")
+    name_location = ("procedure", "name")
     short = name == SHORTEST and SHORTEST not in sections
     if isinstance(data, dict) and (
         short or (name == CARRIED_OUT and "target_uncertainty" in data)
     ):  # a script's name stands there
-        if (otherwise := turned_otherwise(layered.document)) is not None:
-            return None, [f"{_where(place, layered.places)}: {otherwise}"]
+        if (otherwise := alternative_procedure(layered.document)) is not None:
+            return None, [f"{_where(name_location, layered.places)}: {otherwise}"]
         wanted, problems = _validate(
             TargetUncertaintySection, data.get("target_uncertainty", {}), ("procedure", "target_uncertainty"), layered
         )
         if wanted is None:
             return None, problems
-        data = written_out(data, wanted)
+        data = expand_procedure(data, wanted)
         name = data["name"]
     if isinstance(name, str) and name in sections:
         return _validate(sections[name], data, ("procedure",), layered)
-    problems = [_where(place, layered.places) + _not_allowed(name, [*sections, SHORTEST])]
+    problems = [_where(name_location, layered.places) + _not_allowed(name, [*sections, SHORTEST])]
     nearest = difflib.get_close_matches(str(name)[:100], list(sections), n=1)
     if nearest:
         problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), layered)[1]
@@ -223,25 +222,25 @@ def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tupl
 def _validate_turner(
     document: Mapping[str, Any], turners: Turners, layered: Layered
 ) -> tuple[TurnerSection | None, list[str]]:
-    """The section that says what turns: `arm` or, with its kind, `turner`. Of a wrong kind one problem."""
+    """Validate the turner's section: `arm` or, with its kind, `turner`. A wrong kind is one problem."""
     if "turner" not in document:
         if "arm" not in document:
             return None, ["arm: missing"]
         return _validate(ArmSection, document["arm"], ("arm",), layered)
-    known = {**STOCK_TURNERS, **(turners or {})}
+    kinds = {**STOCK_TURNERS, **(turners or {})}
     data = document["turner"]
     kind = data.get("kind") if isinstance(data, dict) else None
     if "arm" in document:
-        problem = _where(("turner",), layered.places) + ": what turns is said twice; say either arm or turner"
+        problem = _where(("turner",), layered.places) + ": the turner is given twice; give either arm or turner"
     elif not isinstance(data, dict):
         problem = _where(("turner",), layered.places) + f": {quote(data)}: must be a section, with the key kind"
-    elif isinstance(kind, str) and kind in known:
-        said = {key: value for key, value in data.items() if key != "kind"}
-        return _validate(known[kind], said, ("turner",), layered)
+    elif isinstance(kind, str) and kind in kinds:
+        keys = {key: value for key, value in data.items() if key != "kind"}
+        return _validate(kinds[kind], keys, ("turner",), layered)
     elif turners is None and kind is not None:
         return TurnerSection(), []
     else:
-        problem = _where(("turner", "kind"), layered.places) + _not_allowed(kind, list(known))
+        problem = _where(("turner", "kind"), layered.places) + _not_allowed(kind, list(kinds))
     return None, [problem]
 
 
@@ -262,7 +261,7 @@ SHAPES = {
 
 
 def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
-    """One validation error as: path (line): what is wrong, what is allowed, nearest spelling."""
+    """Return one validation error as: path (line): the fault, the allowed values, the nearest spelling."""
     location: Location = item["loc"]
     where = _where((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]
@@ -272,7 +271,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
         allowed = [*arm, *_keys_at(model, location[:-1]), *(["world", BASE] if whole else [])]
         return f"{where}: unknown key{_nearest(str(location[-1]), allowed)}; allowed: {', '.join(allowed)}"
     if kind == "missing":
-        return f"{where}: missing{_made_by_override((*prefix, *location[:-1]), layered)}"
+        return f"{where}: missing{_hint_at_override((*prefix, *location[:-1]), layered)}"
     if kind == "literal_error":
         allowed = [word.strip("'") for word in item["ctx"]["expected"].replace(" or ", ", ").split(", ")]
         return where + _not_allowed(value, allowed)
@@ -285,22 +284,22 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
     return f"{where}: {shown}{message[0].lower()}{message[1:]}"
 
 
-def _made_by_override(section: Location, layered: Layered) -> str:
-    """What else there is, where a section stands in no file: a misspelt `--set sensors.NAME.…` has made it."""
+def _hint_at_override(section: Location, layered: Layered) -> str:
+    """Return the names a misspelt `--set sensors.NAME.…` may have meant, if no file has this section; else ""."""
     if layered.places.get(section) != SET:
         return ""
-    beside: Any = layered.document
+    siblings: Any = layered.document
     for part in section[:-1]:
-        beside = beside[part]
-    others = [str(key) for key in beside if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
+        siblings = siblings[part]
+    others = [str(key) for key in siblings if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
     if not others or not section[:-1]:
         return ""
-    return f"; {dotted(section)} is said by --set alone, the file has {', '.join(others)}"
+    return f"; {dotted_path(section)} is given by --set only, the file has {', '.join(others)}"
 
 
-def _where(place: Location, places: Places) -> str:
-    stands = places.get(place)
-    return dotted(place) + (f" ({stands})" if stands else "")
+def _where(location: Location, places: Places) -> str:
+    source = places.get(location)
+    return dotted_path(location) + (f" ({source})" if source else "")
 
 
 def _not_allowed(value: Any, allowed: Sequence[str]) -> str:
@@ -308,13 +307,13 @@ def _not_allowed(value: Any, allowed: Sequence[str]) -> str:
 
 
 def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
-    """The keys allowed in the section at `location` of `model`."""
+    """Return the keys allowed in the section at `location` of `model`."""
     annotation: Any = model
     for part in location:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             annotation = annotation.model_fields[str(part)].annotation
         else:
-            annotation = [each for each in typing.get_args(annotation) if each is not ...][-1]  # of dict[str, Section]
+            annotation = [item for item in typing.get_args(annotation) if item is not ...][-1]  # of dict[str, Section]
         if isinstance(annotation, types.UnionType):
             annotation = typing.get_args(annotation)[0]
     return list(annotation.model_fields)
@@ -326,7 +325,7 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
+    """Yield the conflicts of world and rig: an address on another machine, other sensors than the rig's."""
     turner = config.turner
     if (host := turner.simulated_at) is None and not isinstance(turner, HandSection):
         yield "world: simulates an arm, a hand, or a servo whose port is socket://host:port, and turner says otherwise"
@@ -335,10 +334,10 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         key = "arm.host" if isinstance(turner, ArmSection) else f"turner.{next(iter(turner.moved_to(host)))}"
         yield f"{key}: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     yield from world.misfits(turner)
-    for place, port in config.ports.items():
+    for key, port in config.ports.items():
         if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):
             yield (
-                f"{place}: {quote(port)} must be socket://host:port, at a loopback address (127.x.y.z), "
+                f"{key}: {quote(port)} must be socket://host:port, at a loopback address (127.x.y.z), "
                 "when the file has a world: section"
             )
     for kind, named, simulated in (
@@ -363,7 +362,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Whether a host is this machine; not by how it begins: 127.example.org is a host somewhere else."""
+    """Return whether a host is this machine. Its beginning does not tell: 127.example.org is another host."""
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

@@ -26,11 +26,11 @@ from rig.config.section import (
     Section,
     SensorName,
     Vector3,
-    checked_host,
-    checked_port,
+    check_host,
+    check_port,
 )
 from rig.config.sensors.link_budget import Stream, over_budget
-from rig.config.sensors.mavlink_section import over_budget_of_autopilots
+from rig.config.sensors.mavlink_section import autopilots_over_budget
 from rig.config.sensors.sensor_catalogue import MAGNETOMETERS
 from rig.config.sensors.sensor_sections import ConfiguredSensor, MagnetometerSection, SensorSection
 
@@ -61,7 +61,7 @@ class TurnerSection(Section):
         return None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """The keys, with their values, that put a simulated one at another host."""
+        """Return the keys, with their values, that move a simulated one to another host."""
         return {}
 
 
@@ -118,8 +118,8 @@ class ArmSection(TurnerSection):
     @field_validator("host")
     @classmethod
     def can_be_looked_up(cls, value: str) -> str:
-        """What no name server could be asked for."""
-        return checked_host(value)
+        """Refuse a name that no name server can resolve."""
+        return check_host(value)
 
     @property
     def address(self) -> str:
@@ -137,13 +137,13 @@ class ArmSection(TurnerSection):
         return self.host
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """The controller at another host."""
+        """Return the key of the controller's host, with the new value."""
         return {"host": host}
 
     @property
     def extension_m(self) -> Vector3:
-        """Where the extension ends, x y z in the flange's frame, m."""
-        x, y, z = (each / 1000 for each in self.extension_mm)
+        """The end of the extension, x y z in the flange's frame, m."""
+        x, y, z = (length_mm / 1000 for length_mm in self.extension_mm)
         return x, y, z
 
 
@@ -162,8 +162,8 @@ class BoardSection(Section):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """A port, `socket://host:port` with both; the name of a serial port is the system's affair."""
-        return checked_port(value)
+        """Refuse `socket://` without host and port. The system knows the names of serial ports."""
+        return check_port(value)
 
 
 class ProcedureSection(Section):
@@ -174,7 +174,7 @@ class ProcedureSection(Section):
     @model_validator(mode="before")
     @classmethod
     def stages_only_where_they_mean_something(cls, data: Any) -> Any:
-        """Attitudes and verifications have one mounting: say so, and not that a key is unknown."""
+        """Refuse `stages` for attitudes and verifications, which have one mounting, by this reason."""
         if isinstance(data, dict) and "stages" in data and "stages" not in cls.model_fields:
             raise ValueError(
                 "stages are of six_observation and servo_six_observation, which calibrate gyroscopes: accelerometers "
@@ -204,7 +204,7 @@ class ProcedureSection(Section):
         return False
 
     def problems(self, config: "RigConfig") -> Iterable[str]:
-        """What of the rest of the configuration does not fit this procedure, a line each."""
+        """Yield a line for every part of the configuration that does not fit this procedure."""
         return ()
 
 
@@ -243,30 +243,30 @@ class SensorsConfig(Section):
     @property
     def ports(self) -> dict[str, str]:
         """The ports of board and sensors, each by its key in the file."""
-        own = {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in self.sensors.items() if s.own_port}
-        return own if self.board is None else {"board.port": self.board.port} | own
+        ports = {f"sensors.{name}.{s.own_port[0]}": s.own_port[1] for name, s in self.sensors.items() if s.own_port}
+        return ports if self.board is None else {"board.port": self.board.port} | ports
 
     @field_validator("sensors")
     @classmethod
     def sensors_fit_together(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """The board has one place for each part, and a calibration one reference at most."""
-        places: dict[str, str] = {}
+        """Refuse two sensors on one select line, port or IMU, name clashes, and more than one reference."""
+        sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:
-                place, what = f"{sensor.mavlink.port} {sensor.mavlink.instance}", f"IMU {sensor.mavlink.instance}"
+                source, what = f"{sensor.mavlink.port} {sensor.mavlink.instance}", f"IMU {sensor.mavlink.instance}"
                 what += f" of the autopilot at {sensor.mavlink.port}"
             elif sensor.own_port is not None:
-                _, place = sensor.own_port
-                what = f"at {place}; a port is one sensor's"
+                _, source = sensor.own_port
+                what = f"at {source}; a port can serve one sensor only"
             else:
-                place, what = sensor.part, f"{sensor.part}; the board has one place for each part"
-            if place in places:
-                raise ValueError(f"{places[place]} and {name} are both {what}")
-            places[place] = name
-        brought = _brought(sensors)
-        if both := sorted({name for name in brought if name in sensors or brought.count(name) > 1}):
-            raise ValueError(f"{', '.join(both)} is the name of what another sensor's port brings along already")
-        if problem := over_budget_of_autopilots({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
+                source, what = sensor.part, f"{sensor.part}; the board has one place for each part"
+            if source in sensor_at:
+                raise ValueError(f"{sensor_at[source]} and {name} are both {what}")
+            sensor_at[source] = name
+        bundled = _bundled_names(sensors)
+        if both := sorted({name for name in bundled if name in sensors or bundled.count(name) > 1}):
+            raise ValueError(f"{', '.join(both)} is already the name of a sensor that comes by another sensor's port")
+        if problem := autopilots_over_budget({name: (s.mavlink, s.rate_hz) for name, s in sensors.items()}):
             raise ValueError(problem)
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
         if len(references) > 1:
@@ -278,7 +278,7 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Rates for which the link is too slow would lose samples. Of what a sensor sends, the larger must fit."""
+        """Refuse data rates that exceed the link's capacity. Of a sensor's two message sizes, the larger must fit."""
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
             return sensors
@@ -292,9 +292,9 @@ class SensorsConfig(Section):
     def magnetometers_fit_beside_them(
         cls, magnetometers: dict[str, MagnetometerSection], info: ValidationInfo
     ) -> dict[str, MagnetometerSection]:
-        """A name stands for one sensor, and the link carries them too."""
+        """Refuse a magnetometer with a sensor's name, and rates that exceed the link's capacity."""
         sensors = info.data.get("sensors", {})
-        if both := sorted({*sensors, *_brought(sensors)} & magnetometers.keys()):
+        if both := sorted({*sensors, *_bundled_names(sensors)} & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
         if not magnetometers or not sensors or "board" not in info.data:
             return magnetometers
@@ -348,9 +348,9 @@ class RigConfig(SensorsConfig):
         return self.turner
 
 
-def _brought(sensors: Mapping[str, SensorSection]) -> list[str]:
-    """The names of what sensors on a port of their own bring along: magnetometers, and what has no axes."""
-    return [brought for name, each in sensors.items() for brought in each.brings(name)]
+def _bundled_names(sensors: Mapping[str, SensorSection]) -> list[str]:
+    """Return the names of further sensors that come by the ports of these: magnetometers, and scalars."""
+    return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 
 def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:

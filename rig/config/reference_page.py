@@ -85,7 +85,7 @@ that is there twice are refused.
 
 
 def reference() -> str:
-    """The page as Markdown."""
+    """Return the page as Markdown."""
     return "\n".join([INTRODUCTION, *_keys(), *_parts(), *_world()]) + "\n"
 
 
@@ -176,14 +176,14 @@ def _world() -> Iterator[str]:
 
 
 def _section(path: str, schema: Schema, definitions: Schema, heading: str | None = None) -> Iterator[str]:
-    """A section's heading, its keys in a table, and the sections within it."""
+    """Yield a section's heading, its keys in a table, and its subsections."""
     if "patternProperties" in schema:  # one section for each name
-        (each,) = schema["patternProperties"].values()
-        yield from _section(f"{path}.<name>", each, definitions)
+        (named_section,) = schema["patternProperties"].values()
+        yield from _section(f"{path}.<name>", named_section, definitions)
         return
-    section = _resolved(schema, definitions)
+    section = _resolve(schema, definitions)
     properties = section["properties"]
-    inner = {key: found for key, it in properties.items() if (found := _section_of(it)) is not None}
+    inner = {key: part for key, value in properties.items() if (part := _section_of(value)) is not None}
     required = section.get("required", ())
     yield from (heading or f"### `{path}`", "", " ".join(section["description"].split()), "")
     rows = (_row(key, it, key in required) for key, it in properties.items() if key not in inner)
@@ -194,40 +194,40 @@ def _section(path: str, schema: Schema, definitions: Schema, heading: str | None
 
 
 def _section_of(schema: Schema) -> Schema | None:
-    """What a key holds if that is a section or several, be it one that may be null."""
+    """Return the schema of the section or sections that a key holds, or None for a plain value."""
     if "$ref" in schema or "patternProperties" in schema:
         return schema
     if "$ref" in schema.get("items", ()):  # a list of sections
         return dict(schema["items"])
-    return next((each for each in schema.get("anyOf", ()) if "$ref" in each), None)
+    return next((variant for variant in schema.get("anyOf", ()) if "$ref" in variant), None)
 
 
-def _resolved(schema: Schema, definitions: Schema) -> Schema:
+def _resolve(schema: Schema, definitions: Schema) -> Schema:
     return definitions[schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
 
 
 def _row(key: str, schema: Schema, required: bool) -> tuple[str, ...]:
     value = next((it for it in schema.get("anyOf", ()) if it != {"type": "null"}), schema)
-    allowed = schema.get("allowed") or _allowed(value)
-    return f"`{key}`", schema["description"], unit_of(key, schema), allowed, _left_out(schema, required)
+    allowed = schema.get("allowed") or _describe_values(value)
+    return f"`{key}`", schema["description"], unit_of(key, schema), allowed, _describe_default(schema, required)
 
 
 def unit_of(key: str, schema: Schema) -> str:
-    """The unit of a key's value, by its name or its model; nothing for words and switches."""
+    """Return the unit of a key's value, by its name or its model; "" for words and switches."""
     return schema.get("unit") or next((unit for ending, unit in UNITS.items() if key.endswith(ending)), "")
 
 
-def _allowed(schema: Schema) -> str:
-    """What a value may be, in words."""
+def _describe_values(schema: Schema) -> str:
+    """Return the allowed values in words."""
     if "prefixItems" in schema:
         first, *others = schema["prefixItems"]
-        return f"{1 + len(others)} numbers{_each(first)}"
+        return f"{1 + len(others)} numbers{_describe_items(first)}"
     if "items" in schema:
-        return f"list{_each(schema['items'])}"
+        return f"list{_describe_items(schema['items'])}"
     return _single(schema)
 
 
-def _each(schema: Schema) -> str:
+def _describe_items(schema: Schema) -> str:
     words = _single(schema).removeprefix("number").strip()
     return f", each {words}" if words else ""
 
@@ -248,12 +248,12 @@ def _range(schema: Schema) -> str:
     if low is not None and high is not None:
         return f" {low:g} to {high:g}"
     bounds = (("at least", low), ("above", above), ("at most", high), ("below", below))
-    said = ", ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
-    return f" {said}" if said else ""
+    words = ", ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
+    return f" {words}" if words else ""
 
 
-def _left_out(schema: Schema, required: bool) -> str:
-    """What holds when the key is left out."""
+def _describe_default(schema: Schema, required: bool) -> str:
+    """Return the value that applies if the key is left out."""
     if "usual" in schema:
         return str(schema["usual"])
     if required:

@@ -1,4 +1,4 @@
-"""What all sections of a configuration file share: how they are checked, and what their values may be."""
+"""The base of all sections of a configuration file: common checks and types of values."""
 
 from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
@@ -21,7 +21,7 @@ RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key 
 
 
 def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) -> Any:
-    """YAML reads yes and on as true, which would pass for the number 1: a limit that is "on" limits nothing."""
+    """Refuse true and false for numbers: YAML reads yes and on as true, which would pass for the number 1."""
     field = cls.model_fields.get(info.field_name or "")
     if isinstance(value, bool) and field is not None:
         kinds = _kinds(field.annotation)
@@ -31,7 +31,7 @@ def no_number_is_true(cls: type[BaseModel], value: Any, info: ValidationInfo) ->
 
 
 def _kinds(annotation: Any) -> set[Any]:
-    """The types that a field's annotation is made of."""
+    """Return the types in a field's annotation."""
     return {annotation}.union(*map(_kinds, get_args(annotation))) if get_args(annotation) else {annotation}
 
 
@@ -43,8 +43,8 @@ class Section(BaseModel):
     _numbers = field_validator("*", mode="before")(classmethod(no_number_is_true))
 
 
-def checked_host(name: str) -> str:
-    """A host's name or address. Raises ValueError when it cannot be one."""
+def check_host(name: str) -> str:
+    """Return a host's name or address unchanged. Raise ValueError if it cannot be one."""
     try:
         name.encode("idna")
     except UnicodeError:
@@ -52,15 +52,15 @@ def checked_host(name: str) -> str:
     return name
 
 
-def checked_port(value: str) -> str:
-    """A serial port's name, or `socket://host:port`. Raises ValueError when it cannot be one.
+def check_port(value: str) -> str:
+    """Return a serial port's name or `socket://host:port` unchanged. Raise ValueError if it cannot be one.
 
     pyserial knows other addresses, and one of them, `spy://`, empties and writes a file that it names.
     """
     if "://" in value:
         try:
             parts = urlsplit(value)
-            complete = value.startswith("socket://") and bool(checked_host(parts.hostname or "") and parts.port)
+            complete = value.startswith("socket://") and bool(check_host(parts.hostname or "") and parts.port)
         except ValueError:
             complete = False
         if not complete:

@@ -1,4 +1,4 @@
-"""Units as people's files and devices spell them: what each is a unit of, and how large it is in SI."""
+"""Units as external files and devices spell them, with their quantity and their size in SI."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ TIME, ANGLE, RATE, ACCELERATION, FIELD, TEMPERATURE, PRESSURE, NUMBER = (
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit of what `of` names: a number of it × `size` + `zero` is the value in SI, of a temperature in °C."""
+    """A unit of `quantity`: a number of it × `size` + `zero` is the value in SI, of a temperature in °C."""
 
-    of: str
+    quantity: str
     size: float
     zero: float = 0.0
 
 
-def _spelt(of: str, size: float, *spellings: str, zero: float = 0.0) -> dict[str, Unit]:
-    return dict.fromkeys(spellings, Unit(of, size, zero))
+def _spelt(quantity: str, size: float, *spellings: str, zero: float = 0.0) -> dict[str, Unit]:
+    return dict.fromkeys(spellings, Unit(quantity, size, zero))
 
 
 UNITS: Final[Mapping[str, Unit]] = MappingProxyType(

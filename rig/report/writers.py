@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
-from rig.config.files.written_file import placed_together
+from rig.config.files.written_file import replace_together
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
@@ -38,7 +38,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
     document = document_of(outcome)
     pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, Without))
     told: list[RunEvent] = []
-    with placed_together():
+    with replace_together():
         for name in (*pictures, *WRITERS):
             told += _writer(name)(outcome, document, folder)
         write_result(document, folder)

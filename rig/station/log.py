@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
-from rig.config.files.written_file import opened_to_append
+from rig.config.files.written_file import open_to_append
 from rig.errors import Refused
 from rig.errors.quoting import printable_lines
 from rig.station.events import RunEvent
@@ -37,7 +37,7 @@ def log(path: Path) -> Iterator[Log]:
     Raises Refused `run_folder` where it cannot be written: then the recording beside it cannot either.
     """
     try:
-        file = os.fdopen(opened_to_append(path), "a", encoding="utf-8")
+        file = os.fdopen(open_to_append(path), "a", encoding="utf-8")
     except OSError as error:
         what = f"{path} cannot be written: {error.strerror or error}"
         raise Refused("run_folder", what, "Make room there, or copy the folder to where you may write") from error

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from rig.config.files.written_file import opened_to_append
+from rig.config.files.written_file import open_to_append
 
 LATE_S = 0.5  # wall time
 LOOK_S = 0.1  # between two looks of the thread
@@ -78,7 +78,7 @@ class FlightRecorder:
             if self._records >= RECORDS:
                 return
             self._records += 1
-            file = os.dup(sys.stderr.fileno()) if self._path is None else opened_to_append(self._path)
+            file = os.dup(sys.stderr.fileno()) if self._path is None else open_to_append(self._path)
             try:
                 os.write(file, f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n".encode())
                 if stacks:

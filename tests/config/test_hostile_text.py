@@ -124,7 +124,7 @@ def test_only_regular_files_are_opened(kind: str, tmp_path: Path, monkeypatch: p
         ("arm.host={a: 1, a: 2}", "a: given twice"),
         ("arm.host={[1]: 2}", "found unhashable key"),
         ("arm.host=", "must be path=value"),
-        ("base=demo.yaml", "base is said by the file alone"),
+        ("base=demo.yaml", "base can only be given in the file"),
         ("arm.host=\x1b[31mred", r"holds the control character \x1b"),
         ('arm.host="\\e[31mred"', r"holds the control character \x1b"),
         ("arm.host=a\x00b", r"holds the control character \x00"),

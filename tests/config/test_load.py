@@ -293,7 +293,7 @@ def test_a_value_that_was_given_by_an_override_is_refused_as_that() -> None:
     told = str(caught.value)
     assert "procedure.speed_deg_s (--set): 'fast': " in told
     assert "arm.home_deg (--set): 1: must be a list in brackets" in told
-    assert "sensors.lsm9ds1.part: missing; sensors.lsm9ds1 is said by --set alone, the file has gyro" in told
+    assert "sensors.lsm9ds1.part: missing; sensors.lsm9ds1 is given by --set only, the file has gyro" in told
     assert "Correct the command line" in told
 
 

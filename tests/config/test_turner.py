@@ -49,7 +49,7 @@ def test_another_turner_brings_its_own_keys() -> None:
     ("said", "first"),
     [
         ({}, "arm: missing"),
-        ({"arm": DEMO["arm"], "turner": {"kind": "ur"}}, "turner: what turns is said twice"),
+        ({"arm": DEMO["arm"], "turner": {"kind": "ur"}}, "turner: the turner is given twice"),
         ({"turner": {"kind": "ur", "hots": "127.0.0.2"}}, "turner.host: missing"),
         ({"turner": {"kind": "ur", "payload_kg": -1, "host": "a"}}, "turner.payload_kg"),
         ({"turner": {"kind": "whel"}}, "'whel' is not allowed, did you mean wheel?; allowed: ur, hand, servo, wheel"),

@@ -14,7 +14,7 @@ def test_units_that_are_shown_may_be_written_and_are_as_large() -> None:
     for each in OF_THE_RIG:
         for shown in (each.reading, each.bias, each.drift, *each.residuals):
             if shown.name in UNITS:
-                assert UNITS[shown.name].of == each.name
+                assert UNITS[shown.name].quantity == each.name
                 assert abs(UNITS[shown.name].size / shown.size - 1) < 1e-15
 
 

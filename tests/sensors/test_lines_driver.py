@@ -104,7 +104,7 @@ def test_a_column_that_nothing_describes_is_refused(columns: Any, scalars: Any, 
 
 def units_of(section: type[BaseModel]) -> set[str]:
     """What the units that a section allows are units of."""
-    return {UNITS[unit].of for unit in get_args(section.model_fields["unit"].annotation) if unit != GAP}
+    return {UNITS[unit].quantity for unit in get_args(section.model_fields["unit"].annotation) if unit != GAP}
 
 
 def test_every_unit_of_a_column_is_of_a_quantity_that_is_known() -> None:

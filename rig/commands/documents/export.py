@@ -4,7 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.config.files.written_file import placed_together, write_new
+from rig.config.files.written_file import replace_together, write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
 from rig.station.plain_text import say, say_on_terminal
@@ -58,13 +58,13 @@ def files(options: Namespace) -> list[Path]:
             say_on_terminal("reading the recordings")
             recordings = exported(open_run(run).movement)
             _made(folder, own=out is not None)
-            with placed_together():
+            with replace_together():
                 written = write(recordings, folder)
         else:
             texts = texts_of_calibrations(name)(_calibrations(run, moved))
             _made(folder, own=out is not None)
             written = [folder / file for file in texts]
-            with placed_together():
+            with replace_together():
                 for path, text in zip(written, texts.values(), strict=True):
                     write_new(path, text)
     except OSError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_set
 from rig.commands.history.named_history import add_history, named_history
-from rig.config.files.written_file import placed_together, write_new
+from rig.config.files.written_file import replace_together, write_new
 from rig.errors import Refused
 from rig.station.plain_text import say, say_on_terminal
 
@@ -115,7 +115,7 @@ def _documents(options: Namespace, by: "Signatory | None") -> tuple[list[Path], 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(*(folder / name for name in (*written, *([PDF] if pdf else []))))
-        with placed_together():
+        with replace_together():
             for name, content in written.items():
                 write_new(folder / name, content)
             if pdf:

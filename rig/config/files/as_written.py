@@ -18,31 +18,31 @@ def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, wr
     if isinstance(data, dict):
         for key, field in model.model_fields.items():
             if key in data:
-                data[key] = _as_text(field.annotation, data[key], (*prefix, key), written)
+                data[key] = _restore_text(field.annotation, data[key], (*prefix, key), written)
 
 
-def _as_text(annotation: Any, value: Any, place: Location, written: Mapping[Location, str]) -> Any:
-    """`value` of a key that holds what `annotation` says, its texts as they were written."""
+def _restore_text(annotation: Any, value: Any, location: Location, written: Mapping[Location, str]) -> Any:
+    """Return the `value` of a key of type `annotation`, its texts as they were written in the file."""
     kinds = _kinds(annotation)
-    if str in kinds and not isinstance(value, (str, dict, list)) and place in written:
-        return written[place]
+    if str in kinds and not isinstance(value, (str, dict, list)) and location in written:
+        return written[location]
     for kind in kinds:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
-            take_text_as_written(kind, value, place, written)
+            take_text_as_written(kind, value, location, written)
         elif typing.get_origin(kind) is dict and isinstance(value, dict):
-            of_each = typing.get_args(kind)[1]
-            value = {key: _as_text(of_each, each, (*place, key), written) for key, each in value.items()}
+            item_type = typing.get_args(kind)[1]
+            value = {key: _restore_text(item_type, item, (*location, key), written) for key, item in value.items()}
         elif typing.get_origin(kind) in (tuple, list) and isinstance(value, list):
-            of_each = typing.get_args(kind)[0]
-            value = [_as_text(of_each, each, (*place, index), written) for index, each in enumerate(value)]
+            item_type = typing.get_args(kind)[0]
+            value = [_restore_text(item_type, item, (*location, index), written) for index, item in enumerate(value)]
     return value
 
 
 def _kinds(annotation: Any) -> tuple[Any, ...]:
-    """What an annotation allows: each of a union by itself, without what is said of it beside its type."""
+    """Return the types that an annotation allows: the members of a union, without the metadata of `Annotated`."""
     origin = typing.get_origin(annotation)
     if origin is typing.Annotated:
         return _kinds(typing.get_args(annotation)[0])
     if origin in (typing.Union, types.UnionType):
-        return tuple(kind for each in typing.get_args(annotation) for kind in _kinds(each))
+        return tuple(kind for member in typing.get_args(annotation) for kind in _kinds(member))
     return (annotation,)

@@ -41,12 +41,12 @@ class _Layer:
 
 
 def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
-    """A file, the files it builds on, and the overrides. Raises `Unreadable`."""
-    return put_together(read_file(path), path, overrides)
+    """Read a file, the files it builds on, and the overrides. Raise `Unreadable`."""
+    return merge_layers(read_file(path), path, overrides)
 
 
-def put_together(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
-    """A file's text with what it builds on; text of no file (`path` None) can build on none. Raises `Unreadable`."""
+def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
+    """Merge a file's text with its base files; a text without a `path` has none. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}
@@ -63,7 +63,7 @@ def put_together(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """`over` on top of `base`: sections key by key, lists and values whole; null leaves out what the base says."""
+    """Merge `over` into `base`: sections key by key, lists and values as a whole; null removes a key of the base."""
     merged = dict(base)
     for key, value in over.items():
         below = merged.get(key)
@@ -77,7 +77,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
-    """A file and those below it, from the top."""
+    """Return a file and its base files, from the top."""
     layer, names, files = _layer(text, ""), ["this file"], []
     while BASE in layer.data:
         where, wanted = f"{BASE} ({layer.places[(BASE,)]})", layer.data.pop(BASE)
@@ -102,7 +102,7 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
 
 
 def _layer(text: str, name: str) -> _Layer:
-    """One file's text; `name` is its name when it is not the one that was asked for."""
+    """Read one file's text; `name` is given for a base file only."""
     try:
         document = read_yaml(text)
         if not isinstance(document.data, dict):
@@ -134,14 +134,14 @@ def _override(
         yield f"{what}: more than {DEPTH_MAX} sections within one another"
         return
     if location[0] == BASE:
-        yield f"{what}: {BASE} is said by the file alone"
+        yield f"{what}: {BASE} can only be given in the file"
         return
     try:
-        said = read_yaml(value)
+        parsed = read_yaml(value)
     except Unreadable as error:
         yield f"{what}: {error.why}"
         return
-    yield from (f"{what}: {problem}" for problem in said.problems)
+    yield from (f"{what}: {problem}" for problem in parsed.problems)
     section = document
     for depth, parent in enumerate(parents, start=1):
         if parent not in section:
@@ -151,17 +151,17 @@ def _override(
             yield f"{what}: {shorten(parent)} is not a section"
             return
         section = below
-    if said.data is None and last in section:
+    if parsed.data is None and last in section:
         del section[last]
     else:
-        section[last] = said.data
-    for place in [place for place in places if place[: len(location)] == location]:
-        del places[place]
-    places |= {(*location, *below): SET for below in ((), *said.lines)}
-    written |= {(*location, *below): letters for below, letters in said.written.items()}
+        section[last] = parsed.data
+    for replaced in [key for key in places if key[: len(location)] == location]:
+        del places[replaced]
+    places |= {(*location, *below): SET for below in ((), *parsed.lines)}
+    written |= {(*location, *below): letters for below, letters in parsed.written.items()}
 
 
 def _example(item: str) -> str:
-    """What is meant by `a.b:value`, else any."""
+    """Return the correct spelling of `a.b:value`, or any example."""
     path, colon, value = item.partition(":")
     return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

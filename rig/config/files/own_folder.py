@@ -6,7 +6,7 @@ from rig.errors import Refused
 
 
 def own_folder() -> Path:
-    """The rig's folder of this user, whether it is there or not. Raises Refused `no_home` where no home is known."""
+    """Return the rig's folder of this user, which may not exist yet. Raise Refused `no_home` without a home folder."""
     from platformdirs import user_data_path
 
     try:

@@ -40,18 +40,18 @@ def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[Non
 
 @contextmanager
 def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
-    """A regular file of at most `max_bytes`, open for reading. Raises `UnfitFile`, and OSError as `open` does.
+    """Open a regular file of at most `max_bytes` for reading. Raise `UnfitFile`, and OSError as `open` does.
 
-    A link in place of the file leads out of the folder it lies in: where the folder is not ours, it is not followed.
+    A link leads out of the file's folder: it is not followed if the folder is not ours.
     """
     _check(path.stat() if follow_links else path.lstat(), max_bytes)  # before: to open a device may do something
-    with open(path, "rb", opener=_without_waiting if follow_links else _without_links) as file:
+    with open(path, "rb", opener=_open_nonblocking if follow_links else _open_nofollow) as file:
         _check(os.fstat(file.fileno()), max_bytes)  # another may have come to lie there meanwhile
         yield file
 
 
 def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> bytes:
-    """The content of a regular file. Raises as `open_regular_file`."""
+    """Read the content of a regular file. Raise as `open_regular_file`."""
     with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # it has grown meanwhile, or its size is not told (those of /proc say 0)
@@ -70,10 +70,10 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
         raise UnfitFile(f"it is longer than {max_bytes} bytes")
 
 
-def _without_waiting(path: str, flags: int) -> int:
-    """Opens a file without waiting: into a pipe nobody may ever write."""
+def _open_nonblocking(path: str, flags: int) -> int:
+    """Open a file without waiting, as a pipe may never have a writer."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
-def _without_links(path: str, flags: int) -> int:
-    return _without_waiting(path, flags | getattr(os, "O_NOFOLLOW", 0))
+def _open_nofollow(path: str, flags: int) -> int:
+    return _open_nonblocking(path, flags | getattr(os, "O_NOFOLLOW", 0))

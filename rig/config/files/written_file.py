@@ -14,7 +14,7 @@ NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 
 @contextmanager
-def placed_together() -> Iterator[None]:
+def replace_together() -> Iterator[None]:
     """Hold the files back that this block writes: at its end all take their places, the one written last first.
 
     If it ends in an error, or a file cannot take its place, those that have none are removed.
@@ -35,9 +35,9 @@ def placed_together() -> Iterator[None]:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """A file to be written in this block, which then takes the place of `path`: whole, or not at all.
+    """Open a file to be written in this block, which then replaces `path` completely or not at all.
 
-    Within `placed_together` it does so at the end of that.
+    Within `replace_together` it does so at the end of that.
 
     What lies at `path` is replaced, a link itself and not what it leads to. Raises OSError as writing does, and where
     somebody lays something beside it at the same moment.
@@ -60,13 +60,13 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_new(path: Path, content: bytes | str) -> None:
-    """A file with this content in the place of `path`. Raises as `new_file`."""
+    """Replace `path` by a file with this content. Raise as `new_file`."""
     with new_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
 
 
-def opened_to_append(path: str | Path) -> int:
-    """The descriptor of a regular file that is added to, and made where there is none. Raises OSError."""
+def open_to_append(path: str | Path) -> int:
+    """Open a regular file to append, created if it does not exist, and return its descriptor. Raise OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | getattr(os, "O_NONBLOCK", 0)
     descriptor = os.open(path, flags, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):

@@ -56,12 +56,12 @@ class Document:
 
 
 def first_control_character(text: str) -> str | None:
-    """The first character that does something instead of being seen: escape, carriage return, text direction …"""
+    """Return the first control character (escape, carriage return, text direction …), or None."""
     return next((character for character in text if unicodedata.category(character) in UNSEEN), None)
 
 
 def read_file(path: Path) -> str:
-    """The text of a regular file of reasonable size. Raises `Unreadable`."""
+    """Read the text of a regular file of at most `SIZE_MAX_BYTES`. Raise `Unreadable`."""
     if path.suffix in OTHER_FILES and path.is_file():
         raise Unreadable(f"is {OTHER_FILES[path.suffix]}")
     try:
@@ -77,12 +77,12 @@ def read_file(path: Path) -> str:
 
 
 def read_yaml(text: str) -> Document:
-    """One YAML document. Raises `Unreadable`."""
+    """Parse one YAML document. Raise `Unreadable`."""
     if len(text) > SIZE_MAX_BYTES:
         raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is no configuration")
     for number, line in enumerate(text.split("\n"), 1):
-        if (found := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
-            raise Unreadable(f"holds the control character {printable(found)}", number)
+        if (character := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
+            raise Unreadable(f"holds the control character {printable(character)}", number)
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -148,21 +148,22 @@ def _refusal(why: str, mark: Any) -> yaml.MarkedYAMLError:
 def _survey(
     node: yaml.Node | None, location: Location, lines: dict[Location, int], written: dict[Location, str]
 ) -> Iterator[str]:
-    """Notes the line of every key, and what is `written` where it is no text; yields keys that are no words or stand
-    twice (YAML would keep the last).
+    """Record the line of every key, and the text as `written` of every value that is not a string.
+
+    Yield a problem for each key that is no word or occurs twice (YAML would keep the last).
     """
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             line = key.start_mark.line + 1
             if key.tag not in (TEXT, MERGE):
-                yield f"{dotted(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
+                yield f"{dotted_path(location)} (line {line}): the key {quote(key.value)} is no word; put it in quotes"
                 continue
-            place = (*location, key.value)
-            if place in lines:
-                yield f"{dotted(place)}: given twice, on lines {lines[place]} and {line}"
-            lines[place] = line
-            yield from _visible(key, place)
-            yield from _survey(value, place, lines, written)
+            path = (*location, key.value)
+            if path in lines:
+                yield f"{dotted_path(path)}: given twice, on lines {lines[path]} and {line}"
+            lines[path] = line
+            yield from _visible(key, path)
+            yield from _survey(value, path, lines, written)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
             yield from _survey(value, (*location, index), lines, written)
@@ -173,13 +174,14 @@ def _survey(
 
 
 def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
-    """Quotes can hide a control character behind an escape."""
-    if (found := first_control_character(node.value)) is not None:
-        yield f"{dotted(location)} (line {node.start_mark.line + 1}): holds the control character {printable(found)}"
+    """Yield a problem for a control character, which quotes can hide behind an escape."""
+    if (character := first_control_character(node.value)) is not None:
+        line = node.start_mark.line + 1
+        yield f"{dotted_path(location)} (line {line}): holds the control character {printable(character)}"
 
 
-def dotted(location: Location) -> str:
-    """`sensors.gyro.rate_hz`; the file as a whole is `(file)`."""
+def dotted_path(location: Location) -> str:
+    """Return a location as `sensors.gyro.rate_hz`; the file as a whole is `(file)`."""
     return ".".join(shorten(str(part)) for part in location) or "(file)"
 
 

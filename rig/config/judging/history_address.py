@@ -13,7 +13,7 @@ ENCRYPTED = ("require", "verify-ca", "verify-full")
 
 
 def history_url(text: str) -> "URL":
-    """A URL with nothing in it but what is allowed, percent signs resolved. Raises ValueError, which says why not."""
+    """Parse a URL that has only allowed parts, percent signs resolved. Raise ValueError with the reason."""
     from sqlalchemy import make_url
     from sqlalchemy.exc import ArgumentError
 
@@ -22,7 +22,7 @@ def history_url(text: str) -> "URL":
     except (ArgumentError, ValueError) as error:
         raise ValueError("is no URL") from error
     if url.drivername not in SCHEMES:
-        raise ValueError(f"must be a file or begin with {' or '.join(f'{each}://' for each in SCHEMES)}")
+        raise ValueError(f"must be a file or begin with {' or '.join(f'{scheme}://' for scheme in SCHEMES)}")
     allowed = ALLOWED[url.drivername]
     for key in url.query:
         if key not in allowed:

@@ -124,7 +124,7 @@ class Limits(BaseModel):
     )
 
     def lacking(self, need: Need) -> list[str]:
-        """The paths in a configuration of the limits that are needed so and not set."""
+        """Return the configuration paths of limits that are needed and not set."""
         return [f"limits.{key}" for key, row in LIMITS.items() if row.needed_by == need and getattr(self, key) is None]
 
 
@@ -135,12 +135,12 @@ _KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, r
 
 
 def key_of(quantity: str | None, what: str | None) -> str | None:
-    """The key under which a check of that quantity has its limit; None where a configuration has none for it."""
+    """Return the key of the limit for a check of that quantity, or None if a configuration has none for it."""
     return _KEYS.get((quantity or "", what or ""))
 
 
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
-    """The row of that name, and the limit itself, None where none is set. Raises KeyError without such a row."""
+    """Return the row of that name, and its limit or None if it is not set. Raise KeyError without such a row."""
     key = _KEYS[quantity, what]
     limit: float | None = getattr(limits, key, None)
     return LIMITS[key], limit

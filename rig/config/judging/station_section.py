@@ -43,7 +43,7 @@ class StationSection(Section):
     @field_validator("serial_pattern")
     @classmethod
     def is_a_pattern(cls, value: str) -> str:
-        """What the language of patterns knows."""
+        """Refuse a text that is no regular expression."""
         try:
             re.compile(value, re.ASCII)
         except re.error as error:

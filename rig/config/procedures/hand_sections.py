@@ -58,7 +58,7 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """What is read has a clock that is known, and is read often enough to follow a hand."""
+        """Yield the problems of sensors: an unknown clock, or a data rate too low to follow a hand."""
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (

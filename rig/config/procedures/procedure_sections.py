@@ -13,7 +13,7 @@ from rig.config.procedures.hand_sections import ByHandSection
 from rig.config.procedures.servo_procedure import SPEED_TO_RANGE, ServoSixObservationSection
 from rig.config.procedures.stage_section import StageSection, Wrist
 from rig.config.ranges import ACCELERATION_RANGE_DEG_S2, SPEED_RANGE_DEG_S
-from rig.config.section import DEFAULT_REST_S, RATIO, AccelerometerOrder, Direction, JointAngle
+from rig.config.section import DEFAULT_REST_S, RATIO, AccelerometerOrder, Direction, JointAngle, Vector3
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -131,7 +131,7 @@ class SixSweepsSection(ProcedureSection):
         return self.speeds_deg_s or (self.speed_deg_s,)
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Sweeps beyond a sensor's range; a verification that could not pass."""
+        """Yield sweeps beyond a sensor's range, and a verification that cannot pass."""
         for name, sensor in config.sensors.items():
             if max(self.speeds) * SPEED_TO_RANGE > sensor.range_deg_s:
                 key = "speeds_deg_s" if self.speeds_deg_s else "speed_deg_s"
@@ -146,7 +146,7 @@ class SixSweepsSection(ProcedureSection):
             yield from verification_problems(config)
 
     def _arc_problems(self, config: RigConfig) -> Iterator[str]:
-        """An arc that nobody knows well enough, or that takes longer than a board keeps readings."""
+        """Yield an arc whose angle is too uncertain, or that takes longer than a board stores readings."""
         if self.arcs and config.uncertainty.angle_std_deg is None:
             yield (
                 f"procedure.arc_deg {self.arc_deg:g} is no whole turn, so the encoders measure how far a "
@@ -204,9 +204,9 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """The problems of the sweeps; a verification compares one whole movement, not several mountings.
+        """Yield the problems of the sweeps, and stages or magnetometers, which a verification cannot have.
 
-        A magnetometer would be recorded, and only at the end of the run nobody could calibrate it.
+        A magnetometer would be recorded, and its lack of a calibration would show only at the end of the run.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):
@@ -244,7 +244,7 @@ class VerifySection(SixSweepsSection):
 
 
 def set_of_that_name(value: Any) -> Any:
-    """The attitudes a name stands for; those that are given one by one as they are."""
+    """Replace the name of a set by its attitudes; a list stays as it is."""
     if not isinstance(value, str):
         return value
     if value not in SETS:
@@ -301,14 +301,14 @@ class AttitudesSection(ProcedureSection):
 
     @field_validator("attitudes")
     @classmethod
-    def each_once(cls, value: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float, float, float], ...]:
-        """Attitudes without a second one alike, which tells nothing new of the arm's errors: it makes them alike."""
-        found: set[tuple[float, ...]] = set()
+    def no_attitude_twice(cls, value: tuple[Vector3, ...]) -> tuple[Vector3, ...]:
+        """Refuse an attitude that is listed twice: the arm makes the same error again, which adds no information."""
+        listed: set[tuple[float, ...]] = set()
         for attitude in value:
-            turned = tuple(np.mod(attitude, 360).tolist())
-            if turned in found:
+            angles_deg = tuple(np.mod(attitude, 360).tolist())
+            if angles_deg in listed:
                 raise ValueError(f"{list(attitude)} is listed twice; repeats says how often everything is done")
-            found.add(turned)
+            listed.add(angles_deg)
         return value
 
     @property
@@ -317,7 +317,7 @@ class AttitudesSection(ProcedureSection):
         return 2 if self.second_order else 1
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """What the calibration of an accelerometer lacks."""
+        """Yield what the calibration of an accelerometer lacks."""
         if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
             yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
         lacking = config.limits.lacking("accelerometer")
@@ -348,7 +348,7 @@ class BiasDriftSection(AttitudesSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """What the calibration of an accelerometer lacks, and limits of the drift."""
+        """Yield what the calibration of an accelerometer lacks, and missing limits of the drift."""
         yield from AttitudesSection.problems(self, config)
         if lacking := config.limits.lacking("bias drift"):
             yield f"a bias that is watched needs {', '.join(lacking)}"
@@ -358,7 +358,7 @@ class ImuSection(SixSweepsSection, AttitudesSection):
     """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """The problems of the sweeps and of the attitudes."""
+        """Yield the problems of the sweeps and of the attitudes."""
         yield from SixSweepsSection.problems(self, config)
         yield from AttitudesSection.problems(self, config)
         if self.arc_deg != 360:
@@ -443,11 +443,11 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def a_range_with_several_temperatures(self) -> Self:
-        """What makes sets enough for polynomials, which are found only after the run."""
-        gaps, ways = (2, "") if self.both_directions else (3, " with both_directions: false")
+        """Refuse a range with too few sets for polynomials, whose order is chosen only after the run."""
+        gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(
-                f"from_c and to_c must be {gaps} gaps apart at least{ways}: a line through two points shows nothing"
+                f"from_c and to_c must be {gaps} gaps apart at least{other}: a line through two points shows nothing"
             )
         least_k = MIN_RANGE_C + self.max_step_k
         if self.to_c - self.from_c < least_k:
@@ -464,7 +464,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
         return (2 if self.second_order else 1) if self.with_attitudes else 0
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """The problems of the sweeps and of the attitudes, a heater that cannot be, and sensors without a board."""
+        """Yield the problems of the sweeps and attitudes, of a heater and of sensors without a board."""
         yield from SixSweepsSection.problems(self, config)
         if self.with_attitudes:  # each set is one temperature: no repeat of the attitudes is held out
             yield from AttitudesSection.problems(self.model_copy(update={"repeats": 1}), config)
@@ -499,7 +499,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
 
 
 def verification_problems(config: RigConfig) -> Iterator[str]:
-    """What a verification lacks: without a reference or without limits it could not pass."""
+    """Yield what a verification lacks: without a reference or limits it cannot pass."""
     lacking = []
     if config.reference is None:
         lacking.append("a sensor with role: reference to compare with")

@@ -31,14 +31,14 @@ class ServoStageSection(Section):
     )
 
 
-def _along(axis: str, mount: StageMountSection) -> ServoStageSection:
+def _shaft_along(axis: str, mount: StageMountSection) -> ServoStageSection:
     return ServoStageSection(instruction=HANDS.format(axis=axis) + REST, mount=mount)
 
 
 THREE_MOUNTINGS = (
-    _along("x", StageMountSection(x="+z", y="+x", z="+y")),
-    _along("y", StageMountSection(x="+y", y="+z", z="+x")),
-    _along("z", StageMountSection()),
+    _shaft_along("x", StageMountSection(x="+z", y="+x", z="+y")),
+    _shaft_along("y", StageMountSection(x="+y", y="+z", z="+x")),
+    _shaft_along("z", StageMountSection()),
 )
 
 
@@ -86,16 +86,16 @@ class ServoSixObservationSection(ProcedureSection):
 
     @model_validator(mode="after")
     def six_directions(self) -> Self:
-        """Six parameters need turns both ways about three independent directions; refuse before anything moves."""
+        """Refuse fewer than six independent turns: six parameters need both directions about three independent axes."""
         if set(self.directions) != {"cw", "ccw"}:
             raise ValueError("directions must name both cw and ccw")
-        along = np.array([mount_matrix(each.mount)[:, 2] for each in self.stages])
-        if len(along) < 3 or np.linalg.svd(along, compute_uv=False)[2] < AXES_SPAN:
+        shaft_axes = np.array([mount_matrix(stage.mount)[:, 2] for stage in self.stages])
+        if len(shaft_axes) < 3 or np.linalg.svd(shaft_axes, compute_uv=False)[2] < AXES_SPAN:
             raise ValueError("stages must mount the item with the shaft along three independent directions of it")
         return self
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Turns beyond a sensor's range; sensors that a servo disturbs."""
+        """Yield turns beyond a sensor's range, and sensors that a servo disturbs."""
         for name, sensor in config.sensors.items():
             if self.speed_deg_s * SPEED_TO_RANGE > sensor.range_deg_s:
                 yield (

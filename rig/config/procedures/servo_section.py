@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 
 from rig.config.models import TurnerSection
 from rig.config.ranges import PAYLOAD_RANGE_KG
-from rig.config.section import RATIO, JointAngle, Offset, checked_port
+from rig.config.section import RATIO, JointAngle, Offset, check_port
 
 ServoName = Literal["xl430_w250", "xm430_w350", "xm430_w210"]
 FASTEST_DEG_S = 460.0  # no load, of the fastest of them
@@ -54,8 +54,8 @@ class ServoSection(TurnerSection):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """A port, `socket://host:port` with both; the name of a serial port is the system's affair."""
-        return checked_port(value)
+        """Refuse `socket://` without host and port. The system knows the names of serial ports."""
+        return check_port(value)
 
     @property
     def address(self) -> str:
@@ -73,5 +73,5 @@ class ServoSection(TurnerSection):
         return urlsplit(self.port).hostname if self.port.startswith("socket://") else None
 
     def moved_to(self, host: str) -> Mapping[str, str]:
-        """The servo's port at another host."""
+        """Return the key of the servo's port, with the new value."""
         return {"port": f"socket://{host}:{urlsplit(self.port).port}"}

@@ -37,8 +37,8 @@ class TargetUncertaintySection(Section):
     )
 
     @model_validator(mode="after")
-    def something_is_wanted(self) -> Self:
-        """A wish of one of the two: without it nothing ends the run early."""
+    def has_a_target(self) -> Self:
+        """Refuse a section without a target of either kind: nothing would end the run early."""
         if self.scale is None and self.bias is None:
             raise ValueError("say the expanded uncertainty at which the run ends, as {scale: 1e-3, bias: 1e-4}")
         return self
@@ -51,8 +51,8 @@ class ShortestSection(Section):
     target_uncertainty: TargetUncertaintySection
 
 
-def turned_otherwise(document: Mapping[str, Any]) -> str | None:
-    """What to do in place of a procedure of this name where no arm turns the sensors; None where one does."""
+def alternative_procedure(document: Mapping[str, Any]) -> str | None:
+    """Return the advice for a turner that is no arm, which cannot carry out this procedure; None for an arm."""
     turner = document.get("turner")
     kind = str(turner.get("kind")) if isinstance(turner, dict) else ""
     if kind not in OTHERS:
@@ -61,8 +61,8 @@ def turned_otherwise(document: Mapping[str, Any]) -> str | None:
     return f"{SHORTEST}: {why}; say name: {name}, and {IN_ADVANCE}"
 
 
-def written_out(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:
-    """The section of the procedure that is carried out: the keys that stand beside the name and the wish stay."""
+def expand_procedure(section: Mapping[str, Any], wanted: TargetUncertaintySection) -> dict[str, Any]:
+    """Return the section of the procedure that is carried out: all keys but the name and the target stay."""
     rest = {key: value for key, value in section.items() if key != "target_uncertainty"}
     ends = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias}
     return {"repeats": REPEATS, **ends, **rest, "name": CARRIED_OUT}

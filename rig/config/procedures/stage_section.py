@@ -36,15 +36,15 @@ class StageSection(Section):
 
     @field_validator("sweeps")
     @classmethod
-    def each_wrist_once(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
-        """A wrist that stands there twice says nothing more."""
+    def no_wrist_twice(cls, value: tuple[Wrist, ...] | None) -> tuple[Wrist, ...] | None:
+        """Refuse a wrist that is listed twice."""
         if value is not None and len(set(value)) < len(value):
             raise ValueError("must name each wrist once; procedure.repeats says how often everything is done")
         return value
 
 
 def mount_matrix(mount: StageMountSection) -> np.ndarray:
-    """(3, 3) rotation that takes a flange-frame vector into the item's frame: row i is the item's axis i.
+    """Return the (3, 3) rotation from the flange's frame to the item's: row i is the item's axis i.
 
     The item sits as its axes say and is turned by the rotation vector then: components change by the inverse of that.
     """
@@ -53,7 +53,7 @@ def mount_matrix(mount: StageMountSection) -> np.ndarray:
 
 
 def rotation_by(vector_rad: np.ndarray) -> np.ndarray:
-    """(3, 3) the rotation by a rotation vector (3,), v + φ × v for small ones (Rodrigues' formula)."""
+    """Return the (3, 3) rotation by a rotation vector (3,) in rad, by Rodrigues' formula."""
     angle = float(np.linalg.norm(vector_rad))
     x, y, z = vector_rad
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

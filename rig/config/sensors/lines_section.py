@@ -38,10 +38,10 @@ Decimals = Annotated[
 ]
 
 
-def _told(value: str) -> str:
-    """Raises ValueError where the wizard left a gap."""
+def _refuse_gap(value: str) -> str:
+    """Return the value. Raise ValueError for the gap that `rig lines` leaves if the readings do not determine it."""
     if value == GAP:
-        raise ValueError("the readings did not tell it: look it up in the device's program, and write it here")
+        raise ValueError("the readings did not determine it: look it up in the device's program, and write it here")
     return value
 
 
@@ -56,7 +56,7 @@ class LineTimeSection(Section):
         json_schema_extra={"unit": "as printed"},
     )
 
-    told = field_validator("unit")(_told)
+    unit_is_given = field_validator("unit")(_refuse_gap)
 
 
 class LineRateSection(Section):
@@ -66,7 +66,7 @@ class LineRateSection(Section):
     scale: Scale = 1.0
     decimals: Decimals = None
 
-    told = field_validator("unit")(_told)
+    unit_is_given = field_validator("unit")(_refuse_gap)
 
 
 class LineAccelerationSection(Section):
@@ -76,7 +76,7 @@ class LineAccelerationSection(Section):
     scale: Scale = 1.0
     decimals: Decimals = None
 
-    told = field_validator("unit")(_told)
+    unit_is_given = field_validator("unit")(_refuse_gap)
 
 
 class LineFieldSection(Section):
@@ -86,7 +86,7 @@ class LineFieldSection(Section):
     scale: Scale = 1.0
     decimals: Decimals = None
 
-    told = field_validator("unit")(_told)
+    unit_is_given = field_validator("unit")(_refuse_gap)
 
 
 class LineTemperatureSection(Section):
@@ -202,31 +202,31 @@ class LinesSection(Section):
 
     @field_validator("columns")
     @classmethod
-    def each_once_and_whole(cls, columns: tuple[str, ...]) -> tuple[str, ...]:
-        """A column of a name, three axes of each triad, and a gyroscope."""
+    def columns_are_complete(cls, columns: tuple[str, ...]) -> tuple[str, ...]:
+        """Refuse repeated columns, incomplete triads, and lines without a gyroscope."""
         twice = [name for name, count in Counter(columns).items() if count > 1 and name != "-"]
         if twice:
-            raise ValueError(f"{', '.join(twice)} stands there twice")
+            raise ValueError(f"{', '.join(twice)} is listed twice")
         for axes in (GYROSCOPE, ACCELEROMETER, MAGNETOMETER):
-            there = [axis for axis in axes if axis in columns]
-            if there != [] and len(there) < 3:
-                raise ValueError(f"of {' '.join(axes)} it has {' '.join(there)} only; name all three")
+            present = [axis for axis in axes if axis in columns]
+            if present != [] and len(present) < 3:
+                raise ValueError(f"of {' '.join(axes)} it has {' '.join(present)} only; name all three")
         if "gx" not in columns:
-            raise ValueError("gx gy gz must be among them: it is the gyroscope that tells when the arm turned")
+            raise ValueError("gx gy gz must be among them: the time of every rotation is found from the gyroscope")
         return columns
 
     @model_validator(mode="after")
     def columns_and_sections_agree(self) -> Self:
-        """What is read is described, and what is described is there."""
+        """Refuse a column without its section, and a section without its column."""
         if self.keys and len(self.keys) != len(self.columns):
             raise ValueError(f"there are {len(self.keys)} keys for {len(self.columns)} columns; give one for each")
         if reserved := sorted(self.scalars.keys() & {*COLUMNS, "field"}):
             raise ValueError(f"{', '.join(reserved)}: no name of a scalar, it means something else here")
-        if unknown := [each for each in self.columns if each not in COLUMNS and each not in self.scalars]:
+        if unknown := [name for name in self.columns if name not in COLUMNS and name not in self.scalars]:
             raise ValueError(
                 f"no such column: {', '.join(map(quote, unknown))}; it may be {', '.join(COLUMNS)} or a name in scalars"
             )
-        if missing := [each for each in self.scalars if each not in self.columns]:
+        if missing := [name for name in self.scalars if name not in self.columns]:
             raise ValueError(f"there is a section scalars.{missing[0]}, but no column {missing[0]}")
         described = {"time": self.time, "mx": self.field}
         for column, section in described.items():

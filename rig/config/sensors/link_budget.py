@@ -44,12 +44,12 @@ class Stream:
 
 
 def capacity_bytes_per_s(baud: int) -> float:
-    """What a link of this speed may be loaded with."""
+    """Return the load that a link of this speed may carry, bytes/s."""
     return baud / BITS_PER_BYTE * (1 - MARGIN)
 
 
 def over_budget(streams: Mapping[str, Stream], baud: int) -> str | None:
-    """The arithmetic, when the link cannot carry all `streams` (by sensor name); None when it can."""
+    """Return the arithmetic if the link cannot carry all `streams` (by sensor name), else None."""
     needed = sum(stream.bytes_per_s for stream in streams.values())
     if needed <= capacity_bytes_per_s(baud):
         return None
@@ -63,8 +63,8 @@ def over_budget(streams: Mapping[str, Stream], baud: int) -> str | None:
     )
 
 
-def own_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> str | None:
-    """The arithmetic, when a sensor's own line cannot carry its messages; None when it can."""
+def sensor_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> str | None:
+    """Return the arithmetic if a sensor's own line cannot carry its messages, else None."""
     if rate_hz * message_bytes <= capacity_bytes_per_s(baud):
         return None
     return (

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from rig.config.section import Section, checked_port
+from rig.config.section import Section, check_port
 from rig.config.sensors.link_budget import BITS_PER_BYTE, MARGIN, capacity_bytes_per_s
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 
@@ -55,12 +55,12 @@ class MavlinkSection(Section):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """A port as any other's; what stands behind `udp:` and `tcp:` is an address too."""
+        """Refuse a port that cannot be one; `udp:` and `tcp:` are followed by an address."""
         kind, _, rest = value.partition(":")
         if kind in NETWORKS:
-            checked_port(f"socket://{rest}")
+            check_port(f"socket://{rest}")
             return value
-        return checked_port(value)
+        return check_port(value)
 
     @property
     def instance(self) -> int:
@@ -73,19 +73,19 @@ class MavlinkSection(Section):
         return not self.port.startswith(("udp:", "tcp:", "socket://"))
 
 
-def over_budget_of_autopilots(sensors: Mapping[str, tuple[MavlinkSection | None, float]]) -> str | None:
-    """What is wrong with a line that has to carry more than it can, or IMUs at one port that say other speeds."""
-    at: dict[str, list[tuple[str, MavlinkSection, float]]] = {}
+def autopilots_over_budget(sensors: Mapping[str, tuple[MavlinkSection | None, float]]) -> str | None:
+    """Return the fault of a line whose load exceeds its capacity, or of IMUs at one port with different speeds."""
+    imus_at: dict[str, list[tuple[str, MavlinkSection, float]]] = {}
     for name, (section, rate_hz) in sensors.items():
         if section is not None:
-            at.setdefault(section.port, []).append((name, section, rate_hz))
-    for port, imus in at.items():
+            imus_at.setdefault(section.port, []).append((name, section, rate_hz))
+    for port, imus in imus_at.items():
         first = imus[0][1]
-        if any((each.baud, each.uid) != (first.baud, first.uid) for _, each, _ in imus):
-            return f"the IMUs at {port} are in one autopilot: say the same baud and uid of all of them"
-        needed = OTHER_BYTES_PER_S + sum(MESSAGE_BYTES[each.imu] * rate_hz for _, each, rate_hz in imus)
+        if any((imu.baud, imu.uid) != (first.baud, first.uid) for _, imu, _ in imus):
+            return f"the IMUs at {port} are in one autopilot: give the same baud and uid for all of them"
+        needed = OTHER_BYTES_PER_S + sum(MESSAGE_BYTES[imu.imu] * rate_hz for _, imu, rate_hz in imus)
         if first.wired and needed > capacity_bytes_per_s(first.baud):
-            terms = " + ".join(f"{name} {rate:g} Hz × {MESSAGE_BYTES[each.imu]} bytes" for name, each, rate in imus)
+            terms = " + ".join(f"{name} {rate:g} Hz × {MESSAGE_BYTES[imu.imu]} bytes" for name, imu, rate in imus)
             return (
                 f"the line to {port} cannot carry these rates: {terms} and {OTHER_BYTES_PER_S} for the rest = "
                 f"{needed:g} bytes/s, but {first.baud} / {BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = "

@@ -69,13 +69,13 @@ class Part:
         return radians(self.angle_random_walk_deg_sqrt_h) / 60
 
     def accept_rate(self, rate_hz: float) -> float:
-        """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+        """Return the part's own rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
 
     def accept_range(self, range_deg_s: float) -> float:
-        """`range_deg_s` if the part has it. Raises ValueError naming the nearest otherwise."""
+        """Return `range_deg_s` if the part has it. Raise ValueError with the nearest otherwise."""
         return positive(range_deg_s) if self.any_rate else one_of(range_deg_s, self.ranges_deg_s)
 
 
@@ -88,16 +88,16 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
-        return nearest_rate(rate_hz, self.rates_hz, in_words(self.rates_hz))
+        """Return the part's own rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
+        return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:
-        """`range_gauss` if the part has it. Raises ValueError naming the nearest otherwise."""
+        """Return `range_gauss` if the part has it. Raise ValueError with the nearest otherwise."""
         return one_of(range_gauss, self.ranges_gauss)
 
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
-    """The rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+    """Return the rate that `rate_hz` means. Raise ValueError with the nearest if there is none."""
     nearest = min(rates_hz, key=lambda rate: abs(rate - rate_hz))
     if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
         raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {rule}")
@@ -105,27 +105,27 @@ def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
 
 
 def one_of(value: float, allowed: Sequence[float]) -> float:
-    """`value` if it is allowed. Raises ValueError naming the nearest otherwise."""
+    """Return `value` if it is allowed. Raise ValueError with the nearest otherwise."""
     if value not in allowed:
         nearest = min(allowed, key=lambda candidate: abs(candidate - value))
-        raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {in_words(allowed)}")
+        raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {list_numbers(allowed)}")
     return value
 
 
 def positive(value: float) -> float:
-    """`value` if it is above zero. Raises ValueError otherwise."""
+    """Return `value` if it is above zero. Raise ValueError otherwise."""
     if not value > 0:
         raise ValueError("must be above 0")
     return value
 
 
-def in_words(values: Sequence[float]) -> str:
-    """A list of numbers."""
+def list_numbers(values: Sequence[float]) -> str:
+    """Return numbers as a list in words."""
     return ", ".join(f"{value:g}" for value in values)
 
 
 def has_own_port(part: str) -> bool:
-    """Whether such a part stands beside the board, with a clock of its own; parts that are not known do not."""
+    """Return whether such a part has a port and a clock of its own; unknown parts have none."""
     return part in PARTS and PARTS[part].own_port
 
 

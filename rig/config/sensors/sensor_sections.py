@@ -6,11 +6,18 @@ from typing import Annotated, Any, Literal, Protocol, Self
 import numpy as np
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from rig.config.section import RATIO, Positive, Section, Vector3, checked_port
+from rig.config.section import RATIO, Positive, Section, Vector3, check_port
 from rig.config.sensors.lines_section import GAP, LinesSection
-from rig.config.sensors.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
+from rig.config.sensors.link_budget import KVH1775_MESSAGE_BYTES, sensor_line_over_budget
 from rig.config.sensors.mavlink_section import MavlinkSection
-from rig.config.sensors.sensor_catalogue import CATALOGUE, MAGNETOMETERS, PARTS, MagnetometerName, PartName, in_words
+from rig.config.sensors.sensor_catalogue import (
+    CATALOGUE,
+    MAGNETOMETERS,
+    PARTS,
+    MagnetometerName,
+    PartName,
+    list_numbers,
+)
 
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
@@ -18,7 +25,7 @@ OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual
 
 
 def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
-    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
+    """Return the (3, 3) rotation from the flange's frame to the sensor's nominal frame: row i is sensor axis i."""
     axes = {"x": 0, "y": 1, "z": 2}
     rows = np.zeros((3, 3))
     for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
@@ -27,12 +34,12 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
 
 
 def field_name(sensor: str) -> str:
-    """The name of the magnetometer in the instrument on a port of its own called `sensor`."""
+    """Return the name of the magnetometer in the instrument `sensor`, which has a port of its own."""
     return f"{sensor}_field"
 
 
 def scalar_name(sensor: str, scalar: str) -> str:
-    """The name of what has no axes, called `scalar` in the lines of the device called `sensor`."""
+    """Return the name of the quantity without axes called `scalar` in the lines of the device `sensor`."""
     return f"{sensor}_{scalar}"
 
 
@@ -72,8 +79,8 @@ class OwnPortSection(Section):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """A port as the board's: `socket://host:port` with both."""
-        return checked_port(value)
+        """Refuse `socket://` without host and port."""
+        return check_port(value)
 
 
 class MountingSection(Section):
@@ -85,7 +92,7 @@ class MountingSection(Section):
 
     @model_validator(mode="after")
     def right_handed(self) -> Self:
-        """A mirrored or doubled axis is not a mounting."""
+        """Refuse a mirrored or repeated axis, which no mounting has."""
         if not np.isclose(np.linalg.det(mounting_matrix(self)), 1.0):
             raise ValueError("must name three different axes that form a right-handed frame, for example +x, +y, +z")
         return self
@@ -122,8 +129,8 @@ class ConfiguredSensor(Protocol):
     def mounting(self) -> MountingSection: ...
 
 
-def checked_serial_number(value: str) -> str:
-    """A serial number that the board can store beside the calibration. Raises ValueError when it could not."""
+def check_serial_number(value: str) -> str:
+    """Return a serial number that the board can store with the calibration. Raise ValueError otherwise."""
     if value == GAP:
         raise ValueError("nobody but you knows it: write the number of this specimen here")
     if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
@@ -132,14 +139,14 @@ def checked_serial_number(value: str) -> str:
 
 
 def the_part_has_it(value: float, info: ValidationInfo) -> float:
-    """A rate or range that the part can do, never silently another one."""
+    """Refuse a rate or range that the part does not have; another one is never taken silently."""
     part = CATALOGUE.get(info.data.get("part", ""))
     if part is None:
         return value
     return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
 
 
-SerialNumber = Annotated[str, AfterValidator(checked_serial_number)]
+SerialNumber = Annotated[str, AfterValidator(check_serial_number)]
 OfThePart = Annotated[float, AfterValidator(the_part_has_it)]
 
 
@@ -197,7 +204,7 @@ class SensorSection(Section):
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)
 
     def brings(self, name: str) -> set[str]:
-        """The names of the other sensors whose readings come by its port, where it is called `name`."""
+        """Return the names of the other sensors whose readings come by the port of this one, called `name`."""
         if self.lines is None:
             return {field_name(name)} if self.serial is not None and self.serial.message == "C" else set()
         field = {field_name(name)} if self.lines.field is not None else set()
@@ -206,7 +213,7 @@ class SensorSection(Section):
     @model_validator(mode="before")
     @classmethod
     def usual_of_the_part(cls, data: Any) -> Any:
-        """The section with the part's usual data rate and ranges where they are left out."""
+        """Fill in the part's usual data rate and ranges if they are left out."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("part")
@@ -226,7 +233,7 @@ class SensorSection(Section):
     def a_range_of_its_accelerometer(
         cls, value: AccelerationSection | None, info: ValidationInfo
     ) -> AccelerationSection | None:
-        """A range that the part's accelerometer has."""
+        """Refuse a range that the part's accelerometer does not have."""
         part = PARTS.get(info.data.get("part", ""))
         if value is None or part is None:
             return value
@@ -240,9 +247,9 @@ class SensorSection(Section):
 
     @model_validator(mode="after")
     def its_own_port_carries_it(self) -> Self:
-        """A part has a port of its own or it is on the board."""
+        """Refuse a port for a part on the board, and a part with a port of its own without one."""
         if self.part == "mavlink" or self.mavlink is not None:
-            return self._in_an_autopilot()
+            return self._is_in_autopilot()
         own_port = PARTS[self.part].own_port
         if own_port != (self.serial is not None):
             raise ValueError(
@@ -257,12 +264,12 @@ class SensorSection(Section):
             if self.part == "kvh1775" and self.serial.baud not in KVH1775_BAUDS:
                 raise ValueError(f"a kvh1775 knows serial.baud {', '.join(map(str, KVH1775_BAUDS))}")
             size = KVH1775_MESSAGE_BYTES[self.serial.message] if self.lines is None else self.lines.least_bytes
-            problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
+            problem = sensor_line_over_budget(self.rate_hz, size, self.serial.baud)
             if problem is not None:
                 raise ValueError(problem)
         return self
 
-    def _in_an_autopilot(self) -> Self:
+    def _is_in_autopilot(self) -> Self:
         if self.part != "mavlink":
             raise ValueError(f"{self.part} is in no autopilot: leave mavlink out")
         if self.mavlink is None or self.serial is not None:
@@ -272,7 +279,7 @@ class SensorSection(Section):
     @field_validator("turntable")
     @classmethod
     def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
-        """A sensor that is to be calibrated has no calibration yet."""
+        """Refuse a stored calibration for a sensor that is to be calibrated."""
         if info.data.get("role") == "calibrate":
             raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
         return value
@@ -289,11 +296,14 @@ class MagnetometerSection(Section):
     rate_hz: OfThePart = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
         description="samples per second, one of the part's rates",
-        json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
+        json_schema_extra={"allowed": list_numbers(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
     )
     range_gauss: OfThePart = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss[0],
         description="full scale, one of the part's ranges; 1 gauss is 100 µT, twice the Earth's field",
-        json_schema_extra={"unit": "gauss", "allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss)},
+        json_schema_extra={
+            "unit": "gauss",
+            "allowed": list_numbers(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss),
+        },
     )
     mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")

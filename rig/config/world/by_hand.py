@@ -50,6 +50,6 @@ class SimulatedHandSection(Section):
     mistakes: dict[Mistaken, Probability] = Field(
         default={},
         description="with which probability an action is done with this mistake: "
-        + ", ".join(f"`{each}`" for each in get_args(Mistaken)),
+        + ", ".join(f"`{mistake}`" for mistake in get_args(Mistaken)),
         json_schema_extra={"unit": "1", "allowed": "mistakes with a number 0 to 1 each", "usual": "`{}`"},
     )

@@ -496,7 +496,7 @@ class WorldSection(Section):
     )
 
     def misfits(self, turner: TurnerSection) -> Iterator[str]:
-        """What of this does not go with what turns, a line each."""
+        """Yield a line for every part of this that does not fit the turner."""
         kinds: dict[str, type[TurnerSection]] = {"arm": ArmSection, "servo": ServoSection, "hand": HandSection}
         for name, kind in kinds.items():
             if getattr(self, name) != type(self).model_fields[name].default and not isinstance(turner, kind):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from rig.config.files.regular_file import UnfitFile, open_regular_file
-from rig.config.files.written_file import opened_to_append
+from rig.config.files.written_file import open_to_append
 from rig.data.checked import checked
 from rig.errors import Refused
 from rig.history.again.answer import Answer, Given
@@ -45,7 +45,7 @@ class Journal(AbstractContextManager["Journal"]):
         self._path = folder / JOURNAL
         try:
             self.solved, whole_bytes = _read(self._path, question)
-            self._descriptor = opened_to_append(self._path)
+            self._descriptor = open_to_append(self._path)
             os.ftruncate(self._descriptor, whole_bytes)  # what a kill left half written
         except (UnfitFile, OSError) as error:
             raise self._unusable(error) from error

@@ -157,7 +157,7 @@ def _read(
         yield field_name(name), recorded("lines_magnetometer", field)
     for scalar, told in lines.scalars.items():
         unit = UNITS[told.unit]
-        channel = Channel(unit.of, unit.of, "<f8", 1.0)
+        channel = Channel(unit.quantity, unit.quantity, "<f8", 1.0)
         place = _Printed((lines.columns.index(scalar),), told.scale * unit.size, unit.zero)
         yield scalar_name(name, scalar), recorded(f"lines_{channel.measures.sensor}", (channel, place))
 

@@ -15,7 +15,7 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import Any, NoReturn
 
-from rig.config.files.written_file import opened_to_append
+from rig.config.files.written_file import open_to_append
 from rig.data.processes.ending_signals import ENDING_SIGNALS
 from rig.data.processes.silence import Silence
 from rig.errors import Problem
@@ -323,7 +323,7 @@ def _outlive_the_parent() -> None:
 
 def _send_output_to(log: str | None) -> None:
     """The client writes to stdout and stderr as it likes; stdout belongs to results."""
-    sink = os.open(os.devnull, os.O_WRONLY) if log is None else opened_to_append(log)
+    sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
         os.dup2(sink, stream.fileno())
