@@ -38,6 +38,7 @@ from rig.runner.announcement import announcement
 from rig.runner.board.onboard import BoardCalibration
 from rig.runner.by_hand.session import HandSession
 from rig.runner.ending_early import EndingEarly
+from rig.runner.first_samples import FirstSamples
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.mounting import (
     REST_S,
@@ -63,7 +64,7 @@ from rig.station.station import Station
 from rig.turners.kind import AnyTurner
 from rig.turners.turner import Turner
 
-FIRST_SAMPLE_TIMEOUT_S = 2.0
+FIRST_SAMPLES_LOOK_S = 0.005  # between two looks whether every sensor has sent something
 LOOK_S = 60.0  # to solve what is recorded so far
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
 AT_REST_TIMEOUT_S = 10.0  # for the readings that tell how they scatter before anything has moved
@@ -193,18 +194,12 @@ class Rig:
             self.along.begin()
         for source in sources:
             source.start()
-        host_s, turner_s = time.monotonic(), turner.latest.time_s
+        first_samples = FirstSamples(FIRST_SAMPLES_LOOK_S)
         while silent := self.devices.acquisition.silent():
             self._check()
             turner.check()
-            # By both clocks: this machine may be busy, and the controller's clock another's to run.
-            if min(time.monotonic() - host_s, turner.latest.time_s - turner_s) > FIRST_SAMPLE_TIMEOUT_S:
-                raise Fault(
-                    "no_samples",
-                    f"no sample from {', '.join(silent)} within {FIRST_SAMPLE_TIMEOUT_S:g} s of the start",
-                    "Check the sensor's wiring and its data-ready line, then run `rig check`",
-                )
-            time.sleep(0.005)
+            first_samples.wait_on(silent, turner.latest.time_s)
+            time.sleep(FIRST_SAMPLES_LOOK_S)
         if self.whole_plan.dwells:
             self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S, self._check)
         if self.whole_plan.stages:
@@ -294,7 +289,7 @@ class Rig:
             turner = self.devices.turner
             host_s, turner_s = time.monotonic(), turner.latest.time_s
             with self.early.looking() as looked:
-                # By both clocks, as for the first samples.
+                # By both clocks: this computer may be busy, and the controller's clock may be simulated.
                 while not looked.done() and min(time.monotonic() - host_s, turner.latest.time_s - turner_s) < LOOK_S:
                     turner.rest(SETTLING_LOOK_S, self._check)
                 said = self.early.found(looked)

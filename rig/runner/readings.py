@@ -17,16 +17,16 @@ from rig.board.identify import refusing
 from rig.config.models import SensorsConfig
 from rig.data.quantity import of_news
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.errors import Fault, Refused
+from rig.errors import Refused
 from rig.observation.timebase import NOMINAL_DRIFT
 from rig.runner.acquisition import SensorCount
 from rig.runner.board.sensors import BoardSource, board_source
+from rig.runner.first_samples import FirstSamples
 from rig.sensors.registry import by_port
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples
 
 LOOK_S = 0.05
-FIRST_SAMPLE_S = 2.0
 
 
 @contextmanager
@@ -122,7 +122,7 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
         }
         for source in sources:
             source.start()
-        began_s = time.monotonic()
+        first_samples = FirstSamples(LOOK_S)
         while min(file.lasts_s for file in files.values()) < duration_s:
             time.sleep(LOOK_S)
             while not arrived.empty():
@@ -131,12 +131,8 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
             for source in sources:
                 source.check()
             silent = [name for name, file in files.items() if not file.seen.samples]
-            if silent and time.monotonic() - began_s > FIRST_SAMPLE_S:
-                raise Fault(
-                    "no_samples",
-                    f"no sample from {', '.join(silent)} within {FIRST_SAMPLE_S:g} s of the start",
-                    "Check the sensor's wiring and its data-ready line, then run `rig check`",
-                )
+            if silent:
+                first_samples.wait_on(silent)
         return {file.path: Recorded(file.seen, file.follows_crystal) for file in files.values()}
 
 
