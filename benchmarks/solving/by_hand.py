@@ -14,7 +14,7 @@ import numpy as np
 from imucal import FerrarisCalibration, FerrarisSignalRegions
 
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.by_hand import Handled, Told, solve_by_hand
+from rig.estimation.by_hand import HandRecording, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.by_hand.handled import handled
 from rig.world.hand.habits import Action, Turn
@@ -29,7 +29,7 @@ GRAVITY_M_S2, PART_NAMES = 9.81, {"+": "p", "-": "a"}
 SESSIONS = 200
 
 
-def by_imucal(session: Handled) -> Array:
+def by_imucal(session: HandRecording) -> Array:
     """F (3, 3) by the first hold on each face and the turns."""
     assert session.acceleration is not None
     sections: dict[str, Array] = {}
@@ -54,7 +54,7 @@ def _axes() -> list[Array]:
     return [np.asarray((1.0 if face[0] == "+" else -1.0) * np.eye(3)["xyz".index(face[1])]) for face in FACES]
 
 
-def _add(sections: dict[str, Array], session: Handled, name: str, window: tuple[float, float]) -> None:
+def _add(sections: dict[str, Array], session: HandRecording, name: str, window: tuple[float, float]) -> None:
     assert session.acceleration is not None
     inside = (session.time_s >= window[0]) & (session.time_s <= window[1])
     sections.setdefault(f"gyr_{name}", np.degrees(session.rates[inside]))
@@ -69,7 +69,7 @@ def main(sessions: int) -> None:
         recorded = handle(SESSION, seed, rest_s=REST_S)
         session = handled(recorded.time_s, recorded.rates, recorded.acceleration)
         lasting_s += float(np.ptp(recorded.time_s)) / sessions
-        found = (by_imucal(session), solve_by_hand(session, Told(20.0)).turned.matrix)
+        found = (by_imucal(session), solve_by_hand(session, SessionConditions(20.0)).turned.matrix)
         for each, matrix in zip(errors.values(), found, strict=True):
             off = (matrix - recorded.matrix)[~np.eye(3, dtype=bool)]
             each.append((scale_of(matrix) - recorded.truth[:3], off))

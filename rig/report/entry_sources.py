@@ -36,7 +36,7 @@ from rig.data.entries.earth_rate import EarthRateEntry
 from rig.data.recording.events import BoardSolved
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.estimation.by_hand.solution import MoveFound, RestFound
+from rig.estimation.by_hand.solution import MoveSummary, RestSummary
 from rig.estimation.external.known_increments import KnownIncrements
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.earth_rate import EarthRate
@@ -199,9 +199,9 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     ),
     budget.ClockEntry: (_row(ClockCheck, same="error std"),),
     budget.ClockComparisonEntry: (_row(ClockComparison, same="error std", clock="by"),),
-    hand.RestByHandEntry: (_row(RestFound, same="face", normalised_residual="pull"),),
+    hand.RestByHandEntry: (_row(RestSummary, same="face normalised_residual"),),
     hand.MoveByHandEntry: (
-        _row(MoveFound, same="kind angle_rad turns", normalised_residual="pull", closure_error_rad="closure_rad"),
+        _row(MoveSummary, same="kind angle_rad turns normalised_residual", closure_error_rad="closure_rad"),
     ),
     shared.ConditionsEntry: (_row(When, same="temperature_c temperature_range_c"),),
     shared.DetectionLimitEntry: (

@@ -8,14 +8,14 @@ import pytest
 
 from rig.errors import RigError
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand import HandSolution, Told, progress, solve_by_hand
+from rig.estimation.by_hand import HandSolution, SessionConditions, assess_progress, solve_by_hand
 from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.by_hand.handled import Segmenter, handled
 from rig.observation.by_hand.runs import NotCounted
 from rig.world.hand.habits import Action, Face, Flip, Kind, Mistake, Turn
 from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 
-TOLD = Told(20.0, first_face="+z")
+TOLD = SessionConditions(20.0, first_face="+z")
 SESSION = (*TWELVE, Turn(1), Flip("+x"), Turn(1), Flip("+y"), Turn(1))
 NOISY = Part(rate_hz=238.0, noise_rad_s=0.035)
 # Actions, part, whether there is an accelerometer, and the largest RMS of scale, right angles, bias.
@@ -42,12 +42,12 @@ MISTAKES: dict[Kind, tuple[int, float | None, set[str]]] = {
 }
 
 
-def solved(recorded: Recorded, *, level: bool = True, told: Told = TOLD) -> HandSolution:
+def solved(recorded: Recorded, *, level: bool = True, told: SessionConditions = TOLD) -> HandSolution:
     felt = recorded.acceleration if level else None
     return solve_by_hand(handled(recorded.time_s, recorded.rates, felt), told)
 
 
-def refused(recorded: Recorded, *, level: bool = True, told: Told = TOLD) -> str | None:
+def refused(recorded: Recorded, *, level: bool = True, told: SessionConditions = TOLD) -> str | None:
     """The name of what a session is refused for; None where its scale is within U, which it then has to be."""
     try:
         found = solved(recorded, level=level, told=told)
@@ -75,7 +75,9 @@ def seeds(thorough: bool) -> range:
     return range(20 if thorough else 1)
 
 
-Made = tuple[Recorded, bool, Told]  # what was recorded, whether its accelerometer counts, and what was told
+Made = tuple[
+    Recorded, bool, SessionConditions
+]  # what was recorded, whether its accelerometer counts, and what was told
 
 
 def by_mistake(kind: Kind, at: int, size: float | None = None, *, level: bool = True) -> Callable[[int], Made]:
@@ -84,7 +86,7 @@ def by_mistake(kind: Kind, at: int, size: float | None = None, *, level: bool = 
 
 
 def read_otherwise(
-    change: Callable[[Recorded], Recorded], told: Told = TOLD, *, level: bool = True
+    change: Callable[[Recorded], Recorded], told: SessionConditions = TOLD, *, level: bool = True
 ) -> Callable[[int], Made]:
     """The session without a mistake, and its readings changed."""
     return lambda seed: (change(handle(SESSION, seed)), level, told)
@@ -251,7 +253,7 @@ def test_a_rest_that_creeps_is_left_out_and_costs_no_session(axis: str, rest_s: 
     slowly = np.radians(0.15) * about / np.linalg.norm(about)
     crept = creeping(recorded, rest.start_s - 0.1, rest.end_s + 0.1, slowly)
     found = solved(crept, level=level)
-    assert [start_s for start_s, _ in found.crept] == [pytest.approx(rest.start_s, abs=0.3)]
+    assert [start_s for start_s, _ in found.creeping_s] == [pytest.approx(rest.start_s, abs=0.3)]
     assert len(found.rests) == 17
     assert (np.abs(found.scale - recorded.truth[:3]) < found.budget.expanded[:3]).all()
     assert (np.abs(found.bias_rad_s - recorded.truth[3:]) < 1.3 * found.budget.expanded[3:]).all()
@@ -300,13 +302,13 @@ def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
     for start in range(0, len(recorded.time_s), 12):
         rows = slice(start, start + 12)
         if feed.feed(recorded.time_s[rows], recorded.rates[rows], recorded.acceleration[rows]):
-            found = progress(refused.without(feed.handled), TOLD)
+            found = assess_progress(refused.without(feed.handled), TOLD)
             known.append(found.expanded_scale.max())
-            if found.asked is not None:
-                asked.append((len(known), found.asked.problem.name))
+            if found.fault_of_last is not None:
+                asked.append((len(known), found.fault_of_last.problem.name))
                 refused.moves.append((feed.handled.moves[-1].start_s, feed.handled.moves[-1].end_s))
     assert asked == [(12, "turn_not_closed")]
     assert known[0] > 0.1 and known[-1] < 6e-4
     assert (np.diff(known[8:]) < 1e-3).all()
-    faces: set[Face | str | None] = set(progress(refused.without(feed.handled), TOLD).faces)
+    faces: set[Face | str | None] = set(assess_progress(refused.without(feed.handled), TOLD).faces)
     assert faces == {"+x", "-x", "+y", "-y", "+z", "-z"}

@@ -9,7 +9,7 @@ from rig.analysis.analyses import calibrate_by_hand
 from rig.data.recording.hand_events import HandBegunAnew, HandMoveRefused, HandRestRefused
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault
-from rig.estimation.by_hand.session import Handled, Move, Rest, Told
+from rig.estimation.by_hand.session import HandRecording, Move, Rest, SessionConditions
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
 from rig.observation.by_hand.runs import NotCounted, turned_face
@@ -18,15 +18,15 @@ from support.paths import RECORDINGS
 SECOND_US = 1_000_000
 
 
-def session(rests: int) -> Handled:
+def session(rests: int) -> HandRecording:
     """Rests of a second each, every three seconds; the moves between have peaks 1, 2, 3, …"""
     zero = np.zeros(3)
     lain = tuple(Rest(3.0 * place, 3.0 * place + 1.0, 100, zero, zero) for place in range(rests))
     moves = tuple(Move(3.0 * place + 1.0, 3.0 * place + 3.0, place + 1.0) for place in range(rests - 1))
-    return Handled(np.zeros(0), np.zeros((0, 3)), None, lain, moves)
+    return HandRecording(np.zeros(0), np.zeros((0, 3)), None, lain, moves)
 
 
-def starts(found: Handled) -> list[float]:
+def starts(found: HandRecording) -> list[float]:
     return [rest.start_s for rest in found.rests]
 
 
@@ -92,7 +92,7 @@ def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
 
 def test_more_rests_than_memory_has_room_for_are_refused() -> None:
     with pytest.raises(Fault, match="too_many_moves: there are 301 rests"):
-        solve_by_hand(session(301), Told(clock_ppm=50.0, box_rad=0.003))
+        solve_by_hand(session(301), SessionConditions(clock_ppm=50.0, box_rad=0.003))
 
 
 @pytest.mark.parametrize(

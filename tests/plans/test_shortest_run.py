@@ -19,7 +19,7 @@ from rig.config.load import load, parse
 from rig.config.models import RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS as DATA_SHEETS
 from rig.errors import Refused
-from rig.estimation.by_hand import Told, solve_by_hand
+from rig.estimation.by_hand import SessionConditions, solve_by_hand
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.observation.by_hand.handled import handled
 from rig.plans.by_hand import Wanted as Asked
@@ -142,7 +142,7 @@ def reached_by_hand(of: Run, seed: int) -> Reached:
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
     session = handled(told.time_s, told.rates, told.acceleration)
-    return Reached.by({"gyro": solve_by_hand(session, Told(50.0)).budget})
+    return Reached.by({"gyro": solve_by_hand(session, SessionConditions(50.0)).budget})
 
 
 def off(rng: np.random.Generator, angle_deg: float) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from rig.data.quantity import ACCELERATION, RATE
 from rig.data.recording.motion_file import Columns, Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
-from rig.estimation.by_hand import HandSolution, Told, solve_by_hand
+from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.by_hand.handled import handled
 from rig.observation.external.csv_samples import Samples
@@ -45,10 +45,10 @@ def result_by_hand(sensor: RecordedSensor | Item, solution: HandSolution, correc
     )
 
 
-def told_of(columns: Columns) -> Told:
+def told_of(columns: Columns) -> SessionConditions:
     """What the one row of a table of "turns" says (`rig.data.recording.motion_file`)."""
     first = columns.get("first_face")
-    return Told(
+    return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),
         clock_source="as stated: --clock-ppm",
         box_rad=float(columns["box_rad"][0]),

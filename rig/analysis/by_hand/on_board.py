@@ -15,7 +15,7 @@ from firmware_host.hand_answers import HandReport, HandSolved
 from firmware_host.protocol import HAND_FACES
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.on_board import BoardsSolution, OnFace, TakenMove, solve_as_the_board
+from rig.estimation.by_hand.on_board import BoardMove, BoardRest, BoardSolution, solve_like_board
 
 SCALE_LIMIT = 1e-5  # of an element of the matrix
 BIAS_LIMIT_RAD_S = 1e-6
@@ -38,7 +38,7 @@ class BoardReadings:
 class HandAgreement:
     """A solution in double precision, and the largest difference of the board's matrix, and bias, from it."""
 
-    host: BoardsSolution
+    host: BoardSolution
     matrix_difference: float
     bias_difference_rad_s: float
 
@@ -48,7 +48,7 @@ def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solve
 
     Raises Fault `board_unverified` where readings or reports are missing, `board_disagrees` beyond the limits.
     """
-    host = solve_as_the_board(tuple(_moves(readings, reports)))
+    host = solve_like_board(tuple(_moves(readings, reports)))
     if (taken := sum(each.outcome == "taken" for each in reports)) != solved.taken:
         raise _unverified(f"it has taken {solved.taken} moves, of which {taken} were seen here")
     matrix = float(np.max(np.abs(np.array(solved.matrix) - host.matrix)))
@@ -63,7 +63,7 @@ def hand_agreement(readings: BoardReadings, reports: Sequence[HandReport], solve
     return HandAgreement(host, matrix, bias)
 
 
-def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[TakenMove]:
+def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[BoardMove]:
     counted = False  # whether the rest before is in the solution
     for report in reports:
         taken = report.outcome == "taken"
@@ -72,7 +72,7 @@ def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[T
         counted = taken
 
 
-def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> TakenMove:
+def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> BoardMove:
     assert report.before is not None and report.after is not None, "taken moves are between faces"
     times_us, rates = readings.times_us, readings.rates
     marks = [report.rest_us, report.move_us, report.after_us, report.end_us]
@@ -80,9 +80,9 @@ def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> Take
     there = first > 0 and last < len(times_us) and np.array_equal(times_us[[first, begin, end, last]], marks)
     if not there or (np.diff(readings.sequence[first - 1 : last]) != 1).any():
         raise _unverified(f"readings of its move from {report.before} to {report.after} did not arrive here")
-    return TakenMove(
-        before=OnFace(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
-        after=OnFace(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
+    return BoardMove(
+        before=BoardRest(HAND_FACES.index(report.before), rates[first:begin].mean(axis=0), begin - first),
+        after=BoardRest(HAND_FACES.index(report.after), rates[end:last].mean(axis=0), last - end),
         rates=rates[begin:end],
         steps_s=readings.microsecond_s * np.diff(times_us[begin - 1 : end]),
         noise_rad_s=report.noise_rad_s,

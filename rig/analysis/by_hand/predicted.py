@@ -15,9 +15,9 @@ from rig.config.sensors.sensor_catalogue import PARTS
 from rig.config.sensors.sensor_sections import SensorSection, mounting_matrix
 from rig.data.recording.settings import ByHand, Uncertainty, by_hand_of, uncertainty_of
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.fit import fit
-from rig.estimation.by_hand.session import Handled, Told, axis_of
-from rig.estimation.by_hand.solution import solution_of
+from rig.estimation.by_hand.fit import fit_session
+from rig.estimation.by_hand.session import HandRecording, SessionConditions, axis_of
+from rig.estimation.by_hand.solution import summarise_fit
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.budget import Budget
 from rig.motion.by_hand import Face, Instruction
@@ -46,21 +46,21 @@ def predicted_by_hand(
     found = {}
     for name, sensor in config.to_calibrate.items():
         session = _session(sensor, moves, rest_s)
-        found[name] = solution_of(fit(session, _told(sensor, known, said), trusted=0)).budget
+        found[name] = summarise_fit(fit_session(session, _told(sensor, known, said), trusted=0)).budget
     return found
 
 
-def _told(sensor: SensorSection, known: Uncertainty, procedure: ByHand) -> Told:
+def _told(sensor: SensorSection, known: Uncertainty, procedure: ByHand) -> SessionConditions:
     first = None if sensor.acceleration is not None else turned_face(FIRST, mounting_matrix(sensor.mounting))
     clock = "the board's crystal" if sensor.on_board else ITS_OWN_CLOCK
-    return Told(known.crystal_ppm, clock, procedure.box_rad, first_face=first)
+    return SessionConditions(known.crystal_ppm, clock, procedure.box_rad, first_face=first)
 
 
 def _move_s(move: Instruction) -> float:
     return TURN_S * abs(move.turns) if move.turns else FLIP_S
 
 
-def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> Handled:
+def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> HandRecording:
     """The readings of such a session in the sensor's axes, cut into rests and moves as a recording is."""
     still, faces = np.zeros(3), [FIRST, *(move.face for move in moves)]
     spans = [_turning(rest_s, FIRST, still)]

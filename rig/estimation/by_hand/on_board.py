@@ -1,13 +1,13 @@
-"""A calibration by hand as the board makes it, a move at a time and each once, in double precision.
+"""The board's own calibration by hand in double precision: one move after the other, each used once.
 
-The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; what differs is the arithmetic alone.
-Which rests and moves there are, on which faces, is the board's to say.
+The equations are those of `firmware_host/firmware/core/by_hand/hand_solver.c`; only the arithmetic differs. The board
+reports the rests and moves, and their faces.
 
     m = F ω + b + G u,   C = F⁻¹
 
-Sought are C and G (3, 3) row by row, b (3,), and two angles of each of six faces: how far it is out of square. What is
-known is an information matrix, of which the board keeps the square root (Bierman, Factorization Methods for Discrete
-Sequential Estimation, 1977, chapter V). The equations are linear about a centre, which the board says when to move.
+Unknowns are C and G (3, 3) row by row, b (3,), and two angles of each of six faces: their deviation from square. The
+state is an information matrix, of which the board keeps the square root (Bierman, Factorization Methods for Discrete
+Sequential Estimation, 1977, chapter V). The equations are linearised about a centre; the board reports when it moves.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,8 +26,8 @@ CURVED = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class OnFace:
-    """A rest of so many `samples` on a `face`, 0 to 5 of +x -x +y -y +z -z upwards, and its mean reading (3,)."""
+class BoardRest:
+    """A rest of `samples` readings on a `face`, 0 to 5 of +x -x +y -y +z -z upwards, and its mean reading (3,)."""
 
     face: int
     mean_rad_s: Array
@@ -35,15 +35,16 @@ class OnFace:
 
 
 @dataclass(frozen=True, slots=True)
-class TakenMove:
-    """A move from the rest `before` to the rest `after`: readings (n, 3), each of the `steps_s` (n,) up to it.
+class BoardMove:
+    """A move from the rest `before` to the rest `after`: readings (n, 3) over the steps `steps_s` (n,) before them.
 
-    `whole` turns ended where they began; `follows` where the move taken before this one ended in the rest `before`;
-    `settled` where what was known after it is the centre from then on.
+    - `whole`: a whole turn, which ends where it began.
+    - `follows`: the previous move ended in the rest `before`.
+    - `settled`: the solution after this move is the next centre.
     """
 
-    before: OnFace
-    after: OnFace
+    before: BoardRest
+    after: BoardRest
     rates: Array
     steps_s: Array
     noise_rad_s: float
@@ -53,8 +54,8 @@ class TakenMove:
 
 
 @dataclass(frozen=True, slots=True)
-class BoardsSolution:
-    """What the board's equations give: C (3, 3) and b (3,) of g = C (m + b).
+class BoardSolution:
+    """The solution of the board's equations: C (3, 3) and b (3,) of g = C (m + b).
 
     `scale_std` is the largest standard uncertainty on the diagonal of C.
     """
@@ -64,70 +65,70 @@ class BoardsSolution:
     scale_std: float
 
 
-def solve_as_the_board(moves: Sequence[TakenMove]) -> BoardsSolution:
-    """The solution from the moves that the board has taken, in their order."""
+def solve_like_board(moves: Sequence[BoardMove]) -> BoardSolution:
+    """Solve the moves that the board has used, in their order."""
     centre = np.concatenate([np.eye(3).ravel(), np.zeros(24)])
-    information, amiss = np.diag(PRIOR_STD**-2.0), np.zeros(len(centre))
+    information, gradient = np.diag(PRIOR_STD**-2.0), np.zeros(len(centre))
     for move in moves:
-        rows, missed, variances = (np.array(each) for each in zip(*_equations(centre, move), strict=True))
+        rows, residual, variances = (np.array(part) for part in zip(*_equations(centre, move), strict=True))
         weighted = rows / variances[:, None]
-        information, amiss = information + weighted.T @ rows, amiss + weighted.T @ missed
+        information, gradient = information + weighted.T @ rows, gradient + weighted.T @ residual
         if move.settled:
-            centre, amiss = centre + _solved(information, amiss), np.zeros(len(centre))
-    centre = centre + _solved(information, amiss)
+            centre, gradient = centre + _solve(information, gradient), np.zeros(len(centre))
+    centre = centre + _solve(information, gradient)
     scaling = np.sqrt(np.diag(information))
     variance = np.diag(np.linalg.inv(information / np.outer(scaling, scaling))) / scaling**2
-    return BoardsSolution(
+    return BoardSolution(
         matrix=centre[MATRIX].reshape(3, 3),
         bias_rad_s=-centre[BIAS],
         scale_std=float(np.sqrt(variance[[0, 4, 8]].max())),
     )
 
 
-def _solved(information: Array, amiss: Array) -> Array:
+def _solve(information: Array, gradient: Array) -> Array:
     scaling = np.sqrt(np.diag(information))
-    return np.linalg.solve(information / np.outer(scaling, scaling), amiss / scaling) / scaling
+    return np.linalg.solve(information / np.outer(scaling, scaling), gradient / scaling) / scaling
 
 
-Equation = tuple[Array, float, float]  # a row (33,), what is missed, its variance
+Equation = tuple[Array, float, float]  # a row (33,), its residual, its variance
 
 
-def _equations(centre: Array, move: TakenMove) -> Iterator[Equation]:
+def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     for rest in (move.after,) if move.follows else (move.before, move.after):
-        yield from _of_rest(centre, rest, move.noise_rad_s)
-    yield from _of_move(centre, move)
+        yield from _rest_equations(centre, rest, move.noise_rad_s)
+    yield from _move_equations(centre, move)
 
 
 def _up(centre: Array, face: int) -> tuple[Array, Array]:
-    """The vertical (3,) in the body that lies on a face, and its change (3, 2) with the face's two angles."""
+    """Return the vertical (3,) in a body that lies on a face, and its derivative (3, 2) by the face's two angles."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
-    up, ways = np.zeros(3), np.zeros((3, 2))
-    ways[(axis + 1) % 3, 0] = ways[(axis + 2) % 3, 1] = 1.0
+    up, face_axes = np.zeros(3), np.zeros((3, 2))
+    face_axes[(axis + 1) % 3, 0] = face_axes[(axis + 2) % 3, 1] = 1.0
     up[axis] = (1 - leans @ leans / 2) * (-1.0 if face % 2 else 1.0)
-    return up + ways @ leans, ways
+    return up + face_axes @ leans, face_axes
 
 
-def _of_rest(centre: Array, rest: OnFace, noise_rad_s: float) -> Iterator[Equation]:
+def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
     up, _ = _up(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)
     for axis in range(3):
         row = np.zeros(len(centre))
         row[GRAVITY.start + 3 * axis : GRAVITY.start + 3 * axis + 3] = up
         row[BIAS.start + axis] = 1.0
-        missed = rest.mean_rad_s[axis] - centre[BIAS][axis] - sensitivity[axis] @ up
-        yield row, float(missed), noise_rad_s**2 / rest.samples + EARTH_RAD_S**2
+        residual = rest.mean_rad_s[axis] - centre[BIAS][axis] - sensitivity[axis] @ up
+        yield row, float(residual), noise_rad_s**2 / rest.samples + EARTH_RAD_S**2
 
 
-def _of_move(centre: Array, move: TakenMove) -> Iterator[Equation]:
+def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     matrix, sensitivity = centre[MATRIX].reshape(3, 3), centre[GRAVITY].reshape(3, 3)
-    (up, up_ways), (after, after_ways) = _up(centre, move.before.face), _up(centre, move.after.face)
+    (up, up_axes), (after, after_axes) = _up(centre, move.before.face), _up(centre, move.after.face)
     rates = move.rates - move.before.mean_rad_s
     turned, middles = _attitudes(rates @ matrix.T * move.steps_s[:, None])
-    there = middles * move.steps_s[:, None, None]
-    by_matrix = np.einsum("nar,nc->arc", there, rates).reshape(3, 9)
-    along = np.einsum("nas,nbc,b->asc", there, middles, up)
-    by_bias = there.sum(axis=0) @ matrix
-    by_gravity = np.einsum("ar,c->arc", by_bias, (up + after) / 2) - np.einsum("asc,sr->arc", along, matrix)
+    weighted = middles * move.steps_s[:, None, None]
+    by_matrix = np.einsum("nar,nc->arc", weighted, rates).reshape(3, 9)
+    by_tilt = np.einsum("nas,nbc,b->asc", weighted, middles, up)
+    by_bias = weighted.sum(axis=0) @ matrix
+    by_gravity = np.einsum("ar,c->arc", by_bias, (up + after) / 2) - np.einsum("asc,sr->arc", by_tilt, matrix)
     drift = move.after.mean_rad_s - move.before.mean_rad_s
     corrected = np.einsum("arc,rc->a", by_gravity, sensitivity) - by_bias @ drift / 2
     reached = turned @ after
@@ -138,20 +139,20 @@ def _of_move(centre: Array, move: TakenMove) -> Iterator[Equation]:
     design = np.hstack([by_matrix, by_gravity.reshape(3, 9), np.zeros((3, 15))])
     half = np.linalg.norm(up - reached) / 2
     stretched = np.arcsin(half) / (half * np.sqrt(1 - half**2)) if half > 1e-9 else 1.0
-    for way in across(middle):
-        row, aside = way @ design, np.cross(way, middle)
-        row[FACES.start + 2 * move.before.face + np.arange(2)] -= aside @ up_ways
-        row[FACES.start + 2 * move.after.face + np.arange(2)] += aside @ turned @ after_ways
-        missed = float(way @ np.cross(reached, up) * stretched)
-        yield row, missed, variance + (CURVED * missed**2) ** 2 + 2 * REPEAT_RAD**2
+    for axis in across(middle):
+        row, lever = axis @ design, np.cross(axis, middle)
+        row[FACES.start + 2 * move.before.face + np.arange(2)] -= lever @ up_axes
+        row[FACES.start + 2 * move.after.face + np.arange(2)] += lever @ turned @ after_axes
+        residual = float(axis @ np.cross(reached, up) * stretched)
+        yield row, residual, variance + (CURVED * residual**2) ** 2 + 2 * REPEAT_RAD**2
     if move.whole:
         twist = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-        missed = -float(2 * np.arctan2(middle @ twist, 1 + np.trace(turned)) + middle @ corrected)
-        yield middle @ design, missed, variance + (CURVED * missed**2) ** 2 + CLOSURE_RAD**2
+        residual = -float(2 * np.arctan2(middle @ twist, 1 + np.trace(turned)) + middle @ corrected)
+        yield middle @ design, residual, variance + (CURVED * residual**2) ** 2 + CLOSURE_RAD**2
 
 
 def _attitudes(steps: Array) -> tuple[Array, Array]:
-    """The attitude (3, 3) after rotation vectors (n, 3), and those (n, 3, 3) in the middle of each."""
+    """Return the attitude (3, 3) after rotation vectors (n, 3), and the attitudes (n, 3, 3) in the middle of each."""
     from scipy.spatial.transform import Rotation
 
     halves = np.asarray(Rotation.from_rotvec(steps / 2).as_matrix(), dtype=np.float64)
@@ -162,7 +163,7 @@ def _attitudes(steps: Array) -> tuple[Array, Array]:
     return attitude, middles
 
 
-def _variance(move: TakenMove, path_rad: float) -> float:
+def _variance(move: BoardMove, path_rad: float) -> float:
     lasts_s, noise = float(move.steps_s.sum()), move.noise_rad_s**2
     samples = 1 / len(move.rates) + 0.25 / move.before.samples + 0.25 / move.after.samples
     of_angle = path_rad * (NONLINEARITY**2 * path_rad + OF_ANGLE**2 * QUARTER_RAD)

@@ -1,4 +1,4 @@
-"""How far a session has come: what is known after each move, what was wrong with the last one, what would tell most."""
+"""The progress of a session: the uncertainty after each move, the fault of the last one, the faces still missing."""
 
 from dataclasses import dataclass
 
@@ -7,74 +7,84 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.by_hand.axes import check_axes
-from rig.estimation.by_hand.doubts import doubted
-from rig.estimation.by_hand.fit import fit
-from rig.estimation.by_hand.session import FACES, Handled, Move, Told
-from rig.estimation.by_hand.solution import HandSolution, MoveFound, RestFound, solution_of, sought, too_few
+from rig.estimation.by_hand.doubts import find_contradiction
+from rig.estimation.by_hand.fit import fit_session
+from rig.estimation.by_hand.session import FACES, HandRecording, Move, SessionConditions
+from rig.estimation.by_hand.solution import (
+    HandSolution,
+    MoveSummary,
+    RestSummary,
+    insufficient_session,
+    parameter_columns,
+    summarise_fit,
+)
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 UNKNOWN = 0.4  # U (k = 2) of a scale of which nothing is known
-TOLD_FROM = 4  # moves, from which on one of them can be held against the others
+FEWEST_TO_COMPARE = 4  # moves: from here on one of them can be compared with the others
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
-    """What a session tells so far.
+class SessionProgress:
+    """The result of a session so far.
 
     - `expanded_scale` (3,): U (k = 2), by the session and its clock.
-    - `faces` of each rest, None on none; `moves` as they were taken; `solution` as if it ended here, if it told enough.
-    - `asked`: what is wrong with the last move or the rest after it. `wanted`: faces on which it has not lain.
+    - `faces`, `rests`: face and summary of each rest; `moves`: the summary of each move.
+    - `solution`: the solution if the session ended here, None if it is too uncertain.
+    - `fault_of_last`: the fault of the last move or the rest after it. `missing_faces`: faces without a rest.
     """
 
     expanded_scale: Array
     faces: tuple[str | None, ...]
-    rests: tuple[RestFound, ...]
-    moves: tuple[MoveFound, ...]
+    rests: tuple[RestSummary, ...]
+    moves: tuple[MoveSummary, ...]
     solution: HandSolution | None
-    asked: Fault | None
-    wanted: tuple[str, ...]
+    fault_of_last: Fault | None
+    missing_faces: tuple[str, ...]
 
 
-def progress(session: Handled, told: Told) -> Progress:
-    """What a session tells so far, from its first rest on; too little is no error.
+def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
+    """Assess a session from its first rest on; too few rests are no error.
 
-    Raises Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
+    Raise Fault  `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_not_told`.
     """
     unknown = np.full(3, UNKNOWN)
     if not session.rests:
-        return Progress(unknown, (), (), (), None, None, FACES)
+        return SessionProgress(unknown, (), (), (), None, None, FACES)
     check_axes(session)
-    asked = _at_a_glance(session)
+    fault_of_last = _check_last_move(session)
     last = len(session.rests) - 1
     try:
-        found = fit(session, told, trusted=last if last >= TOLD_FROM else None)
+        fitted = fit_session(session, conditions, trusted=last if last >= FEWEST_TO_COMPARE else None)
     except Fault as fault:
-        return Progress(unknown, (), (), (), None, asked or fault, FACES)
-    if asked is None and last >= TOLD_FROM:
-        asked = doubted(found, since=last)
-    axes, chosen = SensorAxes.of(found.state.matrix), sought(found)
-    covariance = found.covariance[np.ix_(chosen, chosen)]
-    to_parameters = parameter_jacobian(found.state.matrix, axes.scale)
+        return SessionProgress(unknown, (), (), (), None, fault_of_last or fault, FACES)
+    if fault_of_last is None and last >= FEWEST_TO_COMPARE:
+        fault_of_last = find_contradiction(fitted, since=last)
+    axes, chosen = SensorAxes.of(fitted.state.matrix), parameter_columns(fitted)
+    covariance = fitted.covariance[np.ix_(chosen, chosen)]
+    to_parameters = parameter_jacobian(fitted.state.matrix, axes.scale)
     expanded = 2 * np.sqrt(np.diag(to_parameters @ covariance @ to_parameters.T)[:3])
-    expanded = np.hypot(expanded, 2e-6 / np.sqrt(3) * told.clock_ppm * axes.scale)
-    solution = solution_of(found)
-    faces = found.faced.faces
-    return Progress(
+    expanded = np.hypot(expanded, 2e-6 / np.sqrt(3) * conditions.clock_ppm * axes.scale)
+    solution = summarise_fit(fitted)
+    faces = fitted.faces.faces
+    return SessionProgress(
         expanded,
         faces,
         solution.rests,
         solution.moves,
         solution if expanded.max() < UNKNOWN / 4 else None,
-        asked,
+        fault_of_last,
         tuple(face for face in FACES if face not in faces),
     )
 
 
-def _at_a_glance(session: Handled) -> Fault | None:
-    """What the last move shows without any other."""
+def _check_last_move(session: HandRecording) -> Fault | None:
+    """Return the fault that the last move shows without any other, or None."""
     if not session.moves:
         return None
     move: Move = session.moves[-1]
     if (move.clipped or move.lost) and not move.left_out:
-        return too_few(Handled(session.time_s, session.rates, None, session.rests[-2:], (move,)), None)
+        return insufficient_session(
+            HandRecording(session.time_s, session.rates, None, session.rests[-2:], (move,)), None
+        )
     return None

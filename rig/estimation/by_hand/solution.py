@@ -1,4 +1,4 @@
-"""A session by hand solved: scale, bias and axes, what their uncertainty is made of, and what was found on the way."""
+"""The solution of a session by hand: scale, bias and axes, their budget, and summaries of rests and moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,18 +11,18 @@ from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand.axes import check_axes
-from rig.estimation.by_hand.creep import crept
-from rig.estimation.by_hand.doubts import doubted, hidden
-from rig.estimation.by_hand.fit import SEEN, Fit, fit, white
+from rig.estimation.by_hand.creep import find_creeping_rests
+from rig.estimation.by_hand.doubts import find_contradiction, find_masked_fault
+from rig.estimation.by_hand.fit import PRIOR_DOF, GraphFit, fit_session, whiten_rows
 from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
-from rig.estimation.by_hand.session import FACES, LARGEST, STATED, Handled, Told, without_crept
+from rig.estimation.by_hand.session import FACES, LARGEST, STATED, HandRecording, SessionConditions, drop_rests
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.gyroscope.known_turns import TurnedSolution
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
-LOOSE = 3.0  # times what is stated of hands: faces that repeat no better may be other faces
+LOOSE = 3.0  # times the stated value: faces that repeat no better may be other faces
 MOST_RESTS = 300  # their equations together fill a gigabyte; a session has some twenty
-ENOUGH = 0.02  # U (k = 2) of the scale, beyond which nothing has been told
+ENOUGH = 0.02  # U (k = 2) of the scale, beyond which there is no result
 REAL_HANDS = 5e-4  # of the scale: by so much (1 u) recordings of real hands have been seen to disagree with themselves
 CLOCK, RECORDED_HANDS = "clock", "recordings of real hands"
 LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
@@ -40,42 +40,42 @@ LINES: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class RestFound:
-    """A rest on a `face`, None on none; `pull` is its largest residual over that of such residuals."""
+class RestSummary:
+    """A rest on a `face` or on None; `normalised_residual` is its largest residual over its standard deviation."""
 
     face: str | None
-    pull: float
+    normalised_residual: float
 
 
 @dataclass(frozen=True, slots=True)
-class MoveFound:
-    """A move by `angle_rad` in all, a flip or so many whole `turns` on a face, which missed by `closure_rad`."""
+class MoveSummary:
+    """A move by `angle_rad`: a flip, or whole `turns` on a face with the closure error `closure_rad`."""
 
     kind: Literal["flip", "turn", "omitted"]
     angle_rad: float
     turns: int
-    pull: float
+    normalised_residual: float
     closure_rad: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class HandSolution:
-    """What a session by hand gives.
+    """The solution of a session by hand.
 
-    - `turned` is the solution as that of told turns is; its budget is `budget`.
-    - `sizes` are what was found of the hand, what was stated and what is refused, by name.
-    - `crept` is when the body crept at what were to be rests, which are left out.
-    - `expanded_scale` (3,) is U (k = 2) by this session and its clock alone; the budget has real hands beside.
+    - `turned`: the solution in the form of known rotations; its budget is `budget`.
+    - `stds`: standard deviations of the hand by name, each as found, stated, and largest allowed.
+    - `creeping_s`: when the body crept during intended rests, which are left out.
+    - `expanded_scale` (3,): U (k = 2) by this session and its clock; the budget adds recordings of real hands.
     """
 
     turned: TurnedSolution
-    rests: tuple[RestFound, ...]
-    moves: tuple[MoveFound, ...]
-    sizes: dict[str, tuple[float, float, float]]
+    rests: tuple[RestSummary, ...]
+    moves: tuple[MoveSummary, ...]
+    stds: dict[str, tuple[float, float, float]]
     chi_square: float
     freedom: float
     expanded_scale: Array
-    crept: tuple[tuple[float, float], ...] = ()
+    creeping_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def budget(self) -> Budget:
@@ -87,63 +87,63 @@ class HandSolution:
 
     @property
     def bias_rad_s(self) -> Array:
-        """Biases (3,) as g = K (m + b) has them, at the last rest."""
+        """The biases (3,) b of g = K (m + b) at the last rest."""
         return self.turned.bias_rad_s
 
     @property
     def covariance(self) -> Array:
-        """The covariance (6, 6) of scale and bias, by this session and its clock."""
+        """The covariance (6, 6) of scale and bias by this session and its clock."""
         return self.turned.covariance
 
 
-def solve_by_hand(session: Handled, told: Told) -> HandSolution:
-    """The solution of a session.
+def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> HandSolution:
+    """Solve a session.
 
-    Raises Fault `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
+    Raise Fault  `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
     `table_moved`, `bias_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`, `no_fit`, `zero_reading`,
     `too_many_moves`; Refused `first_face_not_told`.
     """
     if len(session.rests) < 2:
-        raise too_few(session, None)
+        raise insufficient_session(session, None)
     if 2 * sum(move.lost or move.clipped for move in session.moves) > len(session.moves):
-        raise too_few(session, None)
+        raise insufficient_session(session, None)
     if len(session.rests) > MOST_RESTS:
         what = f"there are {len(session.rests)} rests; no more than {MOST_RESTS} are solved together"
         raise Fault("too_many_moves", what, "Give the recording in pieces")
     if session.acceleration is not None:
         refusals.check_signal(np.array([rest.acceleration_m_s2 for rest in session.rests]))
     check_axes(session)
-    found: Fit | None = None
+    fitted: GraphFit | None = None
     try:
-        found = fit(session, told)
-        if rows := crept(found):
-            session = without_crept(session, rows)
-            found = fit(session, told)
-        fault = _too_little(found) or doubted(found)
+        fitted = fit_session(session, conditions)
+        if rows := find_creeping_rests(fitted):
+            session = drop_rests(session, rows)
+            fitted = fit_session(session, conditions)
+        fault = _check_precision(fitted) or find_contradiction(fitted)
     except Fault as error:
-        fault = error if all(move.tells for move in session.moves) else too_few(session, None)
+        fault = error if all(move.is_usable for move in session.moves) else insufficient_session(session, None)
     other = None
-    if found is None or _looseness(found) > LOOSE:
-        other = _another_face(session, told, None if fault is not None else found)
-    if (reason := other or fault) is not None or found is None:
-        raise reason or too_few(session, None)
-    refusals.check_unit(scale_of(found.state.matrix))
-    refusals.check_handedness(found.state.matrix)
-    one = hidden(found)
-    return solution_of(found, () if one is None else (f"{one.what}: for this one alone U is larger",))
+    if fitted is None or _looseness(fitted) > LOOSE:
+        other = _find_first_face(session, conditions, None if fault is not None else fitted)
+    if (reason := other or fault) is not None or fitted is None:
+        raise reason or insufficient_session(session, None)
+    refusals.check_unit(scale_of(fitted.state.matrix))
+    refusals.check_handedness(fitted.state.matrix)
+    one = find_masked_fault(fitted)
+    return summarise_fit(fitted, () if one is None else (f"{one.what}: for this one alone U is larger",))
 
 
-def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
-    """The solution of a graph that has come to rest, with what else was found to warn of."""
-    matrix, told = fit.state.matrix, fit.told
+def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution:
+    """Return the solution of a converged graph, with further warnings."""
+    matrix, conditions = fit.state.matrix, fit.conditions
     axes = SensorAxes.of(matrix)
-    chosen = sought(fit)
+    chosen = parameter_columns(fit)
     covariance = fit.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(matrix, axes.scale)
     clock = np.zeros((6, 6))
-    clock[:3, :3] = np.outer(axes.scale, axes.scale) * (1e-6 * told.clock_ppm) ** 2 / 3
+    clock[:3, :3] = np.outer(axes.scale, axes.scale) * (1e-6 * conditions.clock_ppm) ** 2 / 3
     of_session = to_parameters @ covariance @ to_parameters.T + clock
-    design, _ = white(fit.factors)
+    design, _ = whiten_rows(fit.factors)
     conditioned = design / np.linalg.norm(design, axis=0)
     turned = TurnedSolution(
         scale=axes.scale,
@@ -155,10 +155,10 @@ def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
         mounting=axes.mounting,
         angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.zeros((0, 3)),
-        widened=max(1.0, fit.sizes.repeat_rad / STATED.repeat_rad),
+        widened=max(1.0, fit.stds.repeat_rad / STATED.repeat_rad),
         widened_freedom=np.inf,
         budget=_budget(fit, to_parameters, clock),
-        observations=len(fit.session.rests) + sum(move.tells for move in fit.session.moves),
+        observations=len(fit.session.rests) + sum(move.is_usable for move in fit.session.moves),
         rank=12,
         condition=float(np.sqrt(np.linalg.cond(conditioned[:, chosen].T @ conditioned[:, chosen]))),
         iterations=fit.iterations,
@@ -167,29 +167,30 @@ def solution_of(fit: Fit, warnings: tuple[str, ...] = ()) -> HandSolution:
     )
     return HandSolution(
         turned=turned,
-        rests=tuple(RestFound(face, _pull(fit, row)) for row, face in enumerate(fit.faced.faces)),
-        moves=tuple(_move_found(fit, row) for row in range(len(fit.session.moves))),
-        sizes={
-            name: (getattr(fit.sizes, name), getattr(STATED, name), getattr(LARGEST, name))
-            for name in fit.sizes.__slots__
+        rests=tuple(RestSummary(face, _largest_residual(fit, row)) for row, face in enumerate(fit.faces.faces)),
+        moves=tuple(_summarise_move(fit, row) for row in range(len(fit.session.moves))),
+        stds={
+            name: (getattr(fit.stds, name), getattr(STATED, name), getattr(LARGEST, name))
+            for name in fit.stds.__slots__
             if name != "acceleration_m_s2" or fit.session.acceleration is not None
         },
         chi_square=fit.chi_square,
         freedom=fit.freedom,
         expanded_scale=2 * np.sqrt(np.diag(of_session)[:3]),
-        crept=fit.session.crept,
+        creeping_s=fit.session.creeping_s,
     )
 
 
-def sought(fit: Fit) -> NDArray[np.intp]:
-    """(12,) the places of F and of the last rest's bias among all that is found."""
+def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
+    """Return the columns (12,) of F and of the last rest's bias among all unknowns."""
     count = fit.covariance.shape[0]
     return np.asarray(np.r_[0:9, count - 3 : count])
 
 
-def too_few(session: Handled, expanded: Array | None) -> Fault:
-    """Why nothing is told yet: by what went wrong, else that there is too little of it."""
-    clipped, lost = (sum(getattr(move, each) for move in session.moves) for each in ("clipped", "lost"))
+def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
+    """Return the Fault of a session without a result: unusable moves, else too few of them."""
+    clipped = sum(move.clipped for move in session.moves)
+    lost = sum(move.lost for move in session.moves)
     if clipped:
         peak = max(move.peak_rad_s for move in session.moves if move.clipped)
         return Fault(
@@ -204,71 +205,71 @@ def too_few(session: Handled, expanded: Array | None) -> Fault:
             f"in {lost} of {len(session.moves)} moves readings are missing",
             "Look at the cable and at how the readings are logged; record again",
         )
-    if session.held:
-        start_s, end_s = session.held[0]
+    if session.held_in_air_s:
+        start_s, end_s = session.held_in_air_s[0]
         return Fault(
             "held_not_laid_down",
             f"from {start_s:.1f} to {end_s:.1f} s the body was held still, not laid down"
-            + (f", and {len(session.held) - 1} times more" if len(session.held) > 1 else ""),
+            + (f", and {len(session.held_in_air_s) - 1} times more" if len(session.held_in_air_s) > 1 else ""),
             "Lay it down and let go, for a second, after every move",
         )
     so_far = "" if expanded is None else f"; the scale is known to {100 * expanded.max():.1g} %"
-    if session.crept:
-        so_far += f"; {len(session.crept)} more are left out, for the body crept from {session.crept[0][0]:.1f} s on"
+    if creeping_s := session.creeping_s:
+        so_far += f"; {len(creeping_s)} more are left out, as the body crept from {creeping_s[0][0]:.1f} s on"
     return Fault(
         "too_few_moves",
-        f"there are {len(session.rests)} rests and {sum(move.tells for move in session.moves)} moves{so_far}",
+        f"there are {len(session.rests)} rests and {sum(move.is_usable for move in session.moves)} moves{so_far}",
         "Lay it on all six faces, eight moves at least, with a second of rest after each",
     )
 
 
-def _too_little(fit: Fit) -> Fault | None:
+def _check_precision(fit: GraphFit) -> Fault | None:
     expanded = 2 * np.sqrt(np.diag(fit.covariance)[[0, 4, 8]])
-    return too_few(fit.session, expanded) if expanded.max() > ENOUGH else None
+    return insufficient_session(fit.session, expanded) if expanded.max() > ENOUGH else None
 
 
-def _looseness(fit: Fit) -> float:
-    """How many times as large as stated what holds faces and moves together was found to be."""
-    sizes = fit.sizes
-    return max(sizes.repeat_rad / STATED.repeat_rad, sizes.of_angle / STATED.of_angle)
+def _looseness(fit: GraphFit) -> float:
+    """Return the larger ratio of found to stated standard deviation, of faces and of moves."""
+    stds = fit.stds
+    return max(stds.repeat_rad / STATED.repeat_rad, stds.of_angle / STATED.of_angle)
 
 
-def _another_face(session: Handled, told: Told, but: Fit | None) -> Fault | None:
-    """The Fault that the body lay otherwise at first, where with another face all is well."""
-    if session.acceleration is not None or told.first_face is None:
+def _find_first_face(session: HandRecording, conditions: SessionConditions, but: GraphFit | None) -> Fault | None:
+    """Return the Fault of a wrong first face if another one gives a consistent session, else None."""
+    if session.acceleration is not None or conditions.first_face is None:
         return None
-    for face in (each for each in FACES if each != told.first_face):
+    for face in (face for face in FACES if face != conditions.first_face):
         try:
-            found = fit(session, replace(told, first_face=face))
+            fitted = fit_session(session, replace(conditions, first_face=face))
         except Fault:
             continue
-        better = but is None or _looseness(found) < _looseness(but) / 2
-        if better and _too_little(found) is None and doubted(found) is None:
+        better = but is None or _looseness(fitted) < _looseness(but) / 2
+        if better and _check_precision(fitted) is None and find_contradiction(fitted) is None:
             return Fault(
                 "wrong_face",
-                f"the body did not begin with {told.first_face} upwards: its moves are those from {face}",
+                f"the body did not begin with {conditions.first_face} upwards: its moves are those from {face}",
                 f"Say --first-face {face}, or look again which axis is which",
             )
     return None
 
 
-def _budget(fit: Fit, to_parameters: Array, clock: Array) -> Budget:
-    chosen = sought(fit)
-    spread = {name: np.zeros((6, 6)) for name in LINES}
+def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
+    chosen = parameter_columns(fit)
+    covariances = {name: np.zeros((6, 6)) for name in LINES}
     line_of = {cause: name for name, (_, causes, _) in LINES.items() for cause in causes}
     for row in fit.factors:
         gain = to_parameters @ fit.covariance[chosen] @ (row.design / row.std[:, None] ** 2).T
         for cause, std in row.causes.items():
             effect = gain * std
-            spread[line_of[cause]] += effect @ effect.T
+            covariances[line_of[cause]] += effect @ effect.T
     samples = float(sum(rest.samples for rest in fit.session.rests))
-    freedom = {"noise": samples, "placement": fit.freedom + SEEN, "bias from rest to rest": fit.freedom + SEEN}
-    freedom["angles of the moves"] = fit.freedom + SEEN
+    estimated = dict.fromkeys(("placement", "bias from rest to rest", "angles of the moves"), fit.freedom + PRIOR_DOF)
+    freedom = {"noise": samples} | estimated
     lines = [
-        Contributor(name, kind, "normal", None, "", source, freedom.get(name, np.inf), spread[name])
+        Contributor(name, kind, "normal", None, "", source, freedom.get(name, np.inf), covariances[name])
         for name, (kind, _, source) in LINES.items()
     ]
-    ppm, source = fit.told.clock_ppm, fit.told.clock_source
+    ppm, source = fit.conditions.clock_ppm, fit.conditions.clock_source
     lines.append(Contributor(CLOCK, "B", "rectangular", ppm, "ppm", source, np.inf, clock))
     real = np.diag([*(REAL_HANDS * scale_of(fit.state.matrix)) ** 2, 0.0, 0.0, 0.0])
     source = "by how much recordings of hands elsewhere disagree with themselves"
@@ -276,31 +277,31 @@ def _budget(fit: Fit, to_parameters: Array, clock: Array) -> Budget:
     return Budget(tuple(lines))
 
 
-def _pull(fit: Fit, at: int, kinds: Sequence[str] = ("flat", "acceleration")) -> float:
-    rows = [row for row in fit.factors if row.at == at and row.kind in kinds]
-    return max((_pull_of(fit, row) for row in rows), default=0.0)
+def _largest_residual(fit: GraphFit, index: int, kinds: Sequence[str] = ("flat", "acceleration")) -> float:
+    rows = [row for row in fit.factors if row.index == index and row.kind in kinds]
+    return max((_largest_of_factor(fit, row) for row in rows), default=0.0)
 
 
-def _pull_of(fit: Fit, row: Factor) -> float:
-    return float(np.max(np.abs(row.missed) / (row.std * np.sqrt(np.maximum(fit.freedom_of(row), 0.05)))))
+def _largest_of_factor(fit: GraphFit, row: Factor) -> float:
+    return float(np.max(np.abs(row.residual) / (row.std * np.sqrt(np.maximum(fit.redundancy_numbers(row), 0.05)))))
 
 
-def _move_found(fit: Fit, row: int) -> MoveFound:
-    move, turns = fit.session.moves[row], fit.faced.turns[row]
-    closure = next((each for each in fit.factors if each.kind == CLOSURE and each.at == row), None)
-    return MoveFound(
-        kind="omitted" if not move.tells else "turn" if turns else "flip",
-        angle_rad=float(np.linalg.norm(np.linalg.solve(fit.state.matrix, fit.moved.swept_rad[row]))),
+def _summarise_move(fit: GraphFit, row: int) -> MoveSummary:
+    move, turns = fit.session.moves[row], fit.faces.turns[row]
+    closure = next((factor for factor in fit.factors if factor.kind == CLOSURE and factor.index == row), None)
+    return MoveSummary(
+        kind="omitted" if not move.is_usable else "turn" if turns else "flip",
+        angle_rad=float(np.linalg.norm(np.linalg.solve(fit.state.matrix, fit.integrals.swept_rad[row]))),
         turns=turns,
-        pull=_pull(fit, row, (MOVE, CLOSURE)),
-        closure_rad=None if closure is None else float(closure.missed[0]),
+        normalised_residual=_largest_residual(fit, row, (MOVE, CLOSURE)),
+        closure_rad=None if closure is None else float(closure.residual[0]),
     )
 
 
-def _warnings(fit: Fit) -> tuple[str, ...]:
-    said = []
-    for words, each in (("at the end of its range", "clipped"), ("with readings missing", "lost")):
-        if starts := [move.start_s for move in fit.session.moves if getattr(move, each)]:
+def _warnings(fit: GraphFit) -> tuple[str, ...]:
+    warnings = []
+    for words, fault in (("at the end of its range", "clipped"), ("with readings missing", "lost")):
+        if starts := [move.start_s for move in fit.session.moves if getattr(move, fault)]:
             at_s = ", ".join(f"{start_s:.1f}" for start_s in starts)
-            said.append(f"moves left out, the gyroscope {words}: from {at_s} s")
-    return tuple(said)
+            warnings.append(f"moves left out, the gyroscope {words}: from {at_s} s")
+    return tuple(warnings)

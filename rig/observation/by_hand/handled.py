@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import Handled, Move, Rest
+from rig.estimation.by_hand.session import HandRecording, Move, Rest
 from rig.observation.by_hand.rests import ROUNDING, find_rests
 from rig.observation.sampling import find_sampling
 from rig.observation.windows import Window
@@ -29,7 +29,7 @@ HELD_S, HELD_RAD_S, PAUSE_S = 0.75, 0.15, 0.25  # so long in one place, if it tu
 
 def handled(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
-) -> Handled:
+) -> HandRecording:
     """The session of readings (n, 3) at rising times (n,), rad/s and m/s²; `range_rad_s` where it is known."""
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
@@ -42,7 +42,7 @@ def handled(
         inside = (time_s >= start_s) & (time_s <= end_s)
         peak = float(np.abs(rates[inside]).max())
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
-    return Handled(time_s, rates, acceleration, rests, tuple(moves), _held(time_s, rates, rests))
+    return HandRecording(time_s, rates, acceleration, rests, tuple(moves), _held(time_s, rates, rests))
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
@@ -126,7 +126,7 @@ class Segmenter:
         self._pieces: list[tuple[Array, Array, Array | None]] = []
         self._given_s = -np.inf  # beginning of the last rest that was given
         self._looked_s = -np.inf
-        self._session = Handled(np.empty(0), np.empty((0, 3)), None, (), ())
+        self._session = HandRecording(np.empty(0), np.empty((0, 3)), None, (), ())
 
     def feed(self, time_s: Array, rates: Array, acceleration: Array | None = None) -> tuple[Rest | Move, ...]:
         """Takes readings (k, 3) at times (k,) that follow; gives the moves and rests that have settled since."""
@@ -148,7 +148,7 @@ class Segmenter:
         return tuple(found)
 
     @property
-    def handled(self) -> Handled:
+    def handled(self) -> HandRecording:
         """Everything so far, to the last rest that has settled."""
         session = self._session
         count = len(session.rests)
@@ -168,7 +168,7 @@ class Segmenter:
         moving = session.time_s > last.end_s
         rates = session.rates[moving] - last.mean_rad_s
         turned = np.asarray(np.trapezoid(rates, session.time_s[moving], axis=0), dtype=np.float64)
-        held = next((span for span in session.held if span[1] > now_s - 2 * PAUSE_S), None)
+        held = next((span for span in session.held_in_air_s if span[1] > now_s - 2 * PAUSE_S), None)
         state: State = "moving" if held is None else "held"
         since_s = last.end_s if held is None else held[0]
         return Live(now_s, state, since_s, turned, float(np.abs(rates).max()))

@@ -16,7 +16,15 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.by_hand.session import Handled, Move, Rest, Told, axis_of, joined, nearest_face
+from rig.estimation.by_hand.session import (
+    HandRecording,
+    Move,
+    Rest,
+    SessionConditions,
+    axis_of,
+    merge_moves,
+    nearest_face,
+)
 from rig.motion.by_hand import FACES, Face
 from rig.observation.by_hand.handled import Segmenter
 from rig.observation.timebase import NOMINAL_DRIFT, check_readings
@@ -75,7 +83,7 @@ class NotCounted:
     def _span_s(self, begin_us: int, end_us: int, shift_s: float) -> tuple[float, float]:
         return shift_s + self.microsecond_s * begin_us, shift_s + self.microsecond_s * end_us
 
-    def without(self, session: Handled) -> Handled:
+    def without(self, session: HandRecording) -> HandRecording:
         """The session without it: a rest that does not count is a pause of the move that goes on through it."""
         rests, moves, through = list[Rest](), list[Move](), list[Move]()
         for place, rest in enumerate(session.rests):
@@ -86,7 +94,7 @@ class NotCounted:
             if any(rest.start_s < end_s and start_s < rest.end_s for start_s, end_s in self.rests):
                 continue
             if rests:
-                moves.append(joined(through))
+                moves.append(merge_moves(through))
                 through.clear()
             rests.append(rest)
         return replace(session, rests=tuple(rests), moves=tuple(moves))
@@ -130,13 +138,13 @@ def segmented(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted
     return segmenter, refused, 0.0 if ends_s is None else float(ends_s)
 
 
-def session_of(runs: Sequence[RunData], name: str) -> Handled:
+def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
     """A session's rests and moves by one sensor, as they are solved."""
     segmenter, refused, _ = segmented(runs, name)
     return refused.without(segmenter.handled)
 
 
-def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> Told:
+def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
     """What the solution of a session needs to know besides a sensor's readings. Raises Refused `clock_unknown`.
 
     The clock that stamps the readings is the only measure of time there is, and no reading shows that it is wrong.
@@ -151,7 +159,7 @@ def told_of(settings: RunSettings, provenance: Provenance, sensor: RecordedSenso
             "Look at the board's crystal (`rig board info`); a bridge on the Nucleo connects it",
         )
     first = None if sensor.measures(ACCELERATION) else turned_face(FACES[0], np.array(sensor.mounting))
-    return Told(
+    return SessionConditions(
         clock_ppm=known.crystal_ppm,
         clock_source="the board's crystal" if sensor.on_board else ITS_OWN_CLOCK,
         box_rad=said.box_rad,

@@ -33,7 +33,7 @@ def by_hand_entry(solution: HandSolution) -> ByHandEntry:
         moves=tuple(entry(MoveByHandEntry, each) for each in solution.moves),
         errors=tuple(
             HandErrorEntry(name=PUBLIC_NAMES[name], estimate=size, stated=stated, limit=limit)
-            for name, (size, stated, limit) in solution.sizes.items()
+            for name, (size, stated, limit) in solution.stds.items()
         ),
         chi_square=solution.chi_square,
         degrees_of_freedom=solution.freedom,

@@ -44,13 +44,13 @@ def _words(entry: OmittedEntry) -> str:
 
 
 def _rests(solution: HandSolution) -> Iterator[OmittedEntry]:
-    if solution.crept:
-        start_s, end_s = solution.crept[0]
+    if solution.creeping_s:
+        start_s, end_s = solution.creeping_s[0]
         yield OmittedEntry(
             quantity=None,
             what="rests",
-            count=len(solution.crept),
-            total=len(solution.rests) + len(solution.crept),
+            count=len(solution.creeping_s),
+            total=len(solution.rests) + len(solution.creeping_s),
             reason="bias_jumped: the body crept, for the gyroscope read otherwise than before and after",
             first=f"from {start_s:.1f} to {end_s:.1f} s",
         )
@@ -64,6 +64,6 @@ def _moves(solution: HandSolution) -> Iterator[OmittedEntry]:
             what="moves",
             count=len(left_out),
             total=len(solution.moves),
-            reason="; ".join(solution.turned.warnings) or ("too long" if solution.crept else "taken back"),
+            reason="; ".join(solution.turned.warnings) or ("too long" if solution.creeping_s else "taken back"),
             first=f"move {left_out[0]}",
         )

@@ -26,8 +26,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ByHand
 from rig.errors import Fault
-from rig.estimation.by_hand.progress import Progress, progress
-from rig.estimation.by_hand.session import Move, Rest, Told
+from rig.estimation.by_hand.progress import SessionProgress, assess_progress
+from rig.estimation.by_hand.session import Move, Rest, SessionConditions
 from rig.motion.by_hand import FACES, Face, HandMove, Instruction
 from rig.observation.by_hand.handled import Segmenter
 from rig.observation.by_hand.runs import (
@@ -66,7 +66,7 @@ class HandSession:
     settings: ByHand
     name: str
     sensor: RecordedSensor
-    told: Told
+    told: SessionConditions
     earlier: Sequence[RunData] = ()
     wait: Callable[[float], None] = time.sleep
     _segmenter: Segmenter = field(init=False)
@@ -82,7 +82,7 @@ class HandSession:
     _bias_doubted: bool = False  # at the rest before, in which the item may have crept
     _reminded: bool = False
     _asked: HandAsked | None = None
-    _progress: Progress | None = None
+    _progress: SessionProgress | None = None
 
     def __post_init__(self) -> None:
         if not self.earlier:
@@ -142,8 +142,8 @@ class HandSession:
             move = None  # it was somewhere while nobody listened
         self._pauses_before(rest)
         session = self._not_counted.without(self._segmenter.handled)
-        now = self._progress = progress(session, self.told)
-        wrong = now.asked or self._not_closed(now)
+        now = self._progress = assess_progress(session, self.told)
+        wrong = now.fault_of_last or self._not_closed(now)
         read = now.faces[-1] if now.faces else None
         if read is None:
             wrong = wrong or Fault("not_flat", "it lies on none of its six sides", "Lay it down on a side, and let go")
@@ -169,7 +169,7 @@ class HandSession:
                 self.note(event)
         self._judged_s = rest.end_s
 
-    def _not_closed(self, now: Progress) -> Fault | None:
+    def _not_closed(self, now: SessionProgress) -> Fault | None:
         """What is wrong with a turn that was to be whole and ends too far from where it began."""
         if not now.moves or self._asked is None:
             return None
@@ -182,13 +182,13 @@ class HandSession:
         what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
         return Fault("turn_not_closed", what, "Lay it back against the rule, and turn again")
 
-    def _next(self, now: Progress, face: Face | None) -> Instruction | None:
+    def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
         """What is asked next; None once it is enough."""
         wanted = self.settings.wanted_scale_u
         enough = wanted is not None and now.solution is not None and float(max(now.expanded_scale)) <= wanted
         return None if enough else asked_next(self._open, face)
 
-    def _take(self, move: Move, now: Progress, face: Face) -> None:
+    def _take(self, move: Move, now: SessionProgress, face: Face) -> None:
         """A move counts, unless too much time passed in it for it to tell anything."""
         self._refused = 0
         if now.moves[-1].kind == "omitted":

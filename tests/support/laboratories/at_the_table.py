@@ -19,8 +19,8 @@ from rig.data.recording.hand_events import (
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import ByHand
 from rig.estimation.arrays import Array, scale_of
-from rig.estimation.by_hand import HandSolution, Told, solve_by_hand
-from rig.estimation.by_hand.session import Handled
+from rig.estimation.by_hand import HandSolution, SessionConditions, solve_by_hand
+from rig.estimation.by_hand.session import HandRecording
 from rig.observation.by_hand.handled import Segmenter
 from rig.observation.by_hand.runs import NotCounted, range_of, readings_of
 from rig.observation.timebase import NOMINAL_DRIFT
@@ -38,7 +38,7 @@ SENSOR = RecordedSensor("lsm9ds1", "LSM9DS1-HAND", RATE_HZ, CHANNELS)
 MATRIX = np.array([[0.85, 0.003, -0.002], [0.001, 0.865, 0.004], [0.002, -0.001, 0.874]])  # F of m = F ω + c
 OFFSET, NOISE = np.array([0.0077, -0.01, -0.005]), 1.0e-3
 CREEP_RAD_S = np.radians([0.2, -0.15, 0.1])
-TOLD = Told(50.0, "the board's crystal")
+TOLD = SessionConditions(50.0, "the board's crystal")
 LIST = ByHand(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)), closure_rad=float(np.radians(0.3)))
 
 
@@ -73,7 +73,7 @@ class Table:
         self.session.carry_out(lambda: None)
 
     @property
-    def handled(self) -> Handled:
+    def handled(self) -> HandRecording:
         """Its rests and moves, as they are found afterwards, without what was refused."""
         segmenter, not_counted = Segmenter(range_of(SENSOR)), NotCounted()
         segmenter.feed(*readings_of(SENSOR, np.concatenate(self.samples)))
