@@ -16,7 +16,7 @@ from rig.config.load import load
 from rig.config.procedures.procedure_sections import SixSweepsSection
 from rig.data.recording.run_file import read_run
 from rig.plans.motions.six_sweeps import plan_six_observation
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 
 DEMO = Path(__file__).parents[2] / "configs" / "demo.yaml"
 
@@ -41,7 +41,7 @@ def main() -> None:
     planned_s = plan_six_observation(loaded.config.arm, loaded.config.procedure).duration_s
     print(f"planned motions and rests: {planned_s:.1f} s")
     with tempfile.TemporaryDirectory() as folder:
-        for time_scale in (world_section(loaded).time_scale, 1.0):
+        for time_scale in (read_world_section(loaded).time_scale, 1.0):
             wall_s, arm_s = measure(config, time_scale, Path(folder) / f"{time_scale:g}")
             print(
                 f"time_scale {time_scale:g}: command {wall_s:.1f} s, arm {arm_s:.1f} s, {arm_s / planned_s:.3f} of plan"

@@ -17,13 +17,20 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand import HandRecording, SessionConditions, solve_by_hand
 from rig.estimation.by_hand.session import FACES
 from rig.observation.by_hand.handled import handled
-from rig.world.hand.habits import Action, Turn
+from rig.world.hand.habits import Action, TurnAction
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[2]))  # before the tests' folders of the same names
 from support.external.handled_body import TWELVE, handle
 
-SESSION: tuple[Action, ...] = (Turn(-1), TWELVE[0], Turn(-1), TWELVE[1], Turn(-1), *TWELVE[2:])  # on +z, +x and +y
+SESSION: tuple[Action, ...] = (
+    TurnAction(-1),
+    TWELVE[0],
+    TurnAction(-1),
+    TWELVE[1],
+    TurnAction(-1),
+    *TWELVE[2:],
+)  # on +z, +x and +y
 REST_S = 0.9
 GRAVITY_M_S2, PART_NAMES = 9.81, {"+": "p", "-": "a"}
 SESSIONS = 200

@@ -17,8 +17,8 @@ import numpy as np
 from solver_cost import CODE, FIRMWARE, MEANS, RAM, Core, Cost
 
 from firmware_host.protocol import MESSAGE_BY_NAME
-from rig.world.hand.habits import FLIPS, Flip, Habits
-from rig.world.hand.hand import Hand
+from rig.world.hand.habits import FLIPS, FlipAction, Habits
+from rig.world.hand.hand import SimulatedHand
 
 SOURCES = [
     *(FIRMWARE / "core" / "by_hand" / f"hand{part}.c" for part in ("", "_motion", "_solver")),
@@ -44,11 +44,11 @@ def build(folder: Path) -> Path:
 
 def main() -> int:
     """Print what a reading, a block of them, and a move cost."""
-    hand, now_s = Hand(Habits(), 1), 1.5
+    hand, now_s = SimulatedHand(Habits(), 1), 1.5
     for face in FLIPS:
-        now_s = hand.act(Flip(face), now_s) + REST_S
+        now_s = hand.act(FlipAction(face), now_s) + REST_S
     time_s = np.arange(0.0, now_s, 1 / RATE_HZ)
-    felt, rng = hand.felt_at(time_s), np.random.default_rng(1)
+    felt, rng = hand.motion_at(time_s), np.random.default_rng(1)
     noisy = felt.rate_rad_s + NOISE_RAD_S * rng.normal(size=felt.rate_rad_s.shape)
     rates, forces = (
         np.round(each / per).astype(np.int16)

@@ -1,7 +1,7 @@
 """`python -m rig.world CONFIG [--until-eof] [--late FILE]`: the simulated laboratory in the foreground, for any client.
 
-Its first line on stdout is JSON: `ready` and where everything listens. With --until-eof whoever started it reads that
-line, so a refusal is said there too: `ready` false and the `problem`.
+The first line on stdout is JSON: `ready`, and where everything listens. With --until-eof a parent process reads that
+line, so a refusal is reported there too: `ready` is false and `problem` holds the error.
 """
 
 import argparse
@@ -15,11 +15,12 @@ from rig.errors import Refused
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """Run the simulated laboratory until it ends; return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m rig.world", description="The simulated laboratory.")
     parser.add_argument("config", metavar="CONFIG", help="a configuration file with a world: section")
     parser.add_argument("--until-eof", action="store_true", help="ignore Ctrl-C and end when standard input closes")
     parser.add_argument(
-        "--late", type=Path, metavar="FILE", help="where to say what held steps that came late (stderr)"
+        "--late", type=Path, metavar="FILE", help="the file for reports of steps that came late (stderr)"
     )
     options = parser.parse_args(arguments)
     try:

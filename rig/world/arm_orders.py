@@ -1,4 +1,4 @@
-"""The control channel's orders about the simulated arm, by which tests make its controller misbehave."""
+"""The control channel's orders for the simulated arm, with which tests make its controller misbehave."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -13,7 +13,7 @@ Reply = dict[str, Any]
 
 
 class ArmWorld(Protocol):
-    """What of a world an arm's orders reach."""
+    """The parts of a world that an arm's orders act on."""
 
     @property
     def laboratory(self) -> Laboratory: ...
@@ -23,8 +23,8 @@ class ArmWorld(Protocol):
     def set_remote_control(self, on: bool) -> None: ...
 
 
-def arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None]]:
-    """The orders by name."""
+def build_arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None]]:
+    """Return the orders by name, as functions of their JSON arguments."""
     robot = world.laboratory.robot
 
     def claim(first: int, last: int) -> None:
@@ -68,7 +68,7 @@ def arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None]]:
 
 
 def robot_state(robot: Robot) -> Reply:
-    """What a controller is and does."""
+    """Return the controller's state as the control channel reports it."""
     return {
         "q_rad": robot.motion.q_rad,
         "qd_rad_s": robot.motion.qd_rad_s,

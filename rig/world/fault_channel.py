@@ -1,37 +1,38 @@
-"""The control channel: JSON lines by which tests make the world misbehave. The rig never uses it.
+"""The control channel: JSON lines with which tests make the world misbehave. The rig never uses it.
 
 A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s": …, …}` or `{"ok": false, "error": …}`.
 
-    state                                       everything about arm, board and clock
+    state                                       the state of arm, board and clock
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
-    pace time_scale                             how many times as fast as real it may go from now on
+    pace time_scale                             from now on the clock's greatest speed, in multiples of real time
     protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
     pause · play · stop_program · speed_slider fraction · remote_control on · robot_mode name
-    safety_limit fraction                       a limit that slows the arm
-    payload mass_kg · payload_stays on          one that somebody else sets; none is taken that a program sets
-    at_program_start then after_s               another request, carried out so long after the start of every program,
+    safety_limit fraction                       a safety limit that slows the arm down
+    payload mass_kg · payload_stays on          a payload set on the pendant; programs cannot change it
+    at_program_start then after_s               another request, carried out `after_s` after the start of every program,
                                                 as by a fieldbus adapter that is set to stop; null: none
-    step_clock seconds · encoder joint error_rad   the controller's clock is set; a joint's reported angle is off by it
+    step_clock seconds · encoder joint error_rad   a step of the controller's clock; an error of a joint's reported
+    angle
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
-    registers_in_use first last                 all its integers and doubles from one number to another
+    registers_in_use first last                 all integer and double inputs from number `first` to number `last`
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
-    close_dashboard · close_primary             this one of them alone
-    sensor_fault sensor fault   absent, other_part (its identity), damaged (a bit now and then), silent (no data-ready),
-                                stuck (it feels what it felt) or saturated (far more than its range); null: it is well
-    kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
-                                                wire errors, messages lost next, valid bits, BIT's first byte, dead line
+    close_dashboard · close_primary             only this one of the controller's sockets
+    sensor_fault sensor fault   absent, other_part (its identity), damaged (occasional bit errors), silent (no
+                                data-ready), stuck (constant input) or saturated (far beyond its range); null: no fault
+    kvh_fault sensor bit_error_rate lose status test silent   each keeps its value until it is set again:
+                                                bit errors, messages to lose, valid bits, BIT's first byte, dead line
     kvh_power sensor on
     autopilot_fault port lost doubled slowest armed deaf camera silent stolen bit_error_rate host_baud   as above
     autopilot_power port on
     printer_fault sensor bit_error_rate lose stuck silent stolen host_baud   of a device that prints lines, as above
     printer_power sensor on
-    air temperature_c                           the air around the board, from now on, of a laboratory with `thermal`
-    heater                                      which part of the time its pin is up, and how warm the board is
-    mount stage                                 the item, as `world.mounts` says of that stage, from 0
+    air temperature_c                           the air around the board from now on; needs a section `thermal`
+    heater                                      the duty cycle of the heater's pin and the board's temperature
+    mount stage                                 the item, as in `world.mounts` for that stage, counted from 0
     fit part                                    the board of another part of a series, by its serial number
-    instruct say face turns again               what the operator reads, where a hand turns the sensors
-    servo_power on · servo_torque on            the servo's supply; its torque, as another program's write
-    servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   what is given holds; `lose`, `spoil`: replies
+    instruct say face turns again               the instruction for the operator, if a hand turns the sensors
+    servo_power on · servo_torque on            the servo's supply; its torque, as written by another program
+    servo_fault held_fast dumb denies voltage_v temperature_c lose spoil   as above; `lose`, `spoil`: replies
     servo_line silent listen                    a line that carries nothing; its port, that closes
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
@@ -42,20 +43,20 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Protocol
 
-from rig.world.arm_orders import arm_orders, robot_state
+from rig.world.arm_orders import build_arm_orders, robot_state
 from rig.world.board.heat import HeatedBody
 from rig.world.board.serial_line import SerialLine
-from rig.world.clock import Clock
-from rig.world.instruments import Place
+from rig.world.clock import WorldClock
+from rig.world.instruments import InstrumentMount
 from rig.world.laboratory import Laboratory
 from rig.world.on_arm import OnArm
 from rig.world.servo.bench import ServoBench
-from rig.world.servo.drive import Faults
-from rig.world.servo.wire_format import WRITE, Packet
+from rig.world.servo.drive import ServoFaults
+from rig.world.servo.wire_format import WRITE, ServoPacket
 from rig.world.ur10e.faults import AtProgramStart
 
 Reply = dict[str, Any]
-SHOWN = (
+REPORTED_REGISTERS = (
     "Torque Enable",
     "Goal Position",
     "Bus Watchdog",
@@ -63,17 +64,17 @@ SHOWN = (
     "Operating Mode",
     "Profile Velocity",
 )
-FAULTS = tuple(each.name for each in fields(Faults))
+FAULTS = tuple(fault.name for fault in fields(ServoFaults))
 KINDS = ("kvh", "autopilot", "printer")  # of instruments
-OF_LINE = {"bit_error_rate", "silent", "host_baud", "stolen"}
+LINE_FAULTS = {"bit_error_rate", "silent", "host_baud", "stolen"}
 
 
-class World(Protocol):
-    """What can be made to misbehave."""
+class ControlledWorld(Protocol):
+    """The parts of a world that a test can make misbehave."""
 
     laboratory: Laboratory
     line: SerialLine
-    clock: Clock
+    clock: WorldClock
 
     @property
     def instrument_lines(self) -> Mapping[str, SerialLine]: ...
@@ -82,19 +83,19 @@ class World(Protocol):
     def close_arm_port(self, port: int) -> None: ...
     def silence_arm(self, duration_s: float) -> None: ...
     def set_remote_control(self, on: bool) -> None: ...
-    def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None: ...
+    def set_servo_line_fault(self, *, silent: bool = False, listen: bool = True) -> None: ...
     def unplug_board(self) -> None: ...
     def plug_in_board(self) -> None: ...
     def fit_part(self, part: str) -> None: ...
 
 
 class ControlSession:
-    """One client of the control channel."""
+    """The connection of one client to the control channel."""
 
     closing = False
     dialogue = False
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: ControlledWorld) -> None:
         self._world = world
         self._buffer = bytearray()
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
@@ -111,24 +112,24 @@ class ControlSession:
             "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
-            **self._of_what_turns(),
+            **self._motion_orders(),
         }
 
-    def _of_what_turns(self) -> dict[str, Callable[..., Reply | None]]:
-        match self._world.laboratory.turning:
+    def _motion_orders(self) -> dict[str, Callable[..., Reply | None]]:
+        match self._world.laboratory.motion_source:
             case OnArm():
                 return {
-                    **self._of_the_clock(),
-                    "state": self._state_of_the_arm,
-                    "at_program_start": self._at_program_start,
-                    **arm_orders(self._world),
+                    **self._clock_orders(),
+                    "state": self._arm_state,
+                    "at_program_start": self._set_at_program_start,
+                    **build_arm_orders(self._world),
                 }
-            case ServoBench() as bench:  # its driver measures time by the clock on the wall, which nobody holds
-                return self._of_servo(self._world, bench)
+            case ServoBench() as bench:  # its driver measures wall time, so the clock cannot be held
+                return self._servo_orders(self._world, bench)
             case _:
-                return {**self._of_the_clock(), **self._of_the_hand()}
+                return {**self._clock_orders(), **self._hand_orders()}
 
-    def _of_the_clock(self) -> dict[str, Callable[..., Reply | None]]:
+    def _clock_orders(self) -> dict[str, Callable[..., Reply | None]]:
         return {
             "hold": self._hold,
             "run": self._run,
@@ -136,24 +137,24 @@ class ControlSession:
             "pace": lambda time_scale: self._world.clock.pace(float(time_scale)),
         }
 
-    def _of_servo(self, world: World, bench: ServoBench) -> dict[str, Callable[..., Reply | None]]:
-        """What is asked of a servo."""
+    def _servo_orders(self, world: ControlledWorld, bench: ServoBench) -> dict[str, Callable[..., Reply | None]]:
+        """Return the orders for a servo, by name."""
         servo, now_s = bench.servo, bench.now_s
         return {
             "state": lambda: {
                 "angle_rad": servo.angle_at(now_s()),
                 "rate_rad_s": servo.rate_at(now_s()),
-                "registers": {name: servo.memory[name] for name in SHOWN},
+                "registers": {name: servo.memory[name] for name in REPORTED_REGISTERS},
                 "board_powered": world.laboratory.board is not None,
                 "board_baud": world.line.baud,
             },
-            "servo_power": lambda on: servo.switch(bool(on), now_s()),
+            "servo_power": lambda on: servo.switch_supply(bool(on), now_s()),
             "servo_torque": partial(_servo_torque, bench),
             "servo_fault": partial(_servo_fault, bench),
-            "servo_line": world.servo_at_fault,
+            "servo_line": world.set_servo_line_fault,
         }
 
-    def _of_the_hand(self) -> dict[str, Callable[..., Reply | None]]:
+    def _hand_orders(self) -> dict[str, Callable[..., Reply | None]]:
         operator = self._world.laboratory.operator
         return {"instruct": operator.instruct, "state": lambda: operator.state}
 
@@ -189,7 +190,7 @@ class ControlSession:
         self._reply_at = None
         return _line({"ok": True, "time_s": self._world.clock.time_s})
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
     # -- clock -------------------------------------------------------------------------------------------------
@@ -202,7 +203,7 @@ class ControlSession:
     def _advance(self, duration_s: float) -> None:
         self._reply_at = self._world.clock.advance(duration_s)
 
-    def _at_program_start(self, then: Mapping[str, Any] | None, after_s: float = 0.1) -> None:
+    def _set_at_program_start(self, then: Mapping[str, Any] | None, after_s: float = 0.1) -> None:
         faults = self._world.laboratory.robot.faults
         if then is None:
             faults.at_program_start = None
@@ -211,10 +212,10 @@ class ControlSession:
         act = partial(self._orders[request.pop("do")], **request)
         faults.at_program_start = AtProgramStart(act, float(after_s))
 
-    def _state_of_the_arm(self) -> Reply:
+    def _arm_state(self) -> Reply:
         return {
             **robot_state(self._world.laboratory.robot),
-            "held": self._world.clock.held,
+            "held": self._world.clock.is_held,
             "board_powered": self._world.laboratory.board is not None,
             "board_baud": self._world.line.baud,
         }
@@ -222,7 +223,7 @@ class ControlSession:
     # -- heat ----------------------------------------------------------------------------------------------------
     def _body(self) -> HeatedBody:
         if self._world.laboratory.body is None:
-            raise ValueError("nothing is heated here: the world has no section thermal")
+            raise ValueError("this board is not heated: the world has no section thermal")
         return self._world.laboratory.body
 
     def _air(self, temperature_c: float) -> None:
@@ -239,42 +240,42 @@ class ControlSession:
     def _sensor_fault(self, sensor: str, fault: str | None) -> None:
         self._world.laboratory.set_sensor_fault(sensor, fault)
 
-    def _instrument_fault(self, kind: str, *, sensor: str = "", port: str = "", **wrong: Any) -> None:
-        instrument = self._place(kind, sensor or port).instrument
+    def _instrument_fault(self, kind: str, *, sensor: str = "", port: str = "", **faults: Any) -> None:
+        instrument = self._find_mount(kind, sensor or port).instrument
         if instrument is None:
             raise ValueError(f"the {kind} {sensor or port!r} is switched off")
         line = self._world.instrument_lines[sensor or port]
-        for name in wrong.keys() & OF_LINE:
-            setattr(line, name, wrong.pop(name))
-        instrument.misbehave(**wrong)
+        for name in faults.keys() & LINE_FAULTS:
+            setattr(line, name, faults.pop(name))
+        instrument.misbehave(**faults)
 
     def _instrument_power(self, kind: str, on: bool, *, sensor: str = "", port: str = "") -> None:
-        place = self._place(kind, sensor or port)
-        self._world.laboratory.switch_on(sensor or port) if on else place.switch_off()
+        mount = self._find_mount(kind, sensor or port)
+        self._world.laboratory.switch_on(sensor or port) if on else mount.switch_off()
 
-    def _place(self, kind: str, name: str) -> Place:
-        places = {each: place for each, place in self._world.laboratory.instruments.items() if place.kind == kind}
-        if name not in places:
-            raise ValueError(f"no {kind} {name!r}; there are {', '.join(places) or 'none'}")
-        return places[name]
+    def _find_mount(self, kind: str, name: str) -> InstrumentMount:
+        mounts = {key: mount for key, mount in self._world.laboratory.instruments.items() if mount.kind == kind}
+        if name not in mounts:
+            raise ValueError(f"no {kind} {name!r}; there are {', '.join(mounts) or 'none'}")
+        return mounts[name]
 
     def _silence_board(self, on: bool) -> None:
-        """A cable that carries nothing, with its port still there."""
+        """Let the board's cable carry nothing while its port stays open."""
         self._world.line.silent = bool(on)
 
     def _host_baud(self, baud: float | None) -> None:
-        """The host reads and writes at another baud rate than the board: what TCP would not show."""
+        """Let the host read and write at a baud rate other than the board's, which TCP would not show."""
         self._world.line.host_baud = baud
 
 
 def _servo_torque(bench: ServoBench, on: bool) -> None:
     """Switch torque on or off as another program does."""
-    bench.servo.obey(Packet(bench.servo.memory["ID"], WRITE, bytes([64, 0, bool(on)]), True), bench.now_s())
+    bench.servo.obey(ServoPacket(bench.servo.memory["ID"], WRITE, bytes([64, 0, bool(on)]), True), bench.now_s())
 
 
-def _servo_fault(bench: ServoBench, *, lose: int = 0, spoil: int = 0, **given: float) -> None:
-    """Make a servo misbehave. Raises ValueError for what it cannot do."""
-    for name, value in given.items():
+def _servo_fault(bench: ServoBench, *, lose: int = 0, spoil: int = 0, **faults: float) -> None:
+    """Make a servo misbehave. Raise ValueError for a fault that it does not have."""
+    for name, value in faults.items():
         if name not in FAULTS:
             raise ValueError(f"no fault {name!r}; there are {', '.join(FAULTS)}")
         setattr(bench.servo.faults, name, value)

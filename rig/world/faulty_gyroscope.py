@@ -1,4 +1,4 @@
-"""A gyroscope whose electronics do something wrong with its rates: one axis stands still, readings come again."""
+"""Gyroscopes with a fault in their electronics: a frozen axis, repeated readings."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from rig.config.world.faulty import SimulatedFaultySection
 
 
 class FrozenGyroscope:
-    """What is read of a simulated gyroscope, as a `Gyroscope` is read, one axis of which stands still."""
+    """A simulated gyroscope, read as a `Gyroscope` is read, with one axis that freezes."""
 
     def __init__(self, gyroscope: Gyroscope, section: SimulatedFaultySection) -> None:
         self._gyroscope, self._section = gyroscope, section
@@ -28,20 +28,20 @@ class FrozenGyroscope:
 
 
 class Repeats:
-    """Rates of samples as they are sent: now and then the last few of them come again in the place of new ones."""
+    """A source of repeated samples: now and then the last few rates are sent again in place of new ones."""
 
     def __init__(self, section: SimulatedFaultySection, seed: np.random.SeedSequence) -> None:
-        self._begins = section.repeated / section.repeated_length
+        self._start_probability = section.repeated / section.repeated_length
         self._random = np.random.default_rng(seed.spawn(1)[0]) if section.repeated else None
         self._last: deque[Sequence[float]] = deque(maxlen=section.repeated_length)
-        self._again: deque[Sequence[float]] = deque()
+        self._queue: deque[Sequence[float]] = deque()
 
-    def sent(self, rates: Sequence[float]) -> Sequence[float]:
-        """Return the rates (3,) that are sent in the place of the next ones."""
+    def next_rates(self, rates: Sequence[float]) -> Sequence[float]:
+        """Return the rates (3,), rad/s, to send in place of `rates`."""
         if self._random is None:
             return rates
-        if not self._again and len(self._last) == self._last.maxlen and self._random.random() < self._begins:
-            self._again.extend(self._last)
-        sent = self._again.popleft() if self._again else rates
-        self._last.append(sent)
-        return sent
+        if not self._queue and len(self._last) == self._last.maxlen and self._random.random() < self._start_probability:
+            self._queue.extend(self._last)
+        next_rates = self._queue.popleft() if self._queue else rates
+        self._last.append(next_rates)
+        return next_rates

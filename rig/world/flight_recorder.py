@@ -1,7 +1,7 @@
-"""The world's flight recorder: what held a step that came late, written while it is held.
+"""The world's flight recorder: it reports why a step was late, while the step is still held up.
 
-A thread looks ten times a second when the world last came round. It writes the stacks of all threads as soon as a step
-is late, and the loop, once it goes on, for how long it was held and what its processor time says about the cause.
+A thread checks ten times a second when the loop last completed a step. It writes the stacks of all threads as soon as a
+step is late. When the loop goes on, it writes how long the step was held up, and its processor time, which shows why.
 """
 
 import faulthandler
@@ -16,15 +16,16 @@ from pathlib import Path
 from rig.config.files.written_file import open_to_append
 
 LATE_S = 0.5  # wall time
-LOOK_S = 0.1  # between two looks of the thread
-RECORDS = 40  # that are written at most, so that a world that is late for good fills no disk
+LOOK_S = 0.1  # between two checks of the thread
+RECORDS = 40  # at most, so that a world that is always late does not fill the disk
 NS_PER_S = 1e9
 
 
 class FlightRecorder:
-    """Writes to the file `path`, made with the first record and never through a link; to stderr where it is None.
+    """A recorder that writes to the file `path`, or to stderr if that is None.
 
-    `waits_for` says whom the world waits for. A record that cannot be written is lost: nothing waits for it.
+    The file is created with the first record and never through a link. `waits_for` names the clients that the world
+    waits for. A record that cannot be written is lost, because the world must not wait for it.
     """
 
     def __init__(self, path: Path | None, waits_for: Callable[[], str]) -> None:
@@ -32,23 +33,24 @@ class FlightRecorder:
         self._records = 0
         self._writing = threading.Lock()
         self._alive_s = time.monotonic()
-        self._looked_s = self._alive_s
-        self._ran_s, self._starved_s = processor_times()
+        self._checked_s = self._alive_s
+        self._ran_s, self._starved_s = read_processor_times()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="flight recorder", daemon=True)
         self._thread.start()
 
     def alive(self) -> None:
-        """A step has been made, or none is due."""
+        """Note that a step has been made, or that none is due."""
         now_s = time.monotonic()
         late_s, self._alive_s = now_s - self._alive_s, now_s
         if late_s > LATE_S:
             self._account(late_s)
-        if now_s - self._looked_s > LOOK_S:
-            self._looked_s = now_s
-            self._ran_s, self._starved_s = processor_times()
+        if now_s - self._checked_s > LOOK_S:
+            self._checked_s = now_s
+            self._ran_s, self._starved_s = read_processor_times()
 
     def close(self) -> None:
+        """Stop the recorder's thread."""
         self._ended.set()
         self._thread.join()
 
@@ -64,7 +66,7 @@ class FlightRecorder:
         self._write(f"a step is {late_s:.2f} s late; waited for: {self._waits_for()}", stacks=True)
 
     def _account(self, late_s: float) -> None:
-        ran_s, starved_s = processor_times()
+        ran_s, starved_s = read_processor_times()
         ran_s, starved_s = ran_s - self._ran_s, starved_s - self._starved_s
         other_s = max(0.0, late_s - ran_s - starved_s)
         self._write(
@@ -87,8 +89,10 @@ class FlightRecorder:
                 os.close(file)
 
 
-def processor_times() -> tuple[float, float]:
-    """How long this thread has run and has waited for a processor, s; 0 for the latter where proc(5) is not there."""
+def read_processor_times() -> tuple[float, float]:
+    """Return how long this thread has run and has waited for a processor, s. The latter is 0 on systems without
+    proc(5).
+    """
     try:
         ran_ns, starved_ns, _ = Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()
     except (OSError, ValueError):

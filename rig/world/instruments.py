@@ -1,4 +1,4 @@
-"""What the instruments with a port of their own have in common: the laboratory and its sockets know no more of them."""
+"""The interface that all instruments with a port of their own share with the laboratory and its sockets."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -12,22 +12,24 @@ MotionOf = Callable[[SensorTruth], MotionAt]
 FieldOf = Callable[[MountedMagnetometer], MotionAt]
 
 
-class Instrument(Device, Protocol):
-    """What stands at a place while it has power."""
+class SimulatedInstrument(Device, Protocol):
+    """An instrument that has power."""
 
     def advance(self, time_s: float) -> None:
-        """Live until this virtual time, which lies in the laboratory's last tick."""
+        """Simulate until the virtual time `time_s`, which lies in the laboratory's last tick."""
 
     @property
     def misbehave(self) -> Callable[..., None]:
-        """What makes it misbehave: takes its own faults by their names; those that are not given stay as they are."""
+        """A function that sets the instrument's own faults by keyword; faults that are not given keep their value."""
 
 
-class Place(Protocol):
-    """An instrument's place, and what stays there when it is switched off.
+class InstrumentMount(Protocol):
+    """The place of an instrument, with the state that it keeps without power.
 
-    `kind` is the word for it in requests; `pty` says that its port is to be a pseudo-terminal too. Of the bits on its
-    line the share `bit_error_rate` is wrong, to begin with, and the share `stolen` is read by another program.
+    - `kind`: what control requests call it.
+    - `pty`: whether its port is also a pseudo-terminal.
+    - `bit_error_rate`: the fraction of wrong bits on its line, to begin with.
+    - `stolen`: the fraction of its bytes that another program reads, to begin with.
     """
 
     @property
@@ -39,11 +41,11 @@ class Place(Protocol):
     @property
     def stolen(self) -> float: ...
     @property
-    def instrument(self) -> Instrument | None:
-        """What stands there; None without power."""
+    def instrument(self) -> SimulatedInstrument | None:
+        """The instrument; None without power."""
 
     def switch_on(self, motion_of: MotionOf, field_of: FieldOf, time_s: float) -> None:
-        """Give it power at the virtual time `time_s`, if it has none."""
+        """Switch it on at the virtual time `time_s`, s, unless it is on."""
 
     def switch_off(self) -> None:
-        """Take its power away."""
+        """Switch it off."""

@@ -1,4 +1,4 @@
-"""The simulated laboratory without its sockets: what turns, board and sensors on one clock, deterministic."""
+"""The simulated laboratory without its sockets: motion, board and sensors on one clock, deterministic."""
 
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
@@ -12,199 +12,204 @@ from rig.config.models import ArmSection, RigConfig
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.procedures.stage_section import mount_matrix
 from rig.config.world.laboratory import SimulatedPartSection, WorldSection
-from rig.world.autopilot.mounting import autopilot_mounts
-from rig.world.board.flash_file import flash_of
+from rig.world.autopilot.mounting import build_autopilot_mounts
+from rig.world.board.flash_file import open_flash
 from rig.world.board.heat import HeatedBody
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.instruments import Place
-from rig.world.kvh1775.mounting import mounts
-from rig.world.lines.mounting import printer_mounts
-from rig.world.magnetic_field import magnetic_field_of
+from rig.world.instruments import InstrumentMount
+from rig.world.kvh1775.mounting import build_kvh_mounts
+from rig.world.lines.mounting import build_printer_mounts
+from rig.world.magnetic_field import build_magnetic_field
 from rig.world.on_arm import OnArm
 from rig.world.operator import Operator
 from rig.world.servo.bench import ServoBench
-from rig.world.turning import Turning
-from rig.world.ur10e.motion.flange_motion import Felt
+from rig.world.turning import MotionSource
+from rig.world.ur10e.motion.flange_motion import InertialMotion
 from rig.world.ur10e.robot import Robot
 
 
 class Laboratory:
-    """What the world simulates. `step` makes everything 2 ms older.
+    """The simulated laboratory. `step` simulates 2 ms.
 
     The same inputs at the same ticks give the same states and the same bytes from the board.
     """
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
         self._config, self._world = config, world
-        self.turning = _turning(config, world)
+        self.motion_source = _build_motion_source(config, world)
         self.body = None if world.thermal is None else HeatedBody(world.thermal)
-        self._flash = flash_of(world.board.flash_file)
+        self._flash = open_flash(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
-        self._elements: dict[str, SensingElement] = {}  # of the board's sensors that turn with the flange
+        self._elements: dict[str, SensingElement] = {}  # of the board's inertial sensors
         self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
-        self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
+        self._field = build_magnetic_field(world.site, tuple(world.arm.iron.values()))
         self._mount = np.eye(3)  # from the flange's frame to the item's
-        self._laid_in: set[str] = set()  # parts of a series
-        self._mounted = WeakSet[SensorTruth | MountedMagnetometer]()  # all on the item, while it is there
-        # By the sensor's name; an autopilot, which may have several, by its port.
-        self.instruments: Mapping[str, Place] = {
-            **mounts(config, world),
-            **autopilot_mounts(config, world),
-            **printer_mounts(config, world),
+        self._fitted_parts: set[str] = set()  # parts of a series
+        self._sensors_on_item = WeakSet[SensorTruth | MountedMagnetometer]()
+        # By the sensor's name; an autopilot, which may have several sensors, by its port.
+        self.instruments: Mapping[str, InstrumentMount] = {
+            **build_kvh_mounts(config, world),
+            **build_autopilot_mounts(config, world),
+            **build_printer_mounts(config, world),
         }
         self.plug_in()
         for name in self.instruments:
             self.switch_on(name)
 
     def switch_on(self, name: str) -> None:
-        """Give the instrument of that name power, if it has none. Raises KeyError when there is none."""
-        self.instruments[name].switch_on(self._motion_of, self._field_of, self._time_s)
+        """Switch the instrument `name` on, unless it is on. Raise KeyError if there is none of that name."""
+        self.instruments[name].switch_on(self._build_motion, self._build_field, self._time_s)
 
     @property
     def on_arm(self) -> OnArm:
-        """The arm that turns the sensors. Raises TypeError where something else does."""
-        if not isinstance(self.turning, OnArm):
+        """The arm that turns the sensors. Raise TypeError if something else turns them."""
+        if not isinstance(self.motion_source, OnArm):
             raise TypeError("no arm turns the sensors in this laboratory")
-        return self.turning
+        return self.motion_source
 
     @property
     def operator(self) -> Operator:
-        """Whose hand turns the sensors. Raises TypeError where something else does."""
-        if not isinstance(self.turning, Operator):
+        """The operator whose hand turns the sensors. Raise TypeError if something else turns them."""
+        if not isinstance(self.motion_source, Operator):
             raise TypeError("no hand turns the sensors in this laboratory")
-        return self.turning
+        return self.motion_source
 
     @property
     def robot(self) -> Robot:
-        """The arm's controller. Raises TypeError as `on_arm`."""
+        """The arm's controller. Raise TypeError if no arm turns the sensors."""
         return self.on_arm.robot
 
     @property
     def _time_s(self) -> float:
-        return self.turning.time_s
+        return self.motion_source.time_s
 
     def plug_in(self) -> None:
-        """Give the board power, if there is one and it has none."""
+        """Power the board, if there is one without power."""
         if self.board is None and self._config.board is not None:
             time_s = self._time_s
             self._elements = {}
             self._sensors = {
-                **mount_sensors(self._config, self._world, self._element_of, time_s, self.body),
-                **mount_magnetometers(self._config, self._world, self._field_of),
+                **mount_sensors(self._config, self._world, self._build_element, time_s, self.body),
+                **mount_magnetometers(self._config, self._world, self._build_field),
             }
             for name, fault in self._faults.items():
-                self._break(name, fault)
+                self._set_fault(name, fault)
             self.board = power_up(self._world, self._flash, self._sensors.values(), time_s)
 
     def unplug(self) -> None:
-        """Take the board's power away; its flash keeps what it holds."""
+        """Cut the board's power; its flash keeps its content."""
         self.board = None
 
     def fit(self, part: str) -> bool:
-        """Lay the board of another part in, without power yet: a chip of its own, with nothing stored.
+        """Fit the board of another part, still without power: another chip, with nothing stored.
 
-        Returns whether the operator plugs it in: one that was forgotten is not forgotten twice.
+        Return whether the operator plugs it in. An operator forgets this at most once per part.
         """
-        said = self._world.tray.get(part, SimulatedPartSection())
-        unique_id = said.unique_id or sha256(part.encode()).hexdigest()[:24]
+        part_section = self._world.tray.get(part, SimulatedPartSection())
+        unique_id = part_section.unique_id or sha256(part.encode()).hexdigest()[:24]
         board = self._world.board.model_copy(update={"unique_id": unique_id})
         self._world = self._world.model_copy(update={"board": board})
-        self._flash = flash_of(None)
-        forgotten = not said.plugged_in and part not in self._laid_in
-        self._laid_in.add(part)
+        self._flash = open_flash(None)
+        forgotten = not part_section.plugged_in and part not in self._fitted_parts  # only once
+        self._fitted_parts.add(part)
         return not forgotten
 
     def set_sensor_fault(self, name: str, fault: str | None) -> None:
-        """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.
+        """Set or, with None, clear the fault of the sensor called `name` in the configuration. It outlasts a loss of
+        power.
 
-        `fault` is a value of `Fault` or of `ElementFault`. Raises ValueError when there is no such sensor or fault.
+        `fault` is a value of `Fault` or of `ElementFault`. Raise ValueError if there is no such sensor or fault.
         """
         if name not in self._faults:
             raise ValueError(f"no sensor {name!r}; there are {', '.join(self._faults)}")
-        self._break(name, fault)
+        self._set_fault(name, fault)
         self._faults[name] = fault
 
-    def _break(self, name: str, fault: str | None) -> None:
+    def _set_fault(self, name: str, fault: str | None) -> None:
         inside = ElementFault(fault) if fault in list(ElementFault) and name in self._elements else None
         self._sensors[name].fault = None if fault is None or inside else Fault(fault)
         if name in self._elements:
             self._elements[name].set_fault(inside)
 
     def mount(self, stage: int) -> None:
-        """Mount the item as the simulated operator does for that stage, from 0, or leave it where nothing is said."""
+        """Mount the item as the simulated operator does for the stage, counted from 0; keep it if no mount is
+        configured.
+        """
         if stage < len(self._world.mounts):
             self._mount = mount_matrix(self._world.mounts[stage])
-            for each in self._mounted:
-                each.mount_anew(self._mount)
+            for sensor in self._sensors_on_item:
+                sensor.remount(self._mount)
 
-    def _on_the_item(self, sensor: SensorTruth | MountedMagnetometer) -> None:
-        sensor.mount_anew(self._mount)
-        self._mounted.add(sensor)
+    def _mount_on_item(self, sensor: SensorTruth | MountedMagnetometer) -> None:
+        sensor.remount(self._mount)
+        self._sensors_on_item.add(sensor)
 
     def step(self) -> None:
-        """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
+        """Simulate one tick of everything. Raise BoardError if the firmware breaks a rule of the chip."""
         self.turn()
         self.sense()
 
     def turn(self) -> None:
-        """One tick of what turns. While it is `waiting` another may follow before `sense`."""
-        self.turning.step()
+        """Simulate one tick of the motion. While the source is `waiting`, several may precede one `sense`."""
+        self.motion_source.step()
 
     def sense(self) -> None:
-        """Board and instruments live until the end of the last tick. Raises BoardError as `step`."""
+        """Simulate board and instruments until the end of the last tick. Raise BoardError as `step` does."""
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
             self.board.advance(self._time_s)
         if self.body is not None:
             self.body.advance(self._time_s, self.heater_duty, powered=self.board is not None)
-        for place in self.instruments.values():
-            if place.instrument is not None:
-                place.instrument.advance(self._time_s)
+        for mount in self.instruments.values():
+            if mount.instrument is not None:
+                mount.instrument.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:
-        """How long a tick lasts, which is 2 ms by an arm's controller."""
-        return self.turning.tick_s
+        """The duration of a tick, which is 2 ms by an arm controller's clock."""
+        return self.motion_source.tick_s
 
     @property
     def heater_duty(self) -> float:
-        """Which part of the time the pin of the board's heater is up, 0 to 1."""
+        """The duty cycle of the board's heater, 0 to 1."""
         return 0.0 if self.board is None else self.board.heater_duty
 
-    def _element_of(self, name: str, sensor: SensorTruth) -> MotionAt:
-        """What a sensor on the board feels, which can be broken."""
-        return self._elements.setdefault(name, SensingElement(self._motion_of(sensor)))
+    def _build_element(self, name: str, sensor: SensorTruth) -> MotionAt:
+        """Return the motion of a sensor on the board, which can be given a fault."""
+        return self._elements.setdefault(name, SensingElement(self._build_motion(sensor)))
 
-    def _motion_of(self, sensor: SensorTruth) -> MotionAt:
-        """What a sensor on the flange feels at a virtual time inside the last tick."""
-        self._on_the_item(sensor)
-        if self.turning.ideal and not sensor.feels_force:
-            return lambda time_s: sensor.rate(self.turning.rate_at(time_s))
-        last: Felt | None = None
+    def _build_motion(self, sensor: SensorTruth) -> MotionAt:
+        """Return the motion of a sensor on the flange as a function of virtual time inside the last tick."""
+        self._mount_on_item(sensor)
+        if self.motion_source.ideal and not sensor.senses_force:
+            return lambda time_s: sensor.rotate_rate(self.motion_source.rate_at(time_s))
+        last: InertialMotion | None = None
         rows = sensor.rows
         motion: Sequence[float] = ()
 
         def motion_at(time_s: float) -> Sequence[float]:
             nonlocal last, rows, motion
-            felt = self.turning.felt_at(time_s)
-            if felt is not last or rows is not sensor.rows:  # an arm that stands gives the same again
-                last, rows, motion = felt, sensor.rows, sensor.motion(felt)
+            flange = self.motion_source.motion_at(time_s)
+            if flange is not last or rows is not sensor.rows:  # an arm at rest returns the same object
+                last, rows, motion = flange, sensor.rows, sensor.sense(flange)
             return motion
 
         return motion_at
 
-    def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
-        """What a magnetometer on the flange feels at such a time."""
-        self._on_the_item(sensor)
-        return lambda time_s: sensor.feels(self._field, self.turning.frames_at(time_s), time_s)
+    def _build_field(self, sensor: MountedMagnetometer) -> MotionAt:
+        """Return the flux density at a magnetometer on the flange, T, as a function of virtual time inside the last
+        tick.
+        """
+        self._mount_on_item(sensor)
+        return lambda time_s: sensor.sense(self._field, self.motion_source.frames_at(time_s), time_s)
 
 
-def _turning(config: RigConfig, world: WorldSection) -> Turning:
-    """What turns the sensors."""
+def _build_motion_source(config: RigConfig, world: WorldSection) -> MotionSource:
+    """Build the simulation of the configured turner."""
     match config.turner:
         case ArmSection():
             return OnArm(config, world)

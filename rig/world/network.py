@@ -1,4 +1,4 @@
-"""Sockets around sessions: a listener for each port, a connection for each client, one selector for all."""
+"""Sockets around sessions: one listener per port, one connection per client, one selector for all."""
 
 import selectors
 import socket
@@ -13,49 +13,51 @@ from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
-UNPACED = inf  # the lag of a client that nobody waits for
-ALONE_S = 0.3  # wall time after which a client's next question follows from no answer before it
-GATHER_S = 0.002  # wall time for which a gathering wire keeps bytes together while the world has more to do
+UNPACED = inf  # the lag of a client that the world does not wait for
+ALONE_S = 0.3  # wall time after which a client's next question no longer depends on the last answer
+GATHER_S = 0.002  # wall time for which a gathering port collects bytes while more ticks are due
 
 
-class Session(Protocol):
-    """What one client talks to: bytes in, bytes out, and a turn at every tick."""
+class ClientSession(Protocol):
+    """The world's side of one connection: bytes in, bytes out, and a call at every tick."""
 
     @property
     def closing(self) -> bool:
-        """Close the connection once everything has been sent."""
+        """Whether to close the connection once everything has been sent."""
         ...
 
     @property
     def dialogue(self) -> bool:
-        """Whether a client speaks with it by question and answer, each waiting for the one before."""
+        """Whether the client asks questions, each of which depends on the answer before."""
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
     def tick(self) -> bytes: ...
-    def closed(self) -> None: ...
+    def handle_close(self) -> None: ...
 
 
-class Connection:
-    """One accepted client."""
+class ClientConnection:
+    """The connection of one accepted client."""
 
-    def __init__(self, network: "Network", peer: socket.socket, session: Session, listener: "Listener") -> None:
+    def __init__(
+        self, network: "Network", peer: socket.socket, session: ClientSession, listener: "PortListener"
+    ) -> None:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
-        self.due = b""  # what ticks made for this client and its wire does not take yet
+        self.due = b""  # bytes of past ticks that the client's wire cannot take yet
         self._delivered_s = 0.0  # wall time
         self._ticks = 0
-        self._wire = Wire(network.sockets.unread(peer), listener.lag_s, time.monotonic)
-        self._asked_s = time.monotonic()  # or accepted
+        self._wire = Wire(network.sockets.count_unread(peer), listener.lag_s, time.monotonic)
+        self._last_read_s = time.monotonic()
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.wait_s = 0.0  # that the last `deliver` asked for
-        self._watched = 0  # the events the selector looks for
+        self._watched = 0  # the selector's events
 
     @property
     def client(self) -> str:
-        """Who it is, in words."""
+        """The client's address in words."""
         try:
             (host, port), (_, own_port) = self._peer.getpeername(), self._peer.getsockname()
         except OSError:
@@ -73,7 +75,7 @@ class Connection:
             self.read()
 
     def read(self) -> bool:
-        """Take what the client has said, and close when it has hung up; whether there may be more."""
+        """Read what the client has sent, or close if it has hung up. Return whether there may be more."""
         try:
             data = self._peer.recv(65536)
         except BlockingIOError:
@@ -83,22 +85,22 @@ class Connection:
         if not data:
             self.close()
             return False
-        asked_s, self._asked_s = self._asked_s, time.monotonic()
-        if self.session.dialogue and self._asked_s - asked_s < ALONE_S:
+        last_read_s, self._last_read_s = self._last_read_s, time.monotonic()
+        if self.session.dialogue and self._last_read_s - last_read_s < ALONE_S:
             self._network.on_dialogue()
         self.send(self.session.receive(data))
-        if self.session.closing:  # which `send` does not see when there is nothing to say
+        if self.session.closing:  # `send` does not check this if there is nothing to send
             self.watch()
             return False
         return True
 
     def tick(self) -> None:
-        """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
+        """Let the session make its bytes of this tick; `deliver` sends them as soon as the wire is free."""
         self._ticks += 1
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
-        """Send what ticks made, unless `patient` and the client is too far behind: then the wall time to wait."""
+        """Send the bytes of past ticks. If `patient` and the client lags too far, return the wall time to wait, s."""
         if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
@@ -111,34 +113,34 @@ class Connection:
         return wait_s
 
     def send(self, data: bytes) -> None:
-        """Send as much as goes now, keep the rest; whole packages are dropped when the client does not read."""
+        """Send as much as possible now and keep the rest; drop whole packages if the client does not read."""
         if not data or self.listener.silent:
             return
-        self._wire.sent(self._ticks * TICK_S)
+        self._wire.record_send(self._ticks * TICK_S)
         if not self._unsent:
             try:
-                sent = self._peer.send(data)
+                written = self._peer.send(data)
             except BlockingIOError:
-                sent = 0
+                written = 0
             except OSError:
-                return  # it has hung up; reading meets that after what it said before
-            data = data[sent:]
+                return  # it has hung up; `read` notices that after the client's last bytes
+            data = data[written:]
         if data and len(self._unsent) < BACKLOG_BYTES:
             self._unsent += data
         self.watch()
 
     def _flush(self) -> None:
         try:
-            sent = self._peer.send(self._unsent)
+            written = self._peer.send(self._unsent)
         except BlockingIOError:
             return
         except OSError:
-            sent = len(self._unsent)
-        del self._unsent[:sent]
+            written = len(self._unsent)
+        del self._unsent[:written]
         self.watch()
 
     def watch(self) -> None:
-        """Look for what this connection waits for now."""
+        """Register the events that this connection waits for with the selector."""
         if self.session.closing and not self._unsent:
             self.close()
             return
@@ -160,21 +162,21 @@ class Connection:
             if self._watched:
                 self._network.selector.unregister(self._peer)
             self._peer.close()
-            self.session.closed()
+            self.session.handle_close()
 
 
-class Listener:
-    """A port that listens. `limit` bounds the clients at a time: further ones are hung up on at once.
+class PortListener:
+    """A listening port. At most `limit` clients are connected at a time; further ones are hung up on at once.
 
-    A client may be `lag_s` of the world's time behind before the world waits for it. While the world has more to do, a
-    port that `gathers` hands on several ticks' bytes in one go, as a USB adapter does: every packet wakes its reader.
+    A client may lag `lag_s` of virtual time before the world waits for it. While more ticks are due, a port that
+    `gathers` sends the bytes of several ticks together, as a USB adapter does, because every packet wakes its reader.
     """
 
     def __init__(
         self,
         network: "Network",
         address: tuple[str, int],
-        new_session: Callable[[], Session],
+        new_session: Callable[[], ClientSession],
         *,
         limit: int,
         lag_s: float,
@@ -188,11 +190,11 @@ class Listener:
         self.open()
 
     @property
-    def connections(self) -> list[Connection]:
+    def connections(self) -> list[ClientConnection]:
         return [connection for connection in self._network.connections if connection.listener is self]
 
     def open(self) -> None:
-        """Start listening. Raises `Refused` when the address cannot be had."""
+        """Start listening. Raise `Refused` if the address is not available."""
         if self._socket is not None:
             return
         host, port = self._address
@@ -222,17 +224,17 @@ class Listener:
         except OSError:
             return
         for connection in self.connections:
-            while not self.silent and connection.read():  # its end may be known only after this one's beginning
+            while not self.silent and connection.read():  # an old client's end may arrive after the new one
                 pass
         if len(self.connections) >= self._limit:
             peer.close()
             return
-        connection = Connection(self._network, peer, self._new_session(), self)
+        connection = ClientConnection(self._network, peer, self._new_session(), self)
         self._network.connections.append(connection)
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """Let a silent port send and read nothing; the connections stay open."""
+        """Make the port silent or end that. A silent port sends and reads nothing; its connections stay open."""
         self.silent = silent
         for connection in self.connections:
             connection.watch()
@@ -256,48 +258,49 @@ class Network:
 
     def __init__(self, on_dialogue: Callable[[], None]) -> None:
         self.on_dialogue = on_dialogue
-        # select() waits to the microsecond; epoll rounds up to whole milliseconds, which sends packets in bursts
-        # when virtual time runs faster, and a client that keeps only the newest packet then misses some.
+        # select() waits to the microsecond. epoll rounds up to whole milliseconds: when virtual time runs faster,
+        # packets would come in bursts, and a client that keeps only the newest packet would miss some.
         self.selector = selectors.SelectSelector()
         self.sockets = SocketTable()
-        self.listeners: list[Listener] = []
-        self.connections: list[Connection] = []
+        self.listeners: list[PortListener] = []
+        self.connections: list[ClientConnection] = []
 
     def listen(
         self,
         host: str,
         port: int,
-        new_session: Callable[[], Session],
+        new_session: Callable[[], ClientSession],
         *,
         limit: int = 16,
         lag_s: float = UNPACED,
         gathers: bool = False,
-    ) -> Listener:
-        listener = Listener(self, (host, port), new_session, limit=limit, lag_s=lag_s, gathers=gathers)
+    ) -> PortListener:
+        listener = PortListener(self, (host, port), new_session, limit=limit, lag_s=lag_s, gathers=gathers)
         self.listeners.append(listener)
         return listener
 
     def poll(self, timeout_s: float | None) -> None:
-        """Serve whatever the sockets have; wait at most `timeout_s` for the first."""
+        """Serve all sockets with events; wait at most `timeout_s` for the first."""
         for key, events in self.selector.select(timeout_s):
             key.data(events)
 
     def tick(self) -> None:
-        """Give every session its turn."""
+        """Let every session make its bytes of this tick."""
         for connection in tuple(self.connections):
             connection.tick()
 
     def deliver(self, idle: bool = True, patient: bool = True) -> float:
-        """Send what ticks made to every client whose wire is free; the wall time to wait for the others.
+        """Send the bytes of past ticks to every client whose wire is free. Return the wall time to wait for the others,
+        s.
 
-        A tick is over when this returns 0. `idle`: the next one is not due yet, so that nothing is gathered any longer.
-        `patient`: clients that are behind are waited for, as no real controller and no real board does.
+        A tick is over when this returns 0. `idle`: the next tick is not due yet, so nothing needs to be gathered.
+        `patient`: wait for clients that lag, as no real controller and no real board does.
         """
         due = [connection for connection in self.connections if connection.due]
         return max([connection.deliver(idle, patient) for connection in due], default=0.0)
 
-    def waited_for(self) -> str:
-        """The clients that are behind, in words; any thread may ask."""
+    def describe_lagging_clients(self) -> str:
+        """Describe the clients that lag, in words. Any thread may call this."""
         behind = [connection.client for connection in tuple(self.connections) if connection.wait_s > 0.0]
         return ", ".join(behind) or "no client"
 

@@ -21,12 +21,12 @@ from rig.config.models import ArmSection, RigConfig, TurnerSection
 from rig.config.world.laboratory import SimulatedArmSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
-from rig.world.clock import PATIENCE_S, Clock
+from rig.world.clock import PATIENCE_S, WorldClock
 from rig.world.fault_channel import KINDS, ControlSession
 from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
-from rig.world.network import UNPACED, Listener, Network, Session
-from rig.world.section import world_section
+from rig.world.network import UNPACED, ClientSession, Network, PortListener
+from rig.world.section import read_world_section
 from rig.world.servo.bench import BEHIND_S, ServoBench
 from rig.world.ur10e.interfaces import dashboard_server, primary, robot_api, rtde, script_socket
 from rig.world.ur10e.robot import Robot
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
-BUSY_POLL_S = 0.001  # wall time for which the sockets are not looked at while ticks are due one after the other
-# Objects made and not yet gone, between two looks for those that hold each other: ten clients leave so many.
+BUSY_POLL_S = 0.001  # wall time between two polls of the sockets while ticks are due one after the other
+# The threshold of Python's cyclic garbage collection: about the number of objects that ten clients leave behind.
 GARBAGE = 5_000
-LEAP = 4  # ticks at most that are made in one go: a packet's interval at 125 Hz
-ARM_LAG_S = 0.04  # of the world's time, that a reader of the arm's states may be behind: five packets at 125 Hz
-SERIAL_LAG_S = 1.0  # … and a reader of the serial line, where nothing is lost that the system can hold
-ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], float]] = {
+LEAP = 4  # at most so many ticks in one go: a packet's interval at 125 Hz
+ARM_LAG_S = 0.04  # virtual time by which a reader of the arm's states may lag: five packets at 125 Hz
+SERIAL_LAG_S = 1.0  # … and a reader of a serial line, where the system buffers the bytes
+ARM_PORTS: dict[int, tuple[Callable[[Robot], ClientSession], float]] = {
     dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED),
     script_socket.PRIMARY_PORT: (primary.PrimarySession, UNPACED),
     script_socket.SECONDARY_PORT: (primary.PrimarySession, UNPACED),
@@ -56,24 +56,24 @@ class World:
     """Laboratory, clock and sockets."""
 
     def __init__(self, loaded: Loaded) -> None:
-        section = world_section(loaded)
+        section = read_world_section(loaded)
         self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(lambda: self.laboratory.board)
-        places = self.laboratory.instruments
+        mounts = self.laboratory.instruments
         self.instrument_lines = {
-            name: SerialLine(partial(getattr, place, "instrument"), section.seed) for name, place in places.items()
+            name: SerialLine(partial(getattr, mount, "instrument"), section.seed) for name, mount in mounts.items()
         }
         for name, line in self.instrument_lines.items():
-            line.bit_error_rate, line.stolen = places[name].bit_error_rate, places[name].stolen
-        turning = self.laboratory.turning
-        self.servo_line = SerialLine(lambda: turning.bus, section.seed) if isinstance(turning, ServoBench) else None
+            line.bit_error_rate, line.stolen = mounts[name].bit_error_rate, mounts[name].stolen
+        source = self.laboratory.motion_source
+        self.servo_line = SerialLine(lambda: source.bus, section.seed) if isinstance(source, ServoBench) else None
         self.lines = (self.line, *self.instrument_lines.values(), *filter(None, [self.servo_line]))
         patience_s = PATIENCE_S if self.servo_line is None else BEHIND_S
-        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
+        self.clock = WorldClock(section.time_scale, time.monotonic, self.laboratory.tick_s, patience_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
-        self._ended = False
-        host, board = _host_of(loaded.config), loaded.config.board
+        self._is_ended = False
+        host, board = _find_host(loaded.config), loaded.config.board
         try:
             self.arm_listeners = self._listen_as_arm(loaded.config.turner, section)
             self.servo_listener = (
@@ -83,7 +83,7 @@ class World:
             )
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             for name, line in self.instrument_lines.items():
-                self._listen(*_port_of(loaded.config, name), line)
+                self._listen(*_find_port(loaded.config, name), line)
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
@@ -93,7 +93,7 @@ class World:
         ptys = {
             name: _open_pty(line, self.network.selector)
             for name, line in self.instrument_lines.items()
-            if places[name].pty
+            if mounts[name].pty
         }
         self._ptys = [*([pty] if pty else []), *ptys.values()]
         self._description = {
@@ -103,57 +103,57 @@ class World:
             "pty": pty.path if pty else None,
             "kvh_ports": {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None},
             **{
-                f"{kind}_ptys": {name: each.path for name, each in ptys.items() if places[name].kind == kind}
+                f"{kind}_ptys": {name: port.path for name, port in ptys.items() if mounts[name].kind == kind}
                 for kind in KINDS
             },
             "control": f"{host}:{control_port}",
         }
 
     def describe(self) -> str:
-        """The line that says where everything listens."""
+        """Return the line of JSON with the addresses of all ports."""
         return json.dumps(self._description)
 
-    def _listen_as_arm(self, turner: TurnerSection, section: WorldSection) -> list[Listener]:
-        """The ports of the arm's controller, where an arm turns the sensors."""
+    def _listen_as_arm(self, turner: TurnerSection, section: WorldSection) -> list[PortListener]:
+        """Open the ports of the arm's controller, if an arm turns the sensors."""
         if not isinstance(turner, ArmSection):
             return []
         robot = self.laboratory.robot
         listeners = [
             self.network.listen(turner.host, port, partial(new_session, robot), lag_s=lag_s)
             for port, (new_session, lag_s) in ARM_PORTS.items()
-            if port not in _closed_ports(section.arm, robot)
+            if port not in _find_closed_ports(section.arm, robot)
         ]
-        if robot_api.offered(robot):
+        if robot_api.has_robot_api(robot):
             new_session = partial(robot_api.RobotApiSession, robot)
             listeners.append(self.network.listen(turner.host, turner.robot_api_port, new_session))
         return listeners
 
-    def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> Listener:
-        """The far end of a serial line; a client who opens what another has open is hung up on."""
+    def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> PortListener:
+        """Open the port of a serial line. It accepts one client; a second one is hung up on."""
         return self.network.listen(
-            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
+            *_parse_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )
 
-    # -- faults that live in the wires -----------------------------------------------------------------------------
+    # -- faults of the wires ---------------------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
-        """The controller neither sends nor reads for so long (wall time: a client's patience is wall time too)."""
+        """Let the controller neither send nor read for `duration_s` of wall time, which is what clients time out by."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
 
     def close_arm(self, *, listen: bool) -> None:
-        """The controller closes every connection; with `listen` it takes new ones."""
+        """Close every connection of the controller; with `listen` it accepts new ones."""
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
 
     def close_arm_port(self, port: int) -> None:
-        """One of the controller's ports alone closes its connections and takes no new ones."""
+        """Close the connections of one of the controller's ports, which then accepts no new ones."""
         for listener in self.arm_listeners:
             if listener.port == port:
                 listener.close()
 
     def set_remote_control(self, on: bool) -> None:
-        """The pendant is switched to remote or to local control, which closes the connections that took scripts in."""
+        """Switch the pendant to remote or to local control. The latter closes the connections that accepted scripts."""
         robot = self.laboratory.robot
         before, robot.remote_control = robot.local_control, on
         if robot.local_control and not before:
@@ -161,8 +161,8 @@ class World:
                 if listener.port in SCRIPT_PORTS:
                     listener.hang_up()
 
-    def servo_at_fault(self, *, silent: bool = False, listen: bool = True) -> None:
-        """The servo's line carries nothing, or its port is gone."""
+    def set_servo_line_fault(self, *, silent: bool = False, listen: bool = True) -> None:
+        """Make the servo's line silent, or close its port."""
         if self.servo_line is not None and self.servo_listener is not None:
             self.servo_line.silent = bool(silent)
             self.servo_listener.open() if listen else self.servo_listener.close()
@@ -181,21 +181,21 @@ class World:
     def fit_part(self, part: str) -> None:
         """Exchange the board for that of another part, as the simulated operator does."""
         self.unplug_board()
-        gc.collect()  # an emulated board holds itself, and some megabytes: by itself it would stay for several parts
+        gc.collect()  # an emulated board is a reference cycle of some megabytes; free it before the next one
         if self.laboratory.fit(part):
             self.plug_in_board()
 
     # -- the loop ----------------------------------------------------------------------------------------------------
     def end(self) -> None:
-        self._ended = True
+        self._is_ended = True
 
     def run(self, alive: Callable[[], None] = lambda: None) -> None:
-        """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace.
+        """Serve until `end`. A tick ends when its bytes have been delivered to the clients, which set the pace.
 
         `alive` is called after every tick, and whenever none is due.
         """
         polled_s = 0.0
-        while not self._ended:
+        while not self._is_ended:
             wait_s = self.clock.wait_s()
             due = wait_s <= 0.0
             behind_s = self.network.deliver(idle=not due, patient=self.clock.time_scale > 1.0)
@@ -207,23 +207,23 @@ class World:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
-            if due and not behind_s and not self._ended:
+            if due and not behind_s and not self._is_ended:
                 self._tick()
                 alive()
             elif wait_s > 0.0:
                 alive()
 
     def _tick(self) -> None:
-        """One tick; while nothing but a client can let the arm move, all that are due now, `LEAP` at most.
+        """Simulate one tick; or all that are due, at most `LEAP`, while only a client can make the arm move.
 
-        With a board one by one: its core runs as long in any case, and the clients would get their packets in heaps.
-        What sensors feel of an arm that stands they can be asked at the end of all of them: their bytes are the same.
-        Every session has its turn at every tick.
+        With a board it is one at a time: its core takes as long in any case, and clients would get their packets in
+        bursts. The motion of an arm at rest can be sensed once at the end of several ticks, with the same bytes as a
+        result. Every session is called at every tick.
         """
-        for left in reversed(range(LEAP if self.board_listener is None else 1)):
+        for remaining in reversed(range(LEAP if self.board_listener is None else 1)):
             self.clock.count()
             self.laboratory.turn()
-            last = not (left and self.laboratory.turning.waiting and self.clock.wait_s() <= 0.0)
+            last = not (remaining and self.laboratory.motion_source.waiting and self.clock.wait_s() <= 0.0)
             if last:
                 self._sense()
             for line in self.lines:
@@ -238,7 +238,7 @@ class World:
         try:
             self.laboratory.sense()
         except BoardError as error:
-            # The firmware broke a rule of the chip: the board is dead, and its cable with it.
+            # The firmware broke a rule of the chip: the board is dead, and its port with it.
             print(error, file=sys.stderr, flush=True)
             self.unplug_board()
 
@@ -248,37 +248,37 @@ class World:
         self.network.close()
 
 
-def _host_of(config: RigConfig) -> str:
-    """The address of the laboratory: that of what turns, or where a hand does that of the board or a sensor."""
+def _find_host(config: RigConfig) -> str:
+    """Return the laboratory's address: that of the turner, or with a hand that of the board or of a sensor."""
     if config.turner.simulated_at is not None:
         return config.turner.simulated_at
     ports = [("board.port", config.board.port)] if config.board is not None else []
     ports += [sensor.own_port for sensor in config.sensors.values() if sensor.own_port is not None]
-    return _address(*ports[0])[0]
+    return _parse_address(*ports[0])[0]
 
 
-def _port_of(config: RigConfig, name: str) -> tuple[str, str]:
-    """The key of an instrument's port in the configuration, and the port; an autopilot has that for a name."""
+def _find_port(config: RigConfig, name: str) -> tuple[str, str]:
+    """Return an instrument's configuration key and port. An autopilot's name is its port."""
     if name not in config.sensors:
         return "mavlink.port", name
     key, port = config.sensors[name].own_port or ("", "")
     return f"sensors.{name}.{key}", port
 
 
-def _closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:
-    """What the simulated controller does not offer."""
+def _find_closed_ports(arm: SimulatedArmSection, robot: Robot) -> set[int]:
+    """Return the ports that the simulated controller does not offer."""
     closed = set() if arm.dashboard and not robot.is_polyscope_x else {dashboard_server.PORT}
     return closed if arm.primary else closed | {script_socket.PRIMARY_PORT}
 
 
-def _address(key: str, url: str) -> tuple[str, int]:
-    """Host and port of `socket://host:port`. Raises `Refused` for any other port."""
+def _parse_address(key: str, url: str) -> tuple[str, int]:
+    """Return host and port of `socket://host:port`. Raise `Refused` for any other port."""
     parts = urlsplit(url)
     try:
         if parts.scheme == "socket" and parts.hostname and parts.port:
             return parts.hostname, parts.port
     except ValueError:
-        pass  # a port that is no number
+        pass  # the port is not a number
     raise Refused(
         "board_port",
         f"{key} {url!r} is no address to listen on",
@@ -299,24 +299,24 @@ def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
 
 
 def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
-    """Run the world until end of input (`until_eof`) or Ctrl-C. Raises `Refused` when a port cannot be had.
+    """Run the world until end of input (`until_eof`) or Ctrl-C. Raise `Refused` if a port is not available.
 
-    What held steps that came late is written to the file `late`; to stderr where it is None.
+    Reports of late steps are written to the file `late`, or to stderr if that is None.
     """
     world = World(loaded)
     try:
-        # Also where who started us had it ignored. An exception would end nothing inside a call of the emulator's.
-        for each in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(each, lambda *_: world.end())
+        # Set even if the parent process ignores these. An exception would be lost inside a call of the emulator.
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: world.end())
         if until_eof:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-            # A thread, because select() takes no pipe on Windows; it only waits.
+            # A thread, because select() does not accept a pipe on Windows; it only waits.
             threading.Thread(target=_await_end_of_input, args=(world,), daemon=True).start()
-        # What there is now stays: to look it through again and again for garbage would cost a twentieth of the pace.
+        # All objects so far are permanent. To search them for garbage again and again costs 5 % of the pace.
         gc.collect()
         gc.freeze()
         gc.set_threshold(GARBAGE)
-        with closing(FlightRecorder(late, world.network.waited_for)) as recorder:
+        with closing(FlightRecorder(late, world.network.describe_lagging_clients)) as recorder:
             print(world.describe(), flush=True)
             world.run(recorder.alive)
     finally:

@@ -1,4 +1,4 @@
-"""The `world:` section, read by the one program that uses what it says."""
+"""The `world:` section, which only the simulated laboratory reads."""
 
 import yaml
 
@@ -7,10 +7,10 @@ from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
 
 
-def world_section(loaded: Loaded) -> WorldSection:
-    """What a configuration says of the simulated laboratory; a sensor that has no place sits where all do.
+def read_world_section(loaded: Loaded) -> WorldSection:
+    """Return the section of the simulated laboratory. Sensors without a position of their own sit at the turner's.
 
-    Raises `Refused` `no_world` when it says nothing.
+    Raise `Refused` `no_world` if there is no such section.
     """
     if not loaded.simulated:
         raise Refused(
@@ -19,9 +19,9 @@ def world_section(loaded: Loaded) -> WorldSection:
             "Name a file with a world: section, for example configs/demo.yaml",
         )
     world = WorldSection.model_validate(yaml.safe_load(loaded.text)["world"])
-    there = {"offset_mm": tuple(1000 * each for each in loaded.config.turner.extension_m)}
+    default = {"offset_mm": tuple(1000 * length for length in loaded.config.turner.extension_m)}
     sensors = {
-        name: each if "offset_mm" in each.model_fields_set else each.model_copy(update=there)
-        for name, each in world.sensors.items()
+        name: sensor if "offset_mm" in sensor.model_fields_set else sensor.model_copy(update=default)
+        for name, sensor in world.sensors.items()
     }
     return world.model_copy(update={"sensors": sensors})

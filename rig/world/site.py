@@ -1,35 +1,35 @@
-"""Where the laboratory stands: what the base of the arm feels of the Earth, in the base's own axes."""
+"""The laboratory's location: Earth rate and specific force at rest, in the axes of the arm's base."""
 
 from dataclasses import dataclass
 from math import cos, radians, sin
 
 from rig.config.world.laboratory import SiteSection
 
-EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84: against the stars, not the sun
+EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84; sidereal
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
-    """`earth_rate_rad_s`: of the ground; `specific_force_m_s2`: of a body at rest, which is gravity turned upwards."""
+class SiteTruth:
+    """The ground's angular rate (rad/s), and the specific force of a body at rest (m/s²), which is minus gravity."""
 
     earth_rate_rad_s: Vector
     specific_force_m_s2: Vector
 
 
-def site_of(section: SiteSection) -> Site:
-    """The site as its section has it."""
+def build_site(section: SiteSection) -> SiteTruth:
+    """Build the site from its section."""
     rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
     latitude = radians(section.latitude_deg or 0.0)
-    return Site(
-        in_base(section, north=rate * cos(latitude), up=rate * sin(latitude)),
-        in_base(section, up=section.gravity_m_s2),
+    return SiteTruth(
+        rotate_into_base(section, north=rate * cos(latitude), up=rate * sin(latitude)),
+        rotate_into_base(section, up=section.gravity_m_s2),
     )
 
 
-def in_base(section: SiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
-    """A vector turned clockwise by the heading, then tilted about the base's x axis and its new y axis."""
+def rotate_into_base(section: SiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
+    """Return a vector in the base's axes: rotated clockwise by the heading, then tilted about x and the new y axis."""
     heading = radians(section.heading_deg)
     about_x, about_y = (radians(angle) for angle in section.base_tilt_deg)
     x, y, z = north * cos(heading) - west * sin(heading), north * sin(heading) + west * cos(heading), up

@@ -1,49 +1,49 @@
-"""What turns the sensors in the laboratory, as far as they feel it: an arm's flange, or an operator's hand."""
+"""The interface of what turns the sensors in the laboratory: an arm's flange, a servo's shaft, an operator's hand."""
 
 from typing import Protocol
 
 from rig.world.magnetic_field import Frames
-from rig.world.ur10e.motion.flange_motion import Components, Felt
+from rig.world.ur10e.motion.flange_motion import Components, InertialMotion
 
 
-class Turning(Protocol):
+class MotionSource(Protocol):
     """What turns the sensors, tick by tick.
 
-    Times are the world's, inside the last tick or the memory that delayed sensors need.
+    Times are virtual. They lie inside the last tick or inside the memory that delayed sensors need.
     """
 
     @property
     def time_s(self) -> float:
-        """The world's time at the end of the last tick."""
+        """The world's time at the end of the last tick, s."""
         ...
 
     @property
     def tick_s(self) -> float:
-        """How long a tick lasts."""
+        """The duration of a tick, s."""
         ...
 
     @property
     def waiting(self) -> bool:
-        """Whether nothing but a client can let it move."""
+        """Whether only a client can make it move."""
         ...
 
     @property
     def ideal(self) -> bool:
-        """Whether the rate is all that anybody can feel of it."""
+        """Whether angular rate alone describes the sensed motion."""
         ...
 
     def step(self) -> None:
-        """One tick of it."""
+        """Simulate one tick."""
         ...
 
     def rate_at(self, time_s: float) -> Components:
-        """Angular rate of what carries the sensors, in its own frame, rad/s, of what is `ideal`."""
+        """Return the angular rate of the body with the sensors, in its own frame, rad/s, if `ideal`."""
         ...
 
-    def felt_at(self, time_s: float) -> Felt:
-        """All that a body feels that is carried."""
+    def motion_at(self, time_s: float) -> InertialMotion:
+        """Return the inertial motion of the body with the sensors, in its own frame."""
         ...
 
     def frames_at(self, time_s: float) -> Frames:
-        """Rotation (rows) and place (m) of what stands still, and of all that moves, what carries the sensors last."""
+        """Return rotation (rows) and position (m) of every body, the fixed one first, the one with the sensors last."""
         ...

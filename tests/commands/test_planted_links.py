@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from firmware_host.emulator.chip.flash_memory import FlashMemory
-from rig.world.board.flash_file import flash_of
+from rig.world.board.flash_file import open_flash
 from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS
 from support.processes.waiting import PATIENCE_S, alive, wait_for
@@ -88,7 +88,7 @@ def test_a_run_folder_may_be_named_by_a_link_of_one_s_own(run: Path) -> None:
 def test_a_simulated_board_s_flash_is_kept_without_following_a_link(tmp_path: Path, beside: str) -> None:
     (tmp_path / "bench").mkdir()
     target = linked(tmp_path / "bench" / beside)
-    memory: FlashMemory = flash_of(tmp_path / "bench" / "flash.bin")
+    memory: FlashMemory = open_flash(tmp_path / "bench" / "flash.bin")
     changed: Callable[[], None] = memory.on_change
     changed()
     assert target.read_text(encoding="utf-8") == "mine" and (tmp_path / "bench" / "flash.bin").stat().st_size >= 262_144

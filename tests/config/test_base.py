@@ -9,7 +9,7 @@ import yaml
 from rig.config.files.layers import FILES_MAX, merge
 from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.run_folder import ScriptIdentity, new_folder
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.paths import CONFIGS, DEMO
 
 
@@ -62,7 +62,7 @@ def test_the_path_is_relative_to_the_file_that_names_it(folder: Path, monkeypatc
     monkeypatch.chdir("/")
     loaded = load(path)
     assert loaded.config.procedure == load(DEMO, ["procedure.rest_s=7"]).config.procedure
-    assert world_section(loaded) == world_section(load(DEMO))
+    assert read_world_section(loaded) == read_world_section(load(DEMO))
     assert load(written(folder, f"base: {folder / 'stock' / 'demo.yaml'}\n")).config == load(DEMO).config
 
 
@@ -73,7 +73,7 @@ def test_the_text_as_used_stands_alone(folder: Path) -> None:
     shutil.rmtree(folder / "stock")
     again = load(kept)
     assert "base" not in yaml.safe_load(kept.read_text(encoding="utf-8"))
-    assert again.config == loaded.config and world_section(again).seed == 5
+    assert again.config == loaded.config and read_world_section(again).seed == 5
     assert parse(loaded.rig_text).config == loaded.config
 
 

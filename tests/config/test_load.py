@@ -10,7 +10,7 @@ from rig.config.load import ConfigurationRefused, load, parse
 from rig.config.procedures.procedure_sections import SixObservationSection
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.turners.registry import sections
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.paths import CONFIGS
 
 
@@ -197,7 +197,7 @@ def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
 def test_overrides_change_values_and_the_text_that_is_kept() -> None:
     loaded = parse(demo_text(), overrides=["procedure.rest_s=1.5", "world.seed=9"])
     assert isinstance(loaded.config.procedure, SixObservationSection) and loaded.config.procedure.rest_s == 1.5
-    assert world_section(loaded).seed == 9
+    assert read_world_section(loaded).seed == 9
     assert parse(loaded.text).config == loaded.config
 
 

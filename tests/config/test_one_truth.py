@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from rig.config.load import load
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.paths import CONFIGS
 
 # How a part is mounted, filtered and warmed is another matter in every run.
@@ -31,7 +31,7 @@ def simulated() -> list[tuple[str, str, dict[str, Any]]]:
         loaded = load(path)
         if not loaded.simulated:
             continue
-        world = world_section(loaded)
+        world = read_world_section(loaded)
         for name, sensor in loaded.config.sensors.items():
             truth = world.sensors[name].model_dump()
             beside = truth.pop("accelerometer")

@@ -12,11 +12,11 @@ from rig.estimation.by_hand import HandSolution, SessionConditions, assess_progr
 from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.by_hand.handled import Segmenter, handled
 from rig.observation.by_hand.runs import NotCounted
-from rig.world.hand.habits import Action, Face, Flip, Kind, Mistake, Turn
+from rig.world.hand.habits import Action, Face, FlipAction, Mistake, MistakeKind, TurnAction
 from support.external.handled_body import BOTH_WAYS, LSM9DS1, SIX_TURNS, TWELVE, Part, Recorded, creeping, handle
 
 TOLD = SessionConditions(20.0, first_face="+z")
-SESSION = (*TWELVE, Turn(1), Flip("+x"), Turn(1), Flip("+y"), Turn(1))
+SESSION = (*TWELVE, TurnAction(1), FlipAction("+x"), TurnAction(1), FlipAction("+y"), TurnAction(1))
 NOISY = Part(rate_hz=238.0, noise_rad_s=0.035)
 # Actions, part, whether there is an accelerometer, and the largest RMS of scale, right angles, bias.
 SESSIONS = {
@@ -26,7 +26,7 @@ SESSIONS = {
     "both ways on three faces, much noise": (BOTH_WAYS, NOISY, True, (8.5e-4, np.inf, np.inf)),
 }
 # The mistake, at which of the actions, and the names by which it may be refused.
-MISTAKES: dict[Kind, tuple[int, float | None, set[str]]] = {
+MISTAKES: dict[MistakeKind, tuple[int, float | None, set[str]]] = {
     "short": (12, 10.0, {"turn_not_closed"}),
     "two_turns": (12, None, set()),
     "other_way": (12, None, set()),
@@ -65,7 +65,7 @@ def compared(found: HandSolution, recorded: Recorded) -> tuple[Array, Array]:
     return errors, errors / np.sqrt(known)
 
 
-def mistaken(kind: Kind, at: int, size: float | None) -> list[Action]:
+def mistaken(kind: MistakeKind, at: int, size: float | None) -> list[Action]:
     actions = list(SESSION)
     actions[at] = replace(actions[at], mistake=Mistake(kind, size))
     return actions
@@ -75,12 +75,10 @@ def seeds(thorough: bool) -> range:
     return range(20 if thorough else 1)
 
 
-Made = tuple[
-    Recorded, bool, SessionConditions
-]  # what was recorded, whether its accelerometer counts, and what was told
+Made = tuple[Recorded, bool, SessionConditions]  # the bool: whether its accelerometer counts
 
 
-def by_mistake(kind: Kind, at: int, size: float | None = None, *, level: bool = True) -> Callable[[int], Made]:
+def by_mistake(kind: MistakeKind, at: int, size: float | None = None, *, level: bool = True) -> Callable[[int], Made]:
     """The session with one mistake."""
     return lambda seed: (handle(mistaken(kind, at, size), seed), level, TOLD)
 
@@ -103,7 +101,7 @@ def held_each_time(seed: int) -> Made:
 
 def each_turn_short(seed: int) -> Made:
     """Every turn ends a degree before it is whole."""
-    short = [replace(each, mistake=Mistake("short", 1.0)) if isinstance(each, Turn) else each for each in SESSION]
+    short = [replace(each, mistake=Mistake("short", 1.0)) if isinstance(each, TurnAction) else each for each in SESSION]
     return handle(short, seed), True, TOLD
 
 
@@ -158,7 +156,7 @@ SMALLER: dict[str, tuple[Callable[[int], Made], set[str]]] = {
 def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     recorded = handle(TWELVE, 1)
     found = solved(recorded)
-    assert [rest.face for rest in found.rests] == ["+z", *(flip.to for flip in TWELVE if isinstance(flip, Flip))]
+    assert [rest.face for rest in found.rests] == ["+z", *(flip.to for flip in TWELVE if isinstance(flip, FlipAction))]
     errors, over = compared(found, recorded)
     assert (np.abs(over) < 3.5).all() and (np.abs(errors[:3]) < 5e-4).all()
     assert (found.expanded_scale < 6e-4).all()
@@ -196,7 +194,7 @@ def test_uncertainties_are_those_of_many_sessions(
 @pytest.mark.proof
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", MISTAKES)
-def test_a_mistake_is_named_or_within_the_uncertainty(kind: Kind, thorough: bool) -> None:
+def test_a_mistake_is_named_or_within_the_uncertainty(kind: MistakeKind, thorough: bool) -> None:
     at, size, names = MISTAKES[kind]
     found = [refused(handle(mistaken(kind, at, size), seed)) for seed in seeds(thorough)]
     assert {each for each in found if each is not None} <= names, found
@@ -228,7 +226,7 @@ def test_what_is_smaller_is_named_or_within_the_uncertainty(what: str) -> None:
     ("kind", "at", "size", "said"),
     [("crumb", 5, 30.0, "did not lie flat"), ("short", 12, 3.0, "from where it began")],
 )
-def test_one_that_makes_the_uncertainty_larger_is_warned_of(kind: Kind, at: int, size: float, said: str) -> None:
+def test_one_that_makes_the_uncertainty_larger_is_warned_of(kind: MistakeKind, at: int, size: float, said: str) -> None:
     warned = solved(handle(mistaken(kind, at, size), 0)).turned.warnings
     assert any(said in each for each in warned), warned
 
@@ -296,8 +294,8 @@ def test_time_stamps_that_scatter_are_in_the_uncertainty() -> None:
 
 @pytest.mark.slow
 def test_a_session_tells_more_with_every_move_and_names_the_last_one() -> None:
-    wrong = Turn(1, Mistake("short", 5.0))
-    recorded = handle((*TWELVE[:9], Turn(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)
+    wrong = TurnAction(1, Mistake("short", 5.0))
+    recorded = handle((*TWELVE[:9], TurnAction(1), wrong, *TWELVE[9:]), 5, rest_s=1.8)
     feed, refused, known, asked = Segmenter(), NotCounted(), [], []
     for start in range(0, len(recorded.time_s), 12):
         rows = slice(start, start + 12)

@@ -12,7 +12,7 @@ import pytest
 
 import rig as public
 from rig.errors import Refused
-from rig.world.board.flash_file import flash_of
+from rig.world.board.flash_file import open_flash
 from support.laboratories.commands import configuration, rig_here
 from support.paths import RECORDINGS, ROOT
 
@@ -263,5 +263,5 @@ def test_a_configuration_cannot_have_a_file_replaced_that_is_no_boards_flash(tmp
     else:
         os.mkfifo(file)
     with pytest.raises(Refused, match=r"flash_file: .* is no flash that a simulated board left"):
-        flash_of(file)
+        open_flash(file)
     assert target.read_bytes() == bytes(300_000)

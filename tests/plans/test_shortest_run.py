@@ -28,7 +28,7 @@ from rig.plans.registry import installed, sections
 from rig.plans.shortest import plan_of, shortest_run, tried
 from rig.plans.shortest_motions import ARCS_DEG
 from rig.turners import registry as turners
-from rig.world.hand.habits import Action, Flip, Turn
+from rig.world.hand.habits import Action, FlipAction, TurnAction
 from support.external.handled_body import Part, handle
 from support.motions.drawn_servo import KNOWN as OF_DRAWN
 from support.motions.drawn_servo import drawn_servo
@@ -138,7 +138,7 @@ def reached(of: Run, seed: int) -> Reached:
 def reached_by_hand(of: Run, seed: int) -> Reached:
     keys = dict(of.keys)
     asked = listed(Asked(int(keys["flips"]), int(keys["turns"])))
-    actions: list[Action] = [Turn(each.turns) if each.turns else Flip(each.face) for each in asked]
+    actions: list[Action] = [TurnAction(each.turns) if each.turns else FlipAction(each.face) for each in asked]
     part = Part(SAMPLED_HZ, noise_of(of), clock_ppm=20.0)
     told = handle(actions, seed, part, rest_s=1.5)
     session = handled(told.time_s, told.rates, told.acceleration)

@@ -10,7 +10,7 @@ from rig.sensors.mavlink.counting import ImuCounter, LinkCounter
 from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
 from rig.sensors.mavlink.orientations import RIGHT_ANGLES, signed_axes
 from rig.sensors.mavlink.parameters import Parameter, field_of
-from rig.world.autopilot.imu import TURNS, board_turn
+from rig.world.autopilot.imu import TURNS, board_rotation
 
 
 def taken(sequence: list[int], counter: LinkCounter) -> list[int]:
@@ -69,5 +69,5 @@ def test_orientations_are_rotations_and_those_of_the_simulated_autopilot() -> No
         assert matrix is not None and matrix @ matrix.T == pytest.approx(np.eye(3))
         assert np.linalg.det(matrix) == pytest.approx(1.0)
     for number in TURNS:
-        assert signed_axes(float(number)) == pytest.approx(board_turn(number))
+        assert signed_axes(float(number)) == pytest.approx(board_rotation(number))
     assert signed_axes(1.0) is None and signed_axes(100.0) is None and signed_axes(0.5) is None

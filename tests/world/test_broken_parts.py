@@ -4,9 +4,9 @@ import pytest
 
 from rig.config.load import load
 from rig.world.board.sensing_element import ElementFault, SensingElement
-from rig.world.clock import TICK_S, Clock
+from rig.world.clock import TICK_S, WorldClock
 from rig.world.laboratory import Laboratory
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.modes import RuntimeState, SafetyMode
 from support.paths import DEMO
@@ -28,7 +28,7 @@ def test_a_stuck_element_feels_what_it_felt_and_a_saturated_one_far_too_much() -
 
 def test_the_pace_can_change_while_the_world_runs() -> None:
     wall_s = 0.0
-    clock = Clock(8.0, lambda: wall_s)
+    clock = WorldClock(8.0, lambda: wall_s)
     assert clock.wait_s() == pytest.approx(TICK_S / 8)
     clock.pace(1.0)
     assert clock.wait_s() == pytest.approx(TICK_S)
@@ -38,7 +38,7 @@ def test_the_pace_can_change_while_the_world_runs() -> None:
 
 
 def test_a_safeguard_pauses_the_program_and_what_it_paused_goes_on_when_it_is_played() -> None:
-    here = Laboratory(LOADED.config, world_section(LOADED))
+    here = Laboratory(LOADED.config, read_world_section(LOADED))
     here.unplug()
     robot = here.robot
 

@@ -14,12 +14,12 @@ from rig.config.load import load
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.config.world.laboratory import SimulatedSensorSection, WorldSection
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.clock import TICK_S, TICKS_PER_SECOND, Clock
-from rig.world.section import world_section
+from rig.world.clock import TICK_S, TICKS_PER_SECOND, WorldClock
+from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.interfaces.rtde import Output
-from rig.world.ur10e.motion.flange_motion import Felt
+from rig.world.ur10e.motion.flange_motion import InertialMotion
 from rig.world.ur10e.motion.forward_kinematics import flange_rate
 from support.laboratories.ideal import ideal_document
 from support.laboratories.laboratory_host import Host, host
@@ -147,8 +147,8 @@ def test_gravity_is_that_of_where_the_arm_stands_when_nobody_looked_on_the_way()
     one.laboratory.unplug()
     stand(one, TILTED)
     sensor = SensorTruth(SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"}), SIMULATED)
-    felt = one.laboratory.on_arm.arm.felt_at(one.laboratory.robot.time_s)
-    assert sensor.motion(felt)[3:] == pytest.approx(chain(TILTED)[:3, :3].T @ [0, 0, 1], abs=1e-9)
+    felt = one.laboratory.on_arm.arm.motion_at(one.laboratory.robot.time_s)
+    assert sensor.sense(felt)[3:] == pytest.approx(chain(TILTED)[:3, :3].T @ [0, 0, 1], abs=1e-9)
 
 
 def test_a_sensor_off_the_axis_feels_the_turn_push_it_inwards() -> None:
@@ -210,7 +210,7 @@ def test_a_bias_walks_as_its_truth_alone_says() -> None:
     one = laboratory({**walk, "bias_rad_s": [0.01, 0.0, 0.0]}, seed=5)
     simulated = SimulatedSensorSection.model_validate({**walk, "bias_rad_s": [0.01, 0, 0], "noise_rad_s": 0})
     sensor = SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"})
-    still = Felt((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
+    still = InertialMotion((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
     seen = rates(one, 1000)
     times_s = 0.137 + items(one, "time_us") * 1e-6 / (CRYSTAL * 1.000012)  # boot_time_s, crystal_ppm of demo.yaml
     alone = SensorTruth(sensor, simulated).readings(times_s, still, np.random.SeedSequence([5, 0]))
@@ -381,7 +381,7 @@ def test_a_vibration_that_encoders_see_is_felt_when_they_see_it() -> None:
         for _ in range(50):
             one.ticks(1)
             q_rad, qd_rad_s, _ = robot.motion.actual
-            rate, _, _ = arm.felt_at(arm.true_s(robot.time_s))
+            rate, _, _ = arm.motion_at(arm.true_s(robot.time_s))
             assert rate == pytest.approx(flange_rate(q_rad, qd_rad_s), abs=1e-9)
             assert robot.motion.actual_q_rad == q_rad
 
@@ -411,7 +411,7 @@ def test_the_controllers_clock_is_fast_and_the_arm_with_it() -> None:
 
 def test_its_time_passes_faster_on_the_wall_too() -> None:
     now_s = 0.0
-    clock = Clock(1.0, lambda: now_s, laboratory(arm={"clock_ppm": 1000}).laboratory.tick_s)
+    clock = WorldClock(1.0, lambda: now_s, laboratory(arm={"clock_ppm": 1000}).laboratory.tick_s)
     while now_s < 20.0:
         if (wait_s := clock.wait_s()) <= 0.0:
             clock.count()
@@ -437,7 +437,7 @@ def test_left_out_or_written_as_its_default_an_imperfection_is_none() -> None:
     said = []
     for section in (demo, written):
         loaded = load(DEMO, [f"world={json.dumps(section)}"])
-        assert world_section(loaded).arm.unmodelled.encoder_once_rad == 0.0
+        assert read_world_section(loaded).arm.unmodelled.encoder_once_rad == 0.0
         one = host(loaded)
         one.laboratory.robot.motion.move(TILTED, 1.0, 4.0)
         said.append((states(one, 500, "actual_q", "actual_TCP_pose").tobytes(), bytes(one.received)))

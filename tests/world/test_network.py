@@ -27,7 +27,7 @@ class Told:
     def tick(self) -> bytes:
         return b"state"
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         self.ended = True
 
 

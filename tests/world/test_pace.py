@@ -15,7 +15,7 @@ from rig.motion.carried import Carried
 from rig.motion.steps import Transfer, trapezoid_duration
 from rig.turners.ur.driver import Arm
 from rig.world import network
-from rig.world.clock import DIALOGUE_S, TICK_S, Clock
+from rig.world.clock import DIALOGUE_S, TICK_S, WorldClock
 from rig.world.process import ARM_LAG_S
 from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
 from support.laboratories.worlds import World, fresh_host
@@ -52,7 +52,7 @@ class Client:
     def is_sent(self, packets: int) -> None:
         for _ in range(packets):
             self.time_s += PERIOD_S
-            self.wire.sent(self.time_s)
+            self.wire.record_send(self.time_s)
             self.unread += 100
 
     @property
@@ -160,7 +160,7 @@ def test_a_client_that_reads_now_and_then_changes_the_pace_by_less_than_two_perc
 
 def test_the_clock_goes_no_faster_than_a_real_one_while_a_client_asks() -> None:
     wall = Wall()
-    clock = Clock(10.0, wall)
+    clock = WorldClock(10.0, wall)
 
     def ticks_in(duration_s: float) -> int:
         before, end_s = clock.tick, wall.now_s + duration_s
@@ -308,7 +308,7 @@ class Talker:
         self.said += 1
         return bytes([self.said])
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
 

@@ -18,11 +18,11 @@ from rig.config.load import Loaded
 from rig.config.sensors.sensor_sections import mounting_matrix
 from rig.errors import Refused
 from rig.motion.geometry import flange_rate
-from rig.world.board.flash_file import flash_of
-from rig.world.board.mounting import firmware
+from rig.world.board.flash_file import open_flash
+from rig.world.board.mounting import read_firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.laboratories.ideal import ideal
 from support.laboratories.laboratory_host import Host, booted, host
 from support.laboratories.worlds import World, WorldHandle
@@ -75,7 +75,7 @@ def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors()
     one.ticks(TICKS_PER_SECOND)
     nominal = mounting_matrix(loaded.config.sensors["gyro"].mounting) @ flange_rate(motion.q_rad, motion.qd_rad_s)
     seen = np.array([nominal[1], -nominal[0], nominal[2]])  # a quarter turn about the sensor's own z
-    truth = world_section(loaded).sensors["gyro"]
+    truth = read_world_section(loaded).sensors["gyro"]
     expected = seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
     assert one.samples()[-1] * COUNT_RAD_S == pytest.approx(expected, abs=COUNT_RAD_S)
     assert abs(expected).max() > 0.5
@@ -93,7 +93,7 @@ def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
     motion = quiet.laboratory.robot.motion
     flange = np.array(flange_rate(motion.q_rad, motion.qd_rad_s))
     for name, index, count_rad_s in (("gyro", 1, 1 / 131), ("reference", 2, 1 / 40)):
-        truth = world_section(loaded).sensors[name]
+        truth = read_world_section(loaded).sensors[name]
         error = Rotation.from_rotvec(truth.mounting_error_deg, degrees=True).as_matrix()
         seen = error.T @ mounting_matrix(loaded.config.sensors[name].mounting) @ flange
         x, y, z = np.radians(truth.non_orthogonality_deg)
@@ -161,7 +161,7 @@ def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_pro
     give_calibration(booted(kept))
     assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
     data = file.read_bytes()
-    assert data.startswith(firmware("bin"))
+    assert data.startswith(read_firmware("bin"))
     file.write_bytes(data[:8] + bytes(STORE_OFFSET - 8) + data[STORE_OFFSET:])  # another program, long ago
     assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
 
@@ -172,7 +172,7 @@ def test_a_flash_file_keeps_what_a_power_cut_tore(tmp_path: Path) -> None:
     one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0, "range_gauss": 0})
     one.ask("write_calibration", 9, CALIBRATION)
     one.ticks(5)  # the erasing takes eleven
-    again = flash_of(tmp_path / "board.bin")
+    again = open_flash(tmp_path / "board.bin")
     assert len(again.torn) == PAGE_BYTES // DOUBLEWORD_BYTES
     assert stored_scale(booted(kept)) is None
 

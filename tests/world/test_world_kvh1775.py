@@ -8,8 +8,8 @@ import pytest
 from rig.config.world.laboratory import SimulatedSensorSection
 from rig.sensors.kvh1775.messages import MessageReader
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.kvh1775.instrument import Kvh1775
-from rig.world.kvh1775.memory import Memory
+from rig.world.kvh1775.instrument import SimulatedKvh1775
+from rig.world.kvh1775.memory import KvhMemory
 from support.wires.kvh_on_a_wire import STILL, section
 
 PERFECT = SimulatedSensorSection(
@@ -19,9 +19,9 @@ ZEROS = ",".join(["+0.000000E+00"] * 3)
 
 
 def instrument(
-    memory: Memory, motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL, ppm: float = 0.0
-) -> Kvh1775:
-    return Kvh1775(
+    memory: KvhMemory, motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL, ppm: float = 0.0
+) -> SimulatedKvh1775:
+    return SimulatedKvh1775(
         SensorTruth(section("x", acceleration={}), PERFECT),
         motion_at,
         memory,
@@ -33,7 +33,7 @@ def instrument(
     )
 
 
-def said(kvh: Kvh1775, *commands: str) -> list[str]:
+def said(kvh: SimulatedKvh1775, *commands: str) -> list[str]:
     """What it answers in configuration mode."""
     kvh.receive(b"=config,1\n")
     kvh.transmitted()
@@ -58,11 +58,11 @@ def said(kvh: Kvh1775, *commands: str) -> list[str]:
     ],
 )
 def test_commands_and_answers(command: str, answer: str) -> None:
-    assert said(instrument(Memory({})), command) == [answer]
+    assert said(instrument(KvhMemory({})), command) == [answer]
 
 
 def test_settings_outlast_the_supply_and_the_factorys_come_back_but_for_the_baud_rate() -> None:
-    memory = Memory({"BAUD": "115200"})
+    memory = KvhMemory({"BAUD": "115200"})
     said(instrument(memory), "=MSYNC,EXT", "=ROTUNITS,DEG")
     assert said(instrument(memory), "?MSYNC", "?FILTTYPE,G", "?ROTUNITS") == [
         "MSYNC,EXT",
@@ -75,11 +75,11 @@ def test_settings_outlast_the_supply_and_the_factorys_come_back_but_for_the_baud
 
 def test_a_setting_it_does_not_have_cannot_be_left_in_it() -> None:
     with pytest.raises(ValueError, match="DR,123"):
-        Memory({"DR": "123"})
+        KvhMemory({"DR": "123"})
 
 
 def test_it_streams_in_normal_mode_only_and_hears_two_commands_there() -> None:
-    kvh = instrument(Memory({}))
+    kvh = instrument(KvhMemory({}))
     assert MessageReader().feed(kvh.transmitted()).tests[0].passed, "what it says of itself when it is switched on"
     kvh.advance(0.0105)
     assert len(MessageReader().feed(kvh.transmitted()).messages) == 10
@@ -99,7 +99,7 @@ def test_it_streams_in_normal_mode_only_and_hears_two_commands_there() -> None:
 def test_delta_angles_sum_to_the_angle_and_its_own_clock_says_when() -> None:
     """Of a rate that grows, sampled at 10 Hz by a clock that is 1000 ppm fast: a gyroscope of light measures the rate,
     and the instrument sums it over what it takes for seconds."""
-    kvh = instrument(Memory({"DR": "10", "OUTPUTFMT": "B", "ROTUNITS": "DEG"}), lambda t: (t, -t, 0, 0, 0, 1), 1000)
+    kvh = instrument(KvhMemory({"DR": "10", "OUTPUTFMT": "B", "ROTUNITS": "DEG"}), lambda t: (t, -t, 0, 0, 0, 1), 1000)
     kvh.advance(10.0)
     messages = MessageReader().feed(kvh.transmitted()).messages
     time_s = 0.1 * len(messages) / 1.001
@@ -111,7 +111,9 @@ def test_delta_angles_sum_to_the_angle_and_its_own_clock_says_when() -> None:
 
 
 def test_axes_turn_and_scale_rates_and_accelerations() -> None:
-    kvh = instrument(Memory({"AXES": "0,2,0,-1,0,0,0,0,1", "ROTFMT": "RATE"}), lambda t: (0.1, 0.2, 0.3, 0.5, 0.6, 0.7))
+    kvh = instrument(
+        KvhMemory({"AXES": "0,2,0,-1,0,0,0,0,1", "ROTFMT": "RATE"}), lambda t: (0.1, 0.2, 0.3, 0.5, 0.6, 0.7)
+    )
     kvh.advance(0.0011)
     (message,) = MessageReader().feed(kvh.transmitted()).messages
     assert message["rotation"].tolist() == pytest.approx([0.4, -0.1, 0.3])
@@ -120,7 +122,7 @@ def test_axes_turn_and_scale_rates_and_accelerations() -> None:
 
 @pytest.mark.parametrize(("unit", "number"), [("C", 20), ("C_100", 2000), ("F", 68), ("F_100", 6800)])
 def test_the_temperature_has_four_units(unit: str, number: int) -> None:
-    kvh = instrument(Memory({"TEMPUNITS": unit}))
+    kvh = instrument(KvhMemory({"TEMPUNITS": unit}))
     kvh.advance(0.0011)
     (message,) = MessageReader().feed(kvh.transmitted()).messages
     assert message["temperature"] == number

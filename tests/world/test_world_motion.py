@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.motion import geometry as rig_kinematics
-from rig.world.clock import TICK_S, Clock
+from rig.world.clock import TICK_S, WorldClock
 from rig.world.ur10e.motion import forward_kinematics
-from rig.world.ur10e.motion.joint_motion import Motion
-from rig.world.ur10e.motion.ripple import Ripple, ripple
+from rig.world.ur10e.motion.joint_motion import JointMotion
+from rig.world.ur10e.motion.ripple import Ripple, draw_ripple
 from rig.world.ur10e.motion.trajectory import Joints
 
 HOME: Joints = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
@@ -25,7 +25,7 @@ class Player:
 
     def __init__(self, fraction: float = 0.0, start: Joints = HOME) -> None:
         random = Random(7)
-        self.motion = Motion(start, [ripple(fraction, CYCLES, random) for _ in range(6)])
+        self.motion = JointMotion(start, [draw_ripple(fraction, CYCLES, random) for _ in range(6)])
         self.ticks = 0
 
     def tick(self) -> None:
@@ -95,7 +95,7 @@ def test_any_move_ends_exactly_on_target_without_a_jump(
 
 
 def test_the_vibration_has_the_asked_rms_and_adds_nothing_over_a_turn() -> None:
-    shape = ripple(0.05, CYCLES, Random(3))
+    shape = draw_ripple(0.05, CYCLES, Random(3))
     smooth = np.linspace(0.3, 0.3 + 2 * math.pi, 20001)[:-1]
     gains = np.array([shape.gain(u) for u in smooth])
     assert gains.mean() == pytest.approx(1.0, abs=1e-12)
@@ -179,7 +179,7 @@ def test_a_speed_command_holds_its_speed() -> None:
 
 
 def test_encoders_report_whole_steps() -> None:
-    motion = Motion(HOME, [Ripple()] * 6, encoder_step_rad=1e-3)
+    motion = JointMotion(HOME, [Ripple()] * 6, encoder_step_rad=1e-3)
     motion.move(turned(HOME, 5, 1.0), 1.0, 1.4)
     for tick in range(1, 300):
         motion.step(tick * TICK_S)
@@ -213,7 +213,7 @@ class Wall:
 
 def test_virtual_time_never_runs_faster_than_asked_and_never_jumps() -> None:
     wall = Wall()
-    clock = Clock(10.0, wall)
+    clock = WorldClock(10.0, wall)
 
     def play(duration_s: float) -> int:
         """Ticks made in so much wall time, looking every microsecond or so."""
@@ -234,7 +234,7 @@ def test_virtual_time_never_runs_faster_than_asked_and_never_jumps() -> None:
 
 def test_a_held_clock_stands_until_advanced() -> None:
     wall = Wall()
-    clock = Clock(1.0, wall)
+    clock = WorldClock(1.0, wall)
     clock.hold()
     wall.now_s += 5.0
     assert clock.wait_s() == math.inf
@@ -243,7 +243,7 @@ def test_a_held_clock_stands_until_advanced() -> None:
         wall.now_s += TICK_S * 1.001
         assert clock.wait_s() <= 1e-9
         clock.count()
-    assert clock.held
+    assert clock.is_held
     clock.run()
     wall.now_s += TICK_S
     assert clock.wait_s() <= 1e-9

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rig.config.load import load
 from rig.errors import Refused
 from rig.world.laboratory import Laboratory
-from rig.world.network import Session
+from rig.world.network import ClientSession
 from rig.world.process import World
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
 from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.interfaces.rtde import RtdeSession
@@ -23,7 +23,7 @@ from support.paths import DEMO
 from support.wires.damaged_messages import carry_to_world
 
 LOADED = load(DEMO)
-LABORATORY = Laboratory(LOADED.config, world_section(LOADED))
+LABORATORY = Laboratory(LOADED.config, read_world_section(LOADED))
 LABORATORY.unplug()
 
 statements = st.sampled_from(
@@ -53,14 +53,14 @@ statements = st.sampled_from(
 )
 
 
-def play(session: Session, data: bytes) -> None:
+def play(session: ClientSession, data: bytes) -> None:
     """Feed a session and let some time pass."""
     assert isinstance(session.greeting(), bytes)
     assert isinstance(session.receive(data), bytes)
     for _ in range(60):
         LABORATORY.step()
         assert isinstance(session.tick(), bytes)
-    session.closed()
+    session.handle_close()
     robot = LABORATORY.robot
     robot.stop_program("")
     robot.release()
@@ -71,7 +71,7 @@ def play(session: Session, data: bytes) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from([RtdeSession, DashboardSession, PrimarySession]), st.binary(max_size=200))
-def test_noise(new_session: Callable[[Robot], Session], data: bytes) -> None:
+def test_noise(new_session: Callable[[Robot], ClientSession], data: bytes) -> None:
     play(new_session(LABORATORY.robot), data + b"\n")
 
 
@@ -146,7 +146,7 @@ def test_a_client_may_not_ask_for_more_than_there_is() -> None:
     recipe = b"input_int_register_40"
     answers = [rtde.receive(struct.pack(">HB", 3 + len(recipe), ord("I")) + recipe) for _ in range(300)]
     assert answers[254][3] == 255 and answers[255].endswith(b"\0\x04I\0")
-    rtde.closed()
+    rtde.handle_close()
     assert b"no RTDE" in rtde.receive(b"\0\0\0") and rtde.closing
     said = b"".join(dashboard.receive(b"x" * 10_000) for _ in range(7))
     assert said.startswith(b"could not understand: a line of more than") and dashboard.closing

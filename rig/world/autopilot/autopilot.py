@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rig.errors.extras import missing_extra
-from rig.world.autopilot.imu import RATE_HZ, Imu
+from rig.world.autopilot.imu import RATE_HZ, SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -33,7 +33,7 @@ UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 
 @dataclass(slots=True)
-class Faults:
+class AutopilotFaults:
     """What a test can make wrong: fractions of messages `lost` and `doubled`, and of the asked that are sent."""
 
     lost: float = 0.0
@@ -49,7 +49,7 @@ class SimulatedAutopilot:
     def __init__(
         self,
         firmware: str,
-        imus: Sequence[Imu],
+        imus: Sequence[SimulatedImu],
         parameters: Parameters,
         *,
         baud: float,
@@ -76,7 +76,7 @@ class SimulatedAutopilot:
         self._baud, self._first_version = baud, mavlink_version == 1
         self._provides_temperature, self._next_pressure_s = provides_temperature, 0.0
         self._uid, self.armed = bytes.fromhex(uid), armed
-        self.faults = Faults()
+        self.faults = AutopilotFaults()
         self._speed, self._began_s, self._on_for_s = 1.0 + 1e-6 * clock_ppm, time_s, uptime_s
         self._random = Random(f"autopilot {seed}")
         self._sent = bytearray()

@@ -48,7 +48,7 @@ class LowPass:
         return filtered
 
 
-class Imu:
+class SimulatedImu:
     """An IMU, the `place`-th of its autopilot. `step` reads it; `rate` and `force` are what the firmware has of it."""
 
     def __init__(
@@ -82,7 +82,7 @@ class Imu:
 
     def rate_to_send(self) -> list[float]:
         """Return the rate (3,), rad/s, of the next message."""
-        return list(self._repeats.sent(self.rate.tolist()))
+        return list(self._repeats.next_rates(self.rate.tolist()))
 
     def step(self, at_s: float, time_us: int) -> None:
         """Read it once at the virtual time, which is `time_us` by the autopilot's clock."""
@@ -90,7 +90,7 @@ class Imu:
             np.array([self._parameters[name] for name in names]) for names in self._names
         )
         self.temperature_c = self._gyroscope.temperature_c(at_s)
-        turned = board_turn(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
+        turned = board_rotation(self._parameters["SENS_BOARD_ROT" if self._px4 else "AHRS_ORIENTATION"])
         rate = turned @ (np.array(self._gyroscope.read(at_s)) - offset)
         force = turned @ ((np.array(self._accelerometer.read(at_s)) - force_offset) * force_scale)
         if self._px4:
@@ -105,7 +105,7 @@ class Imu:
         self.time_us = time_us
 
 
-def board_turn(number: float) -> Vector:
+def board_rotation(number: float) -> Vector:
     """(3, 3) what an orientation of a few that are known turns readings by. Raises ValueError of another."""
     if int(number) not in TURNS:
         raise ValueError(f"the simulated autopilot has no orientation {number:g}")

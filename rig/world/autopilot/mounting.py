@@ -10,7 +10,7 @@ from rig.config.world.autopilot import SimulatedAutopilotSection
 from rig.config.world.laboratory import WorldSection
 from rig.errors import Refused
 from rig.world.autopilot.autopilot import SimulatedAutopilot
-from rig.world.autopilot.imu import Imu
+from rig.world.autopilot.imu import SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.instruments import FieldOf, MotionOf
@@ -69,7 +69,7 @@ class AutopilotMount:
         """Take its power away."""
         self.instrument = None
 
-    def _imu(self, place: int, motion_of: MotionOf, time_s: float) -> Imu:
+    def _imu(self, place: int, motion_of: MotionOf, time_s: float) -> SimulatedImu:
         name = self.imus.get(place, next(iter(self.imus.values())))
         # It has an accelerometer whether the rig reads it or not.
         truth = SensorTruth(self.config.sensors[name], self.world.sensors[name], time_s, accelerometer=True)
@@ -77,10 +77,10 @@ class AutopilotMount:
         seed = np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(name), *of_another])
         px4 = self.section.firmware == "px4"
         faulty = self.world.sensors[name].faulty
-        return Imu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed, faulty=faulty)
+        return SimulatedImu(place, truth, motion_of(truth), self.parameters, px4=px4, seed=seed, faulty=faulty)
 
 
-def autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, AutopilotMount]:
+def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, AutopilotMount]:
     """Autopilots by port. Raises `Refused` `autopilot_parameters` for a parameter that one does not have."""
     at: dict[str, dict[int, str]] = {}
     for name, sensor in config.sensors.items():

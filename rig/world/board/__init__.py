@@ -1,1 +1,1 @@
-"""The emulated board as the laboratory mounts it, its memory and its serial line."""
+"""The emulated board as the laboratory mounts it: sensors, memory and serial line."""

@@ -1,8 +1,8 @@
-"""The simulated board's flash in a file, so that the next run meets the board this one left behind.
+"""The simulated board's flash in a file, so that the next run meets the board as this one leaves it.
 
-The file holds the 256 KB as the chip shows them, then the offset (u32, little-endian) of every doubleword whose
-writing a power cut tore. Of a file only the last pages count, where the calibrations are: the program is always the
-shipped one. A file that does not begin with a program is none of these and stays as it is.
+The file holds the 256 KB as the chip reads them, then the offset (u32, little-endian) of every doubleword that a power
+cut tore while it was written. Only the last pages of a file are used, those of the calibrations: the program is always
+the shipped one. A file that does not begin with a program is refused and not changed.
 """
 
 import struct
@@ -12,18 +12,18 @@ from firmware_host.emulator.chip.flash_memory import FLASH_BYTES, STORE_OFFSET, 
 from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.config.files.written_file import write_new
 from rig.errors import Refused
-from rig.world.board.mounting import firmware
+from rig.world.board.mounting import read_firmware
 
 LARGEST_BYTES = 2 * FLASH_BYTES  # with an offset for every doubleword
-# Where the chip has them (RM0394, section 2.2): the first two words of a program point to the end of the one, and into
-# the other.
+# The chip's memories (RM0394, section 2.2). A program's first word points to the end of the RAM, its second into the
+# flash.
 RAM, FLASH = range(0x2000_0000, 0x2001_0000), range(0x0800_0000, 0x0804_0000)
 
 
-def flash_of(path: Path | None) -> FlashMemory:
-    """A flash with the shipped program that `path`, if given, keeps up to date. Raises `Refused` for another file."""
+def open_flash(path: Path | None) -> FlashMemory:
+    """Return a flash with the shipped program, saved to `path` if given. Raise `Refused` if the file is not a flash."""
     if path is None:
-        return FlashMemory(firmware("bin"))
+        return FlashMemory(read_firmware("bin"))
     if not path.parent.is_dir():
         raise Refused("flash_file", f"world.board.flash_file {path}: there is no such folder", "Make the folder first")
     try:
@@ -40,15 +40,15 @@ def flash_of(path: Path | None) -> FlashMemory:
             "Name another file, or delete this one",
         ) from error
     torn = frozenset(offset for (offset,) in struct.iter_unpack("<I", data[FLASH_BYTES:]))
-    memory = FlashMemory(firmware("bin"), data[STORE_OFFSET:FLASH_BYTES], torn)
-    memory.on_change = lambda: write_new(  # in one go: whoever reads the file meets the old flash or the new one
+    memory = FlashMemory(read_firmware("bin"), data[STORE_OFFSET:FLASH_BYTES], torn)
+    memory.on_change = lambda: write_new(  # atomic: a reader meets the old flash or the new one
         path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn))
     )
     return memory
 
 
 def _check(data: bytes) -> None:
-    """A foreign configuration may name any file, and what is named is replaced. Raises UnfitFile."""
+    """Raise UnfitFile unless `data` is a flash: a foreign configuration may name any file, which would be replaced."""
     if len(data) < FLASH_BYTES or len(data) % 4:
         raise UnfitFile(f"it has {len(data)} bytes")
     stack, reset = struct.unpack_from("<II", data)

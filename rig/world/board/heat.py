@@ -1,4 +1,4 @@
-"""How warm the simulated board and its parts are: one body, a heater on it, air around it."""
+"""The temperatures of the simulated board and its parts: one body, a heater on it, air around it."""
 
 from math import expm1
 
@@ -8,40 +8,41 @@ from rig.config.world.thermal import SimulatedThermalSection
 
 
 class HeatedPart:
-    """A sensor on the body. `thermometer_c` follows the body; the elements follow the thermometer, and remember.
+    """A sensor on the body. Its thermometer follows the body, its elements follow the thermometer with hysteresis.
 
-    What they remember is a play: `branch` is 1 after warming, -1 after cooling, and between these on the way round.
+    The hysteresis is a play operator: `branch` is 1 after warming, -1 after cooling, and between these during a
+    reversal.
     """
 
     def __init__(self, section: SimulatedThermalSection) -> None:
         self._section = section
-        self._thermometer_c = self._element_c = self._behind_c = section.start_c
+        self._thermometer_c = self._element_c = self._play_c = section.start_c
         self._offset_k = 0.0
 
     def advance(self, body_c: float, heater_w: float, dt_s: float) -> None:
-        """Follow the body for a tick."""
+        """Follow the body for `dt_s`."""
         section = self._section
-        self._thermometer_c += (body_c - self._thermometer_c) * _gone(dt_s, section.thermometer_lag_s)
-        self._element_c += (self._thermometer_c - self._element_c) * _gone(dt_s, section.element_lag_s)
-        self._offset_k += (section.gradient_k_w * heater_w - self._offset_k) * _gone(dt_s, section.element_lag_s)
-        half_k, felt_c = section.hysteresis_k / 2, self._element_c + self._offset_k
-        self._behind_c = min(max(self._behind_c, felt_c - half_k), felt_c + half_k)
+        self._thermometer_c += (body_c - self._thermometer_c) * _settle(dt_s, section.thermometer_lag_s)
+        self._element_c += (self._thermometer_c - self._element_c) * _settle(dt_s, section.element_lag_s)
+        self._offset_k += (section.gradient_k_w * heater_w - self._offset_k) * _settle(dt_s, section.element_lag_s)
+        half_k, input_c = section.hysteresis_k / 2, self._element_c + self._offset_k
+        self._play_c = min(max(self._play_c, input_c - half_k), input_c + half_k)
 
     def thermometer_c(self, _time_s: float) -> float:
-        """What its thermometer reads at a time within the last tick."""
+        """Return the thermometer's reading, °C, at a time within the last tick."""
         return self._thermometer_c
 
     def temperature_c(self, _time_s: float) -> float:
-        """How warm its elements are."""
+        """Return the temperature of the sensing elements, °C."""
         return self._element_c + self._offset_k
 
     def branch(self, time_s: float) -> float:
-        """Branch of its hysteresis on which it is, from -1 to 1."""
-        return (self.temperature_c(time_s) - self._behind_c) / (self._section.hysteresis_k / 2)
+        """Return the branch of the hysteresis, from -1 to 1."""
+        return (self.temperature_c(time_s) - self._play_c) / (self._section.hysteresis_k / 2)
 
 
 class HeatedBody:
-    """The body; `temperature_c` is how warm it is. `air_c` overrides the file's air where a test says so."""
+    """The board as one body at `temperature_c`, °C. A test may set `air_c`, which overrides the configured air."""
 
     def __init__(self, section: SimulatedThermalSection) -> None:
         self._section = section
@@ -51,11 +52,11 @@ class HeatedBody:
         self._parts: dict[str, HeatedPart] = {}
 
     def part(self, name: str) -> HeatedPart:
-        """The part of that name on the body, as warm as it has become."""
+        """Return the part of that name on the body; a new one has the starting temperature."""
         return self._parts.setdefault(name, HeatedPart(self._section))
 
     def advance(self, time_s: float, duty: float, *, powered: bool) -> None:
-        """Live until `time_s` with the heater's pin up for `duty` of the time."""
+        """Simulate until `time_s` with the heater's pin up for the fraction `duty` of the time."""
         section, dt_s = self._section, time_s - self._time_s
         if dt_s <= 0:
             return
@@ -63,7 +64,7 @@ class HeatedBody:
         heater_w = duty * section.heater_w
         power_w = heater_w + (section.own_w if powered else 0.0)
         final_c = self._air_at(time_s) + power_w / section.loss_w_k
-        self.temperature_c += (final_c - self.temperature_c) * _gone(dt_s, section.capacity_j_k / section.loss_w_k)
+        self.temperature_c += (final_c - self.temperature_c) * _settle(dt_s, section.capacity_j_k / section.loss_w_k)
         for part in self._parts.values():
             part.advance(self.temperature_c, heater_w, dt_s)
 
@@ -76,6 +77,6 @@ class HeatedBody:
         return float(np.interp(time_s, times, temperatures))
 
 
-def _gone(dt_s: float, time_constant_s: float) -> float:
-    """Which part of the way to its end something has come that follows exponentially."""
+def _settle(dt_s: float, time_constant_s: float) -> float:
+    """Return the fraction of a step that a first-order lag has covered after `dt_s`."""
     return -expm1(-dt_s / time_constant_s)

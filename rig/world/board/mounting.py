@@ -1,4 +1,4 @@
-"""The emulated board as the laboratory mounts it: the firmware image, and sensors that feel the flange turn."""
+"""The emulated board as the laboratory mounts it: the firmware image, and sensors that move with the flange."""
 
 from collections.abc import Callable, Collection
 from functools import cache, partial
@@ -21,8 +21,8 @@ from rig.world.board.sensor_truth import SensorTruth
 
 
 @cache
-def firmware(suffix: str) -> bytes:
-    """The image that is flashed (`bin`) or the same with its symbols (`elf`)."""
+def read_firmware(suffix: str) -> bytes:
+    """Return the image that is flashed (`bin`), or the same with its symbols (`elf`)."""
     return (resources.files("firmware_host") / "firmware" / "image" / f"rig_l432.{suffix}").read_bytes()
 
 
@@ -33,12 +33,13 @@ def mount_sensors(
     time_s: float,
     body: HeatedBody | None = None,
 ) -> dict[str, SpiDevice]:
-    """The board's sensors of the `world:` section, by name, given power at the virtual time `time_s`.
+    """Return the board's sensors of the `world:` section by name, powered at the virtual time `time_s`.
 
-    `motion_of`: what each of them feels at any time, 3 components or 6. On a `body` they are as warm as that is.
+    `motion_of`: the motion that a sensor senses as a function of time, 3 components or 6. A `body` sets the
+    temperature.
     """
     return {
-        name: _sensor(
+        name: _build_sensor(
             config.sensors[name],
             SensorTruth(config.sensors[name], simulated, time_s, None if body is None else body.part(name)),
             partial(motion_of, name),
@@ -53,7 +54,7 @@ def mount_sensors(
 def mount_magnetometers(
     config: RigConfig, world: WorldSection, field_of: Callable[[MountedMagnetometer], MotionAt]
 ) -> dict[str, SpiDevice]:
-    """The magnetometers of the `world:` section, by name. `field_of`: what each of them feels at any time, T."""
+    """Return the magnetometers of the `world:` section by name. `field_of`: flux density over time, T."""
     mounted = {
         name: MountedMagnetometer(
             config.magnetometers[name].mounting,
@@ -65,23 +66,25 @@ def mount_magnetometers(
     }
     return {
         name: MAGNETOMETERS[config.magnetometers[name].part].register_model(
-            field_of(each), each.truth, seed=np.random.SeedSequence([world.seed, len(world.sensors) + index])
+            field_of(magnetometer),
+            magnetometer.truth,
+            seed=np.random.SeedSequence([world.seed, len(world.sensors) + index]),
         )
-        for index, (name, each) in enumerate(mounted.items())
+        for index, (name, magnetometer) in enumerate(mounted.items())
     }
 
 
 def _extension_mm(config: RigConfig) -> tuple[float, float, float]:
-    """Where the extension ends on which the item sits."""
-    x, y, z = (1000 * each for each in config.turner.extension_m)
+    """Return the end of the turner's extension, on which the item sits, in the flange's frame, mm."""
+    x, y, z = (1000 * length for length in config.turner.extension_m)
     return x, y, z
 
 
 def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:
-    """A board that gets power at the virtual time `time_s` and starts `boot_time_s` later."""
+    """Return a board that is powered at the virtual time `time_s` and starts `boot_time_s` later."""
     return EmulatedBoard(
         flash=flash,
-        elf=firmware("elf"),
+        elf=read_firmware("elf"),
         devices=list(sensors),
         unique_id=bytes.fromhex(world.board.unique_id),
         crystal_ppm=world.board.crystal_ppm,
@@ -90,7 +93,7 @@ def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDev
     )
 
 
-def _sensor(
+def _build_sensor(
     sensor: SensorSection,
     truth: SensorTruth,
     motion_of: Callable[[SensorTruth], MotionAt],
@@ -98,7 +101,7 @@ def _sensor(
     ready_s: float,
 ) -> SpiDevice:
     part = GYROSCOPES[sensor.part]
-    chosen: dict[str, Any] = {"range_deg_s": int(sensor.range_deg_s), "ready_s": ready_s}
+    options: dict[str, Any] = {"range_deg_s": int(sensor.range_deg_s), "ready_s": ready_s}
     return part.register_model(
         motion_of(truth),
         truth.gyro,
@@ -106,5 +109,5 @@ def _sensor(
         seed=seed,
         acceleration=truth.accelerometer,
         oscillator_ppm=truth.data_rate_ppm,
-        **{name: chosen[name] for name in part.told},
+        **{name: options[name] for name in part.told},
     )

@@ -13,11 +13,11 @@ OUTPUT_SPEED = 5  # of the list that tcgetattr returns
 
 
 class PtyPort:
-    """A pseudo-terminal on the serial line. The baud rate its user sets is the host's."""
+    """A pseudo-terminal on the serial line. Its user sets the host's baud rate."""
 
     def __init__(self, line: SerialLine, selector: selectors.BaseSelector) -> None:
         self._line, self._selector = line, selector
-        # Our own hold on the user's side keeps the port there while nobody has it open.
+        # The user's side stays open here, which keeps the port alive while no client has it open.
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -29,11 +29,11 @@ class PtyPort:
 
     def _ready(self, events: int) -> None:
         with suppress(OSError):
-            self._line.to_device(os.read(self._master, 4096), self._baud())
+            self._line.send_to_device(os.read(self._master, 4096), self._baud())
 
     def tick(self) -> None:
-        """Hand on what the device sent; what the user does not read in time is lost, as on a real port."""
-        if self._line.fresh and (data := self._line.to_host(self._baud())):
+        """Write the device's bytes. Bytes that the user does not read in time are lost, as on a real port."""
+        if self._line.fresh and (data := self._line.read_as_host(self._baud())):
             with suppress(BlockingIOError):
                 os.write(self._master, data)
 

@@ -1,4 +1,4 @@
-"""What moves inside a sensor: it feels the flange's motion, or is stuck, or driven far beyond its range."""
+"""The sensing element of a part: it senses the flange's motion, is stuck, or is driven far beyond its range."""
 
 from collections.abc import Callable, Sequence
 from enum import StrEnum
@@ -9,27 +9,27 @@ FAR_BEYOND = 1e3  # rad/s and g: no part has such a range
 
 
 class ElementFault(StrEnum):
-    """What can be wrong with it. Its noise and its electronics are as before."""
+    """Faults of a sensing element. Its noise and its electronics stay as they are."""
 
-    STUCK = "stuck"  # it feels for ever what it felt at first
-    SATURATED = "saturated"  # it feels far more than its range, on every axis
+    STUCK = "stuck"  # the motion when the fault began, for ever
+    SATURATED = "saturated"  # a motion far beyond its range, on every axis
 
 
 class SensingElement:
-    """A part's `motion_at`, made of what it `felt` while nothing was wrong."""
+    """A part's `motion_at`: the true motion `motion_at`, unless a fault is set."""
 
-    def __init__(self, felt: MotionAt) -> None:
-        self._felt = felt
+    def __init__(self, motion_at: MotionAt) -> None:
+        self._motion_at = motion_at
         self._fault: ElementFault | None = None
-        self._held: Sequence[float] | None = None
+        self._faulty_motion: Sequence[float] | None = None
 
     def set_fault(self, fault: ElementFault | None) -> None:
-        self._fault, self._held = fault, None
+        self._fault, self._faulty_motion = fault, None
 
     def __call__(self, time_s: float) -> Sequence[float]:
         if self._fault is None:
-            return self._felt(time_s)
-        if self._held is None:
-            felt = self._felt(time_s)
-            self._held = felt if self._fault is ElementFault.STUCK else (FAR_BEYOND,) * len(felt)
-        return self._held
+            return self._motion_at(time_s)
+        if self._faulty_motion is None:
+            motion = self._motion_at(time_s)
+            self._faulty_motion = motion if self._fault is ElementFault.STUCK else (FAR_BEYOND,) * len(motion)
+        return self._faulty_motion

@@ -1,6 +1,6 @@
-"""How one simulated sensor sits on the flange and what it reads of the flange's motion, with or without a board.
+"""A simulated sensor: its mounting on the flange, and its readings of the flange's motion, with or without a board.
 
-`SensorTruth` is what the emulated sensors are made of. Studies and tests use it alone: `readings` takes arrays.
+The emulated sensors are made of `SensorTruth`. Studies and tests use it alone: `readings` takes arrays.
 """
 
 from collections.abc import Sequence
@@ -14,15 +14,17 @@ from firmware_host.emulator.parts.gyroscope import GyroTruth, Temperature, Warmi
 from rig.config.sensors.sensor_sections import MountingSection, SensorSection, mounting_matrix
 from rig.config.world.laboratory import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.board.heat import HeatedPart
-from rig.world.ur10e.motion.flange_motion import Components, Felt, moved
+from rig.world.ur10e.motion.flange_motion import Components, InertialMotion, transfer_force
 from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:
-    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read nor `accelerometer` said.
+    """A sensor with its true errors, `gyro` and `accelerometer`. The latter is None if nothing reads it.
 
-    `temperature_c`: the die's, of a part that gets power at the time `powered_s`, or as warm as the heated `part` is;
-    `data_rate_ppm`: how much too fast its own oscillator is.
+    - `accelerometer`: simulate it even if the rig does not read it.
+    - `powered_s`: when the part gets power, which starts its warm-up.
+    - `part`: the heated part that sets its temperature, in place of a warm-up.
+    - `data_rate_ppm`: the error of its own oscillator, positive if fast.
     """
 
     def __init__(
@@ -34,11 +36,11 @@ class SensorTruth:
         *,
         accelerometer: bool = False,
     ) -> None:
-        self.gyro = replace(_gyro(simulated), die=part)
+        self.gyro = replace(_build_gyro_truth(simulated), die=part)
         self.accelerometer = (
             None
             if sensor.acceleration is None and not accelerometer
-            else replace(_accelerometer(simulated.accelerometer, simulated.temperature_c), die=part)
+            else replace(_build_accelerometer_truth(simulated.accelerometer, simulated.temperature_c), die=part)
         )
         self.data_rate_ppm = simulated.data_rate_ppm
         self.temperature_c: float | Temperature = simulated.temperature_c
@@ -48,50 +50,50 @@ class SensorTruth:
             self.temperature_c = Warming(
                 simulated.start_temperature_c, simulated.temperature_c, simulated.warm_up_s, powered_s
             )
-        self._sits = np.array(mounted_rows(sensor.mounting, simulated.mounting_error_deg))
-        self._place_m = 1e-3 * np.array(simulated.offset_mm)
-        self.mount_anew(np.eye(3))
+        self._item_rotation = np.array(build_sensor_rotation(sensor.mounting, simulated.mounting_error_deg))
+        self._item_position_m = 1e-3 * np.array(simulated.offset_mm)
+        self.remount(np.eye(3))
 
-    def mount_anew(self, mount: np.ndarray) -> None:
-        """Mount the item the sensor sits on: `mount` (3, 3) takes the flange's frame into the item's."""
-        self._rows: list[list[float]] = (self._sits @ mount).tolist()
-        self._offset_m: list[float] = (mount.T @ self._place_m).tolist()
+    def remount(self, mount: np.ndarray) -> None:
+        """Mount the item with the sensor: `mount` (3, 3) takes the flange's frame into the item's."""
+        self._rows: list[list[float]] = (self._item_rotation @ mount).tolist()
+        self._offset_m: list[float] = (mount.T @ self._item_position_m).tolist()
 
     @property
     def rows(self) -> list[list[float]]:
-        """The rotation from the flange's axes to the sensor's: another list once the item is mounted anew."""
+        """Rotation from the flange's axes to the sensor's (rows); another list object after every remount."""
         return self._rows
 
     @property
-    def feels_force(self) -> bool:
-        """Whether anything it reads depends on the specific force."""
+    def senses_force(self) -> bool:
+        """Whether any reading depends on the specific force."""
         return self.accelerometer is not None or bool(self.gyro.g_sensitivity_rad_s_per_g)
 
-    def rate(self, flange_rate: Components) -> Components:
-        """The flange's rate in the sensor's own axes."""
+    def rotate_rate(self, flange_rate: Components) -> Components:
+        """Return the flange's angular rate in the sensor's axes."""
         (a, b, c), (d, e, f), (g, h, i) = self._rows
         u, v, w = flange_rate
         return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
 
-    def motion(self, flange: Felt) -> Sequence[float]:
-        """What the part feels of what the flange feels: its `motion_at`, 3 components or 6."""
-        rate = self.rate(flange.rate_rad_s)
-        if not self.feels_force:
+    def sense(self, flange: InertialMotion) -> Sequence[float]:
+        """Return the motion that the part senses, rad/s and (with 6 components) g, from the flange's motion."""
+        rate = self.rotate_rate(flange.rate_rad_s)
+        if not self.senses_force:
             return rate
-        force = moved(flange.rate_rad_s, flange.change_rad_s2, flange.force_m_s2, self._offset_m)
-        return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rate(force)))
+        force = transfer_force(flange.rate_rad_s, flange.change_rad_s2, flange.force_m_s2, self._offset_m)
+        return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rotate_rate(force)))
 
-    def readings(self, time_s: np.ndarray, flange: Felt, seed: int | np.random.SeedSequence) -> np.ndarray:
-        """The readings (n, 3) rad/s at times (n,), before rounding to counts. `flange`: arrays (n,) of those times."""
-        columns = [np.broadcast_to(component, time_s.shape) for component in self.motion(flange)]
+    def readings(self, time_s: np.ndarray, flange: InertialMotion, seed: int | np.random.SeedSequence) -> np.ndarray:
+        """Return the readings (n, 3), rad/s, at times (n,), unrounded. `flange`: its motion as arrays (n,)."""
+        columns = [np.broadcast_to(component, time_s.shape) for component in self.sense(flange)]
         return readings(self.gyro, time_s, np.column_stack(columns), seed, self.temperature_c)
 
 
-def mounted_rows(mounting: MountingSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
-    """The rotation from the flange's axes to the sensor's.
+def build_sensor_rotation(mounting: MountingSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
+    """Return the rotation (rows) from the flange's axes to the sensor's.
 
-    The sensor sits as `mounting` says, then turned by the rotation vector `mounting_error_deg` (degrees, in its
-    own nominal axes): a vector's components change by the inverse of that rotation.
+    The sensor sits as `mounting` states, then rotated by the rotation vector `mounting_error_deg` (degrees, in its own
+    nominal axes). A vector's components therefore change by the inverse of that rotation.
     """
     x, y, z = (radians(angle) for angle in mounting_error_deg)
     error = np.array(rotation_from_vector((x, y, z)))
@@ -99,7 +101,7 @@ def mounted_rows(mounting: MountingSection, mounting_error_deg: Sequence[float])
     return rows
 
 
-def _gyro(simulated: SimulatedSensorSection) -> GyroTruth:
+def _build_gyro_truth(simulated: SimulatedSensorSection) -> GyroTruth:
     g_sensitivity = simulated.g_sensitivity_rad_s_per_g
     return GyroTruth(
         scale=simulated.scale,
@@ -123,8 +125,8 @@ def _gyro(simulated: SimulatedSensorSection) -> GyroTruth:
     )
 
 
-def _accelerometer(simulated: SimulatedAccelerometerSection, holds_at_c: float) -> AccelerometerTruth:
-    """The emulated part has its bias to be added to the reading, as that of the gyroscope; TRIAX's is part of it."""
+def _build_accelerometer_truth(simulated: SimulatedAccelerometerSection, holds_at_c: float) -> AccelerometerTruth:
+    """Return the emulated accelerometer's errors. Its bias is added to a reading; TRIAX's is part of the reading."""
     return AccelerometerTruth(
         scale=simulated.scale,
         bias_m_s2=[-bias for bias in simulated.bias_m_s2],

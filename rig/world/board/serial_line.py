@@ -1,54 +1,55 @@
-"""A serial line: bytes between what it comes from and the host, spoilt by unlike baud rates or a bad wire."""
+"""A serial line: bytes between a device and the host, corrupted by unequal baud rates or a bad wire."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
-TOLERANCE = 0.03  # of the baud rate; a receiver still reads ten bits right
+TOLERANCE = 0.03  # relative error of the baud rate at which a receiver still reads ten bits correctly
 
 
 def misread(data: bytes, sent_baud: float, read_baud: float) -> bytes:
-    """What a receiver at `read_baud` makes of `data` sent back to back at `sent_baud` (8 data bits, 1 stop bit)."""
+    """Return the bytes that a receiver at `read_baud` reads of `data` sent back to back at `sent_baud` (8N1)."""
     if abs(sent_baud / read_baud - 1.0) < TOLERANCE:
         return data
     line = [bit for byte in data for bit in (0, *(byte >> i & 1 for i in range(8)), 1)]
-    bit_length = sent_baud / read_baud  # of the receiver's bits, in the sender's
+    bit_length = sent_baud / read_baud  # length of a receiver's bit in the sender's bits
 
     def level(time: float) -> int:
         return line[int(time)] if time < len(line) else 1  # an idle line is high
 
-    seen = bytearray()
+    received = bytearray()
     time = 0.0
     while time < len(line):
         if level(time):
-            time = float(int(time) + 1)  # the next place where the line may fall
+            time = float(int(time) + 1)  # the next possible falling edge
             continue
         if level(time + 0.5 * bit_length) == 0:  # else a glitch shorter than half a bit
-            seen.append(sum(level(time + (1.5 + i) * bit_length) << i for i in range(8)))
+            received.append(sum(level(time + (1.5 + i) * bit_length) << i for i in range(8)))
             time += 9.5 * bit_length
         else:
             time = float(int(time) + 1)
-    return bytes(seen)
+    return bytes(received)
 
 
 class Device(Protocol):
-    """What stands at the far end of a serial line."""
+    """The device at the far end of a serial line."""
 
     @property
     def baud_rate(self) -> float | None:
-        """The device's baud rate; None while it neither sends nor hears."""
+        """The device's baud rate; None while it neither sends nor receives."""
 
     def transmitted(self) -> bytes: ...
     def receive(self, data: bytes) -> None: ...
 
 
 class SerialLine:
-    """A line between a device of the laboratory (None: it has no power) and the host's end.
+    """A line between a device of the laboratory (None: without power) and the host's end.
 
-    `host_baud` is the host's baud rate where the transport does not tell (None: the same as the device's); a `silent`
-    line loses everything both ways; of what the device sends, each bit is wrong with the probability `bit_error_rate`.
-    Another program that has opened the same port takes the rest of what came in a tick with the probability `stolen`.
+    - `host_baud`: the host's baud rate if the transport does not carry it. None: the same as the device's.
+    - `silent`: whether the line loses everything in both directions.
+    - `bit_error_rate`: the probability that a bit from the device is wrong.
+    - `stolen`: the probability that in a tick another program on the same port takes the end of the bytes.
     """
 
     def __init__(self, device: Callable[[], Device | None], seed: int = 0) -> None:
@@ -58,7 +59,7 @@ class SerialLine:
         self.silent = False
         self.bit_error_rate = 0.0
         self.stolen = 0.0
-        self.fresh = b""  # what the device has sent in the last tick, as the line carries it
+        self.fresh = b""  # the device's bytes of the last tick, as the line carries them
 
     @property
     def baud(self) -> float | None:
@@ -75,20 +76,20 @@ class SerialLine:
             bits = np.unpackbits(np.frombuffer(self.fresh, np.uint8))
             self.fresh = np.packbits(bits ^ (self._random.random(len(bits)) < self.bit_error_rate)).tobytes()
 
-    def to_host(self, host_baud: float | None) -> bytes:
-        """What a host at `host_baud` reads in this tick."""
+    def read_as_host(self, host_baud: float | None) -> bytes:
+        """Return the bytes that a host at `host_baud` reads in this tick."""
         if self.silent or not self.fresh:
             return b""
-        wanted, baud = host_baud or self.host_baud, self.baud
-        return misread(self.fresh, baud, wanted) if wanted and baud else self.fresh
+        host_rate, baud = host_baud or self.host_baud, self.baud
+        return misread(self.fresh, baud, host_rate) if host_rate and baud else self.fresh
 
-    def to_device(self, data: bytes, host_baud: float | None) -> None:
-        """A host at `host_baud` sends."""
+    def send_to_device(self, data: bytes, host_baud: float | None) -> None:
+        """Send the bytes of a host at `host_baud`."""
         device, baud = self._device(), self.baud
         if self.silent or device is None or not baud:
             return
-        wanted = host_baud or self.host_baud
-        device.receive(misread(data, wanted, baud) if wanted else data)
+        host_rate = host_baud or self.host_baud
+        device.receive(misread(data, host_rate, baud) if host_rate else data)
 
 
 class SerialSession:
@@ -104,11 +105,11 @@ class SerialSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        self._line.to_device(data, None)
+        self._line.send_to_device(data, None)
         return b""
 
     def tick(self) -> bytes:
-        return self._line.to_host(None)
+        return self._line.read_as_host(None)
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.world.hand.habits import Habits
-from rig.world.hand.rotations import Array, running, turned, vector_of
+from rig.world.hand.rotations import Array, accumulate_rotations, rotation_from_rotvec, rotvec_from_rotation
 
 STEP_S = 1e-3
 PASSES = 4  # of the correction that ends the course where it should end
@@ -19,7 +19,7 @@ KNOCK_S = 0.006
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class HandCourse:
     """Times (n,), rates (n, 3) in body axes, attitudes (n, 3, 3) body to room, specific forces (n, 3) in body axes."""
 
     time_s: Array
@@ -28,65 +28,69 @@ class Course:
     forces: Array
 
 
-def moved(start: Array, end: Array, vector: Array, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
+def simulate_move(
+    start: Array, end: Array, vector: Array, habits: Habits, rng: np.random.Generator
+) -> tuple[Array, Array]:
     """Times from 0 on and rates of a move from `start` to `end` (3, 3), about by `vector` (3,) in body axes."""
     angle = float(np.linalg.norm(vector))
     axis = vector / angle
     grasp_s, rock_s = rng.uniform(*GRASP_S), rng.uniform(*ROCK_S)
-    pushes, until_s = _pushes(angle, grasp_s, habits, rng)
+    pushes, until_s = _draw_pushes(angle, grasp_s, habits, rng)
     time_s = np.arange(0.0, until_s + rock_s + STEP_S, STEP_S)
     along = np.zeros(len(time_s))
     for begins_s, lasting_s, part in pushes:
-        along += part * _raised(time_s, begins_s, lasting_s)
+        along += part * _pulse(time_s, begins_s, lasting_s)
     across = np.linalg.svd(axis[None])[2][1:]  # (2, 3)
     rates = np.outer(along, axis)
-    wobble = np.radians(habits.wobble_deg) * _shaken(time_s, (0.0, until_s), WOBBLE_HZ, rng, 2)
-    tremor = np.radians(habits.tremor_deg) * _shaken(time_s, (0.0, until_s), TREMOR_HZ, rng, 3)
-    rates += wobble @ across + tremor + 1e-3 * habits.rock_mrad * _rocking(time_s, until_s, rock_s, rng) @ across
+    wobble = np.radians(habits.wobble_deg) * _simulate_oscillation(time_s, (0.0, until_s), WOBBLE_HZ, rng, 2)
+    tremor = np.radians(habits.tremor_deg) * _simulate_oscillation(time_s, (0.0, until_s), TREMOR_HZ, rng, 3)
+    rates += (
+        wobble @ across + tremor + 1e-3 * habits.rock_mrad * _simulate_rocking(time_s, until_s, rock_s, rng) @ across
+    )
     rates[0] = rates[-1] = 0.0
     last_s = grasp_s + 0.3 * (until_s - grasp_s)
-    shape = _raised(time_s, last_s, until_s - last_s)[:, None]
+    shape = _pulse(time_s, last_s, until_s - last_s)[:, None]
     for _ in range(PASSES):
-        turned_to = integrated(time_s, rates)
-        missed = turned_to[-1] @ vector_of((start @ turned_to[-1]).T @ end)  # in the axes that stand still
+        turned_to = integrate_rates(time_s, rates)
+        missed = turned_to[-1] @ rotvec_from_rotation((start @ turned_to[-1]).T @ end)  # in the axes that stand still
         rates = rates + shape * (np.swapaxes(turned_to, -1, -2) @ missed)
     return time_s, rates
 
 
-def nudged(vector: Array, lasting_s: float) -> tuple[Array, Array]:
+def simulate_nudge(vector: Array, lasting_s: float) -> tuple[Array, Array]:
     """Times from 0 on and rates of one smooth turn by `vector` (3,)."""
     time_s = np.arange(0.0, lasting_s + STEP_S, STEP_S)
-    return time_s, np.outer(_raised(time_s, 0.0, lasting_s), vector)
+    return time_s, np.outer(_pulse(time_s, 0.0, lasting_s), vector)
 
 
-def in_the_air(lasting_s: float, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
+def simulate_holding(lasting_s: float, habits: Habits, rng: np.random.Generator) -> tuple[Array, Array]:
     """Times from 0 on and rates of a body that is held and not laid down."""
     time_s = np.arange(0.0, lasting_s + STEP_S, STEP_S)
     whole = (0.0, float(time_s[-1]))
-    rates = np.radians(2 * habits.tremor_deg) * _shaken(time_s, whole, TREMOR_HZ, rng, 3)
-    return time_s, rates + np.radians(0.5) * _shaken(time_s, whole, WOBBLE_HZ, rng, 3)
+    rates = np.radians(2 * habits.tremor_deg) * _simulate_oscillation(time_s, whole, TREMOR_HZ, rng, 3)
+    return time_s, rates + np.radians(0.5) * _simulate_oscillation(time_s, whole, WOBBLE_HZ, rng, 3)
 
 
-def course_of(start: Array, time_s: Array, rates: Array, habits: Habits, knock_m_s2: float = 0.0) -> Course:
+def integrate_course(start: Array, time_s: Array, rates: Array, habits: Habits, knock_m_s2: float = 0.0) -> HandCourse:
     """The course from `start` (3, 3) on; a knock is felt at its end."""
-    attitudes = start @ integrated(time_s, rates)
+    attitudes = start @ integrate_rates(time_s, rates)
     arm = np.asarray(habits.lever_arm_m)
     felt = np.swapaxes(attitudes, -1, -2) @ np.array([0.0, 0.0, habits.gravity_m_s2])
     felt += np.cross(np.gradient(rates, time_s, axis=0), arm) + np.cross(rates, np.cross(rates, arm))
     felt[[0, -1]] = attitudes[[0, -1], 2] * habits.gravity_m_s2
     knocked = (time_s > time_s[-1] - 0.1) & (time_s < time_s[-1] - 0.1 + KNOCK_S)
     felt[knocked] += knock_m_s2 * attitudes[knocked, 2]
-    return Course(time_s, rates, attitudes, felt)
+    return HandCourse(time_s, rates, attitudes, felt)
 
 
-def integrated(time_s: Array, rates: Array) -> Array:
+def integrate_rates(time_s: Array, rates: Array) -> Array:
     """Attitudes (n, 3, 3) by rates (n, 3) that are linear between times (n,), to the third order of a step."""
     step = np.diff(time_s)[:, None]
     vectors = 0.5 * step * (rates[1:] + rates[:-1]) + step**2 / 12 * np.cross(rates[:-1], rates[1:])
-    return running(vectors)
+    return accumulate_rotations(vectors)
 
 
-def _pushes(
+def _draw_pushes(
     angle: float, begins_s: float, habits: Habits, rng: np.random.Generator
 ) -> tuple[list[tuple[float, float, float]], float]:
     """Beginning, length and angle of each push, and when the last one has ended."""
@@ -100,13 +104,13 @@ def _pushes(
     return pushes, pushes[-1][0] + pushes[-1][1]
 
 
-def _raised(time_s: Array, begins_s: float, lasting_s: float) -> Array:
+def _pulse(time_s: Array, begins_s: float, lasting_s: float) -> Array:
     """(n,) a raised cosine of area 1."""
     part = np.clip((time_s - begins_s) / lasting_s, 0, 1)
     return np.asarray((1 - np.cos(2 * np.pi * part)) / lasting_s, dtype=np.float64)
 
 
-def _shaken(
+def _simulate_oscillation(
     time_s: Array, window_s: tuple[float, float], band_hz: tuple[float, float], rng: np.random.Generator, ways: int
 ) -> Array:
     """(n, ways) rates of an angle that swings by 1 within a window, and is zero at its ends."""
@@ -117,7 +121,7 @@ def _shaken(
     return np.asarray(np.gradient(angle, time_s, axis=0), dtype=np.float64)
 
 
-def _rocking(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Generator) -> Array:
+def _simulate_rocking(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Generator) -> Array:
     """(n, 2) rates of a body that rocks from edge to edge, less and less."""
     since = time_s - begins_s
     on = (since > 0) & (since < lasting_s)
@@ -128,6 +132,6 @@ def _rocking(time_s: Array, begins_s: float, lasting_s: float, rng: np.random.Ge
     return np.outer(np.gradient(angle, time_s), rng.normal(0, 1, 2))
 
 
-def leant(vector: Array) -> Array:
+def rotate_about_horizontal(vector: Array) -> Array:
     """(3, 3) a small rotation about the horizontal by `vector` (2,), rad."""
-    return turned(np.array([vector[0], vector[1], 0.0]))
+    return rotation_from_rotvec(np.array([vector[0], vector[1], 0.0]))

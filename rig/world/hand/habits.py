@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 Face = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-Kind = Literal[
+MistakeKind = Literal[
     "short", "two_turns", "other_way", "wrong_face", "skipped", "crumb", "table_pushed", "held", "dropped",
     "cable_pulled", "left", "lifted", "too_fast",
 ]  # fmt: skip
 
 FACES: tuple[Face, ...] = ("+x", "-x", "+y", "-y", "+z", "-z")
 FLIPS: tuple[Face, ...] = ("+x", "+y", "-z", "-x", "-y", "+z", "+y", "-x", "-z", "+x", "-y", "+z")
-USUAL: dict[Kind, float] = {
+USUAL: dict[MistakeKind, float] = {
     "short": 2.0,  # °
     "crumb": 5.0,  # mrad
     "table_pushed": 10.0,  # mrad
@@ -40,7 +40,7 @@ class Mistake:
       `too_fast`.
     """
 
-    kind: Kind
+    kind: MistakeKind
     size: float | None = None
 
     @property
@@ -49,7 +49,7 @@ class Mistake:
 
 
 @dataclass(frozen=True, slots=True)
-class Flip:
+class FlipAction:
     """The body is laid on another face: its axis `to` then points upwards."""
 
     to: Face
@@ -57,7 +57,7 @@ class Flip:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class TurnAction:
     """The body is turned on its face by whole `turns`, about its axis that points upwards."""
 
     turns: int
@@ -65,14 +65,14 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
+class WaitAction:
     """The body is left alone."""
 
     seconds: float
     mistake: Mistake | None = None
 
 
-Action = Flip | Turn | Wait
+Action = FlipAction | TurnAction | WaitAction
 
 
 @dataclass(frozen=True, slots=True)

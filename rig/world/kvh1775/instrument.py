@@ -18,7 +18,7 @@ from rig.config.world.faulty import SimulatedFaultySection
 from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.faulty_gyroscope import FrozenGyroscope, Repeats
-from rig.world.kvh1775.memory import Memory
+from rig.world.kvh1775.memory import KvhMemory
 
 INTERNAL_STEP_S = 1e-3  # at most, between two looks at the motion that a delta angle is summed of
 LINE_END = b"\r\n"
@@ -33,7 +33,7 @@ def no_field(time_s: float) -> Sequence[float]:
 
 
 @dataclass(slots=True)
-class Faults:
+class KvhFaults:
     """What a test can make wrong: the next messages to `lose`, `status` bits that are valid, built-in test bytes."""
 
     lose: int = 0
@@ -41,7 +41,7 @@ class Faults:
     test: int = GOOD_TEST_BYTE
 
 
-class Kvh1775:
+class SimulatedKvh1775:
     """The instrument, switched on at the virtual time `time_s`, by when it has counted `uptime_s`.
 
     `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
@@ -52,7 +52,7 @@ class Kvh1775:
         self,
         truth: SensorTruth,
         motion_at: Callable[[float], Sequence[float]],
-        memory: Memory,
+        memory: KvhMemory,
         *,
         field_at: Callable[[float], Sequence[float]] = no_field,
         magnetometer: MagnetometerTruth = PERFECT,
@@ -63,7 +63,7 @@ class Kvh1775:
         time_s: float,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
-        self.faults = Faults()
+        self.faults = KvhFaults()
         self._truth, self._motion_at, self._memory = truth, motion_at, memory
         self._serial_number = serial_number
         self._speed = 1.0 + 1e-6 * oscillator_ppm
@@ -147,7 +147,7 @@ class Kvh1775:
         delta = memory["ROTFMT"] == "DELTA"
         self._felt = [total / self._steps_each for total in self._sum] if delta else cast(Sequence[float], self._before)
         self._sum = [0.0] * 6
-        rotation = np.array(self._repeats.sent(self._gyroscope.read(at_s)))
+        rotation = np.array(self._repeats.next_rates(self._gyroscope.read(at_s)))
         if delta:
             rotation /= float(memory["DR"])
         if memory["ROTUNITS"] == "DEG":

@@ -38,7 +38,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 }
 
 
-class Memory:
+class KvhMemory:
     """The instrument's non-volatile memory, as its user left it: `left` over the factory's settings.
 
     Raises ValueError for a setting the instrument does not have.

@@ -11,12 +11,12 @@ from rig.errors import Refused
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.instruments import FieldOf, MotionOf
-from rig.world.kvh1775.instrument import Kvh1775
-from rig.world.kvh1775.memory import Memory
+from rig.world.kvh1775.instrument import SimulatedKvh1775
+from rig.world.kvh1775.memory import KvhMemory
 
 
 @dataclass(slots=True)
-class Mount:
+class KvhMount:
     """One instrument's place: what stays there when it is switched off, which is its memory."""
 
     kind: ClassVar[str] = "kvh"
@@ -25,8 +25,8 @@ class Mount:
     name: str
     config: RigConfig
     world: WorldSection
-    memory: Memory
-    instrument: Kvh1775 | None = None
+    memory: KvhMemory
+    instrument: SimulatedKvh1775 | None = None
 
     @property
     def pty(self) -> bool:
@@ -44,7 +44,7 @@ class Mount:
         magnetometer = MountedMagnetometer(
             sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
         )
-        self.instrument = Kvh1775(
+        self.instrument = SimulatedKvh1775(
             truth,
             motion_of(truth),
             self.memory,
@@ -63,12 +63,12 @@ class Mount:
         self.instrument = None
 
 
-def mounts(config: RigConfig, world: WorldSection) -> dict[str, Mount]:
+def build_kvh_mounts(config: RigConfig, world: WorldSection) -> dict[str, KvhMount]:
     """Instruments by sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what is none."""
     found = {}
     for name in sorted(name for name, sensor in config.sensors.items() if sensor.part == "kvh1775"):
         try:
-            found[name] = Mount(name, config, world, Memory(_section(world, name).settings))
+            found[name] = KvhMount(name, config, world, KvhMemory(_section(world, name).settings))
         except ValueError as error:
             raise Refused(
                 "kvh_settings", f"world.sensors.{name}.kvh1775.settings: {error}", "Give settings of its commands"

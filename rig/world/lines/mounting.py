@@ -76,7 +76,7 @@ class PrinterMount:
         self.instrument = None
 
 
-def printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, PrinterMount]:
+def build_printer_mounts(config: RigConfig, world: WorldSection) -> dict[str, PrinterMount]:
     """Devices by sensor name."""
     printing = sorted(name for name, sensor in config.sensors.items() if sensor.part == "lines")
     return {name: PrinterMount(name, config, world) for name in printing}

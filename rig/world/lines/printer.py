@@ -35,7 +35,7 @@ FAULTLESS = SimulatedFaultySection()
 
 
 @dataclass(slots=True)
-class Faults:
+class PrinterFaults:
     """What a test can make wrong: the next samples to `lose`; `stuck`: it prints the same line again and again."""
 
     lose: int = 0
@@ -64,7 +64,7 @@ class Printer:
         time_s: float,
         faulty: SimulatedFaultySection = FAULTLESS,
     ) -> None:
-        self.faults = Faults()
+        self.faults = PrinterFaults()
         self.baud_rate = baud_rate
         self._section, self._prints, self._motion_at = section, prints, motion_at
         self._speed = 1.0 + 1e-6 * section.oscillator_ppm
@@ -113,7 +113,7 @@ class Printer:
     def _sampled(self, at_s: float) -> bytes:
         """The line of a sample."""
         prints = self._prints
-        rates = self._repeats.sent(self._gyroscope.read(at_s))
+        rates = self._repeats.next_rates(self._gyroscope.read(at_s))
         values = {axis: _printed(each, prints.rate) for axis, each in zip(("gx", "gy", "gz"), rates, strict=True)}
         if self._accelerometer is not None:
             forces = self._accelerometer.read(at_s)

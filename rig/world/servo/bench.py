@@ -1,4 +1,4 @@
-"""A simulated servo as what turns the item: its shaft, the base it is screwed to, and its line."""
+"""A simulated servo that turns the item: its shaft, the base it is screwed to, and its line."""
 
 import time
 from collections.abc import Sequence
@@ -9,40 +9,39 @@ import numpy as np
 from rig.config.procedures.servo_section import ServoSection
 from rig.config.world.laboratory import WorldSection
 from rig.world.clock import TICK_S
-from rig.world.servo.bus import Bus
-from rig.world.servo.servo import Servo
+from rig.world.servo.bus import SimulatedBus
+from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
-from rig.world.site import site_of
-from rig.world.ur10e.motion.flange_motion import Felt, base, carried
+from rig.world.site import build_site
+from rig.world.ur10e.motion.flange_motion import InertialMotion, find_base_motion, propagate_motion
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector
-from rig.world.ur10e.motion.links import Link
+from rig.world.ur10e.motion.links import ArmLink
 
-BEHIND_S = 60.0  # wall time that the board may be behind the servo, and catches up
-AHEAD_S = 2 * TICK_S  # of the world's first tick, that nothing is asked of the shaft's future
-CHANGE_S = 1e-4  # the change of the rate is the difference of two
-SHAFT = Link(theta_rad=0.0, a_m=0.0, d_m=0.0, alpha_rad=0.0, cos_alpha=1.0, sin_alpha=0.0)
-# As it is set up for the rig (docs/how-to/without-an-arm/servo.md): 1 Mbit/s, no return delay; the modes are the
-# driver's to set.
+BEHIND_S = 60.0  # wall time by which the board may lag the servo and still catch up
+AHEAD_S = 2 * TICK_S  # the servo's lead over the first tick: no sensor asks for the shaft's future
+CHANGE_S = 1e-4  # the step of the numerical derivative of the rate
+SHAFT = ArmLink(theta_rad=0.0, a_m=0.0, d_m=0.0, alpha_rad=0.0, cos_alpha=1.0, sin_alpha=0.0)
+# Its setup for the rig (docs/how-to/without-an-arm/servo.md): 1 Mbit/s, no return delay. The driver sets the modes.
 BAUDS = {57600: 1, 115200: 2, 1_000_000: 3, 2_000_000: 4, 3_000_000: 5, 4_000_000: 6}
 
 
 class ServoBench:
-    """The servo on its `bus`.
+    """The servo on its `bus`, a `MotionSource`.
 
-    The servo lives by the clock on the wall, as does whoever talks to it. The board lives by the world's ticks, and
-    may be late: what its sensors feel is then the shaft as it was.
+    The servo lives in wall time, as does its client. The board lives in the world's ticks and may lag: its sensors then
+    sense the shaft's past.
     """
 
     def __init__(self, configured: ServoSection, world: WorldSection) -> None:
         section = world.servo
         self._began_s = time.monotonic()
-        self._site = site_of(world.site)
+        self._site = build_site(world.site)
         self._ticks = 0
         seed = int(np.random.SeedSequence([world.seed, 430]).generate_state(1)[0])
         truth = ServoTruth(
             model=(section.model or configured.model).upper().replace("_", "-"),
             firmware=section.firmware,
-            left={"ID": configured.id, "Baud Rate": BAUDS[configured.baud], "Return Delay Time": 0},
+            settings={"ID": configured.id, "Baud Rate": BAUDS[configured.baud], "Return Delay Time": 0},
             start_deg=section.start_deg,
             encoder_once_deg=section.encoder_once_deg,
             encoder_twice_deg=section.encoder_twice_deg,
@@ -57,51 +56,51 @@ class ServoBench:
             fall_deg_s=section.fall_deg_s,
             seed=seed,
         )
-        self.servo = Servo(truth, 0.0)
-        self.bus = Bus([self.servo], LineTruth(latency_ms=section.latency_ms), self.now_s, seed=seed)
+        self.servo = SimulatedServo(truth, 0.0)
+        self.bus = SimulatedBus([self.servo], LineTruth(latency_ms=section.latency_ms), self.now_s, seed=seed)
 
     def now_s(self) -> float:
-        """The servo's time: that on the wall, since the world began. No tick is ahead of it."""
+        """Return the servo's time: wall time since the world began, s. No tick is ahead of it."""
         return time.monotonic() - self._began_s + AHEAD_S
 
     @property
     def time_s(self) -> float:
-        """The end of the last tick."""
+        """The end of the last tick, s."""
         return self._ticks * TICK_S
 
     @property
     def tick_s(self) -> float:
-        """How long a tick lasts."""
+        """The duration of a tick, s."""
         return TICK_S
 
     @property
     def waiting(self) -> bool:
-        """Whether nothing but a client can let it move: never sure, its watchdog may too."""
+        """Whether only a client can make it move: never certain, because its watchdog can too."""
         return False
 
     @property
     def ideal(self) -> bool:
-        """Whether its rate alone is what a body on it feels."""
+        """Whether angular rate alone describes the sensed motion."""
         return not any(self._site.earth_rate_rad_s)
 
     def step(self) -> None:
-        """One tick of the world's, and the servo lives until now."""
+        """Simulate one tick of the world, and the servo until now."""
         self._ticks += 1
         self.bus.advance()
 
     def rate_at(self, time_s: float) -> Vector:
-        """The shaft's rate, about its own axis, rad/s."""
+        """Return the shaft's angular rate about its own axis, (3,) rad/s."""
         return (0.0, 0.0, self.servo.rate_at(time_s))
 
-    def felt_at(self, time_s: float) -> Felt:
-        """All that a body on the shaft feels."""
+    def motion_at(self, time_s: float) -> InertialMotion:
+        """Return the inertial motion of a body on the shaft."""
         angle, rate = self.servo.angle_at(time_s), self.servo.rate_at(time_s)
         change = (self.servo.rate_at(time_s + CHANGE_S) - rate) / CHANGE_S
-        return carried(base(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
+        return propagate_motion(find_base_motion(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
 
     def frames_at(self, time_s: float) -> Sequence[tuple[Rotation, Vector]]:
-        """Rotation and place of the base and of the shaft."""
-        angle, nowhere = self.servo.angle_at(time_s), (0.0, 0.0, 0.0)
-        still = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        """Return rotation (rows) and position (m) of the base and of the shaft."""
+        angle, origin = self.servo.angle_at(time_s), (0.0, 0.0, 0.0)
+        identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         c, s = cos(angle), sin(angle)
-        return [(still, nowhere), (((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), nowhere)]
+        return [(identity, origin), (((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), origin)]

@@ -1,34 +1,36 @@
-"""The bus: servos on one line, what they send at the same time, and the converter between them and the host."""
+"""The bus: servos on one line, collisions of their answers, and the converter between them and the host."""
 
 from collections.abc import Callable, Sequence
 from math import ceil
 
 import numpy as np
 
-from rig.world.servo.servo import Servo
+from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth
-from rig.world.servo.wire_format import BROADCAST, PING, SYNC_READ, Packet, Receiver
+from rig.world.servo.wire_format import BROADCAST, PING, SYNC_READ, Receiver, ServoPacket
 
-BITS = 10  # of a byte on the wire: start, eight, stop
-HELD_UP_S = 0.02  # far longer than it takes to come round
-PING_SLOT_S = 0.003  # between two answers to a ping of everybody, times the ID; the maker's client waits so long
+BITS = 10  # of a byte on the wire: start, eight data, stop
+STALL_S = 0.02  # far longer than one pass of the world's loop
+PING_SLOT_S = 0.003  # delay per ID of the answers to a broadcast ping, as the maker's client expects it
 
 
-class Bus:
-    """The far end of a serial line (a `Device` of `rig.world.board.serial_line`); `now` is the world's clock.
+class SimulatedBus:
+    """The far end of a serial line (a `Device` of `rig.world.board.serial_line`); `now` is the servos' clock.
 
-    Answers that overlap on the wire pull each other low: the host reads their bytes' AND. `lose` is how many of the
-    next answers are lost on their way, `spoil` how many arrive damaged.
+    Answers that overlap on the wire pull each other low: the host reads the AND of their bytes. `lose` is the number of
+    next answers to lose, `spoil` the number to corrupt.
     """
 
-    def __init__(self, servos: Sequence[Servo], line: LineTruth, now: Callable[[], float], seed: int = 0) -> None:
+    def __init__(
+        self, servos: Sequence[SimulatedServo], line: LineTruth, now: Callable[[], float], seed: int = 0
+    ) -> None:
         self.servos, self.line = servos, line
         self.lose = self.spoil = 0
         self._now = now
         self._receiver = Receiver()
-        self._lived_s = now()
+        self._advanced_s = now()
         self._random = np.random.default_rng(seed)
-        self._under_way: list[tuple[float, bytes]] = []  # when the host gets it, and what
+        self._pending: list[tuple[float, bytes]] = []  # arrival at the host, s, and data
 
     @property
     def baud_rate(self) -> float | None:
@@ -36,60 +38,62 @@ class Bus:
         return next((baud for servo in self.servos if (baud := servo.baud_rate) is not None), None)
 
     def receive(self, data: bytes) -> None:
-        """Bytes of the host's that end now."""
+        """Take bytes from the host, the last of which ends now."""
         now_s = self._now()
         if self.line.echo:
             self._send(now_s, data)
-        for packet in self._receiver.hear(data, now_s):
+        for packet in self._receiver.receive(data, now_s):
             self.advance()
             self._answer(packet, now_s)
 
     def advance(self) -> None:
-        """Let every servo live until now.
+        """Simulate every servo until now.
 
-        Where this process was held up, what the host sent meanwhile has not been heard yet: no watchdog counts that.
+        If this process was stalled, the host's bytes of that time have not been read yet: no watchdog counts it.
         """
         now_s = self._now()
-        held_up_s, self._lived_s = now_s - self._lived_s, now_s
+        stalled_s, self._advanced_s = now_s - self._advanced_s, now_s
         for servo in self.servos:
-            if held_up_s > HELD_UP_S:
-                servo.hear_later(held_up_s)
+            if stalled_s > STALL_S:
+                servo.extend_watchdog(stalled_s)
             servo.advance(now_s)
 
     def due_s(self) -> float:
-        """The time at which the host is to get something; infinity when nothing is under way."""
-        return min((due_s for due_s, _ in self._under_way), default=float("inf"))
+        """Return the time at which the host gets its next bytes, s; infinity if none are pending."""
+        return min((due_s for due_s, _ in self._pending), default=float("inf"))
 
     def transmitted(self) -> bytes:
-        """What has reached the host since it was asked last."""
+        """Return the bytes that have reached the host since the last call."""
         now_s = self._now()
-        arrived = b"".join(data for due_s, data in self._under_way if due_s <= now_s)
-        self._under_way = [each for each in self._under_way if each[0] > now_s]
+        arrived = b"".join(data for due_s, data in self._pending if due_s <= now_s)
+        self._pending = [(due_s, data) for due_s, data in self._pending if due_s > now_s]
         return arrived
 
-    def _answer(self, packet: Packet, time_s: float) -> None:
+    def _answer(self, packet: ServoPacket, time_s: float) -> None:
         byte_s = BITS / (self.baud_rate or 1e6)
-        answers: list[tuple[int, bytes]] = []  # the byte's place on the wire, from now, at which each begins
-        free = 0  # … after the answers to a sync read before it
-        for servo in sorted(self.servos, key=lambda each: each.memory["ID"]):
+        answers: list[tuple[int, bytes]] = []  # the first byte's slot on the wire, counted from now, and the bytes
+        free = 0  # the first free slot after the earlier answers to a sync read
+        for servo in sorted(self.servos, key=lambda servo: servo.memory["ID"]):
             answer = servo.obey(packet, time_s)
             if answer is None:
                 continue
             wait_s = servo.return_delay_s()
             if packet.servo_id == BROADCAST and packet.instruction == PING:
                 wait_s += PING_SLOT_S * servo.memory["ID"]
-            if len(self.servos) > 1:  # no two clocks are alike
+            if len(self.servos) > 1:  # no two clocks run alike
                 wait_s += byte_s * self._random.uniform(0.0, 2.0)
-            begins = round(wait_s / byte_s) + (free if packet.instruction == SYNC_READ else 0)
-            answers.append((begins, answer))
-            free = begins + len(answer)
+            first_slot = round(wait_s / byte_s) + (free if packet.instruction == SYNC_READ else 0)
+            answers.append((first_slot, answer))
+            free = first_slot + len(answer)
         if not answers:
             return
         wire: dict[int, int] = {}
-        for begins, answer in answers:
-            for place, byte in enumerate(answer, begins):
-                wire[place] = wire.get(place, 0xFF) & byte
-        self._send(time_s + max(wire) * byte_s + 1e-3 * self.line.reply_delay_ms, bytes(wire[p] for p in sorted(wire)))
+        for first_slot, answer in answers:
+            for slot, byte in enumerate(answer, first_slot):
+                wire[slot] = wire.get(slot, 0xFF) & byte
+        self._send(
+            time_s + max(wire) * byte_s + 1e-3 * self.line.reply_delay_ms, bytes(wire[slot] for slot in sorted(wire))
+        )
 
     def _send(self, time_s: float, data: bytes) -> None:
         if self.lose > 0:
@@ -99,4 +103,4 @@ class Bus:
             self.spoil -= 1
             data = data[:9] + bytes([data[9] ^ 0x10]) + data[10:]
         lump_s = 1e-3 * self.line.latency_ms
-        self._under_way.append((ceil(time_s / lump_s) * lump_s if lump_s else time_s, data))
+        self._pending.append((ceil(time_s / lump_s) * lump_s if lump_s else time_s, data))

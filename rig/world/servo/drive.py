@@ -1,7 +1,7 @@
-"""The simulated servo's motor and shaft: what it does with time, with its goals, and with what goes wrong.
+"""The simulated servo's motor and shaft: their response to time, goals and faults.
 
 Source: ROBOTIS e-Manual, pages of the models and the includes named beside each rule. Not simulated: velocity, PWM and
-current modes (goals of theirs are kept, nothing turns), load on the shaft but that it falls or is held fast.
+current modes (their goals are stored, nothing turns), loads on the shaft other than a fall or a blocked shaft.
 """
 
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ from math import floor, inf, isclose, pi, radians
 
 import numpy as np
 
-from rig.world.servo.profile import Piece, limited, timed
-from rig.world.servo.registers import EXTENDED, POSITION, REVERSE, TIME_BASED, TRIPPED, Memory, Model
+from rig.world.servo.profile import ProfileSegment, plan_limited, plan_timed
+from rig.world.servo.registers import EXTENDED, POSITION, REVERSE, TIME_BASED, TRIPPED, Model, ServoMemory
 from rig.world.servo.shaft import Shaft, whole_turns
 from rig.world.servo.truth import ServoTruth
 
 PULSE_RAD = 2 * pi / 4096
 SPEED_RAD_S = 0.229 * 2 * pi / 60  # unit of velocity registers
 ACCELERATION_RAD_S2 = 214.577 * 2 * pi / 3600  # … and of Profile Acceleration: rev/min²
-FASTEST_RAD_S2 = 200.0  # what "infinite" acceleration comes to
+FASTEST_RAD_S2 = 200.0  # "infinite" acceleration in practice
 WATCHDOG_S = 0.020
 TICKS = 32768
 BY_VOLTAGE, BY_HEAT, BY_LOAD = 0x01, 0x04, 0x20  # bits of Hardware Error Status and of Shutdown
 
 
 @dataclass(slots=True)
-class Faults:
-    """What a test can make wrong: supply, heat, a shaft held fast, a servo that says nothing, or no to every write."""
+class ServoFaults:
+    """Faults that a test can set: supply, temperature, a blocked shaft, no answers, a refusal of every write."""
 
     voltage_v: float
     temperature_c: float
@@ -35,42 +35,42 @@ class Faults:
 
 
 class Drive:
-    """The motor as its registers, `memory`, have it. Times are the world's, seconds.
+    """The motor, controlled by its registers `memory`. Times are the world's, s.
 
-    `torque` is whether it holds its shaft; `fed_s` is when its watchdog was last fed.
+    `torque`: whether it holds its shaft; `fed_s`: when its watchdog was last fed.
     """
 
-    def __init__(self, truth: ServoTruth, model: Model, memory: Memory, time_s: float) -> None:
+    def __init__(self, truth: ServoTruth, model: Model, memory: ServoMemory, time_s: float) -> None:
         self._truth, self._model, self._memory = truth, model, memory
         self.shaft = Shaft(truth, time_s)
-        self.faults = Faults(truth.voltage_v, truth.temperature_c)
+        self.faults = ServoFaults(truth.voltage_v, truth.temperature_c)
         self._random = np.random.default_rng(truth.seed)
-        self._strained_s = inf  # since when the shaft is held fast
+        self._strained_s = inf  # since when the shaft is blocked
         self.torque = False
         self._began_s = self.fed_s = time_s
         self._turns_rad = 0.0
 
     def start(self, time_s: float) -> None:
-        """Begin anew, as after power-up."""
+        """Start as after power-up."""
         self._began_s = self.fed_s = time_s
         self.torque, self._strained_s = False, inf
         self.forget_turns(time_s)
 
     def forget_turns(self, time_s: float) -> None:
-        """Count from within one turn again."""
+        """Reduce the count of revolutions to zero, as the servo does."""
         self._turns_rad = whole_turns(self.shaft.encoder_at(time_s))
 
-    def moving(self, time_s: float) -> bool:
-        """Whether a profile goes on."""
+    def is_moving(self, time_s: float) -> bool:
+        """Return whether a profile is in progress."""
         return time_s < self.shaft.ends_s()
 
     # -- time --------------------------------------------------------------------------------------------------------
     def advance(self, time_s: float) -> None:
-        """Live until `time_s`: what comes without being asked for."""
+        """Simulate until `time_s`: watchdog, overload, temperature and voltage."""
         memory = self._memory
-        if self._watched and time_s > self.fed_s + memory["Bus Watchdog"] * WATCHDOG_S:
+        if self._is_watchdog_on and time_s > self.fed_s + memory["Bus Watchdog"] * WATCHDOG_S:
             self.trip(self.fed_s + memory["Bus Watchdog"] * WATCHDOG_S)
-        if self.torque and self.faults.held_fast and self.moving(time_s):
+        if self.torque and self.faults.held_fast and self.is_moving(time_s):
             self._strained_s = min(self._strained_s, time_s)
             self.shaft.halt(time_s)
         if self.torque and time_s > self._strained_s + self._truth.overload_after_s:
@@ -82,24 +82,24 @@ class Drive:
             self._fail(BY_VOLTAGE, time_s)
 
     @property
-    def _watched(self) -> bool:
+    def _is_watchdog_on(self) -> bool:
         return "Bus Watchdog" in self._memory and self.torque and 1 <= self._memory["Bus Watchdog"] <= 127
 
     def trip(self, time_s: float) -> None:
-        """The watchdog stops it abruptly, and its profile is zero from now on (bus_watchdog.md, steps 4, 5)."""
+        """Let the watchdog stop the shaft abruptly and set the profile to zero (bus_watchdog.md, steps 4, 5)."""
         self.shaft.halt(time_s)
         self._memory["Bus Watchdog"] = TRIPPED
         self._memory["Profile Velocity"] = self._memory["Profile Acceleration"] = 0
 
     def _fail(self, bit: int, time_s: float) -> None:
-        """Report an error, and shut down if that is what it is set to do (shutdown.md)."""
+        """Report an error, and shut down if that is configured (shutdown.md)."""
         self._memory["Hardware Error Status"] |= bit
         if bit & self._memory["Shutdown"] and self.torque:
             self.torque_off(time_s)
 
-    # -- what registers make of it -----------------------------------------------------------------------------------
+    # -- effects of the registers ------------------------------------------------------------------------------------
     def torque_on(self, time_s: float) -> None:
-        """Hold the shaft where it is; in position mode it forgets its turns."""
+        """Hold the shaft where it is; in position mode, forget whole revolutions."""
         if self._memory["Operating Mode"] == POSITION:
             self.forget_turns(time_s)
         self.torque, self.fed_s, self._strained_s = True, time_s, inf
@@ -107,16 +107,16 @@ class Drive:
         self._memory["Goal Position"] = self._pulses(time_s, noisy=False)
 
     def torque_off(self, time_s: float) -> None:
-        """Let the shaft go: it stands by its gear, or falls for half a turn at most."""
+        """Release the shaft: its gear holds it, or it falls by half a revolution at most."""
         self.torque = False
         self._memory["Torque Enable"] = 0
         fall = radians(self._truth.fall_deg_s)
         start = self.shaft.start_at(time_s)
-        falls = [] if isclose(fall, 0.0) else [Piece(time_s, time_s + pi / abs(fall), start.angle_rad, fall)]
+        falls = [] if isclose(fall, 0.0) else [ProfileSegment(time_s, time_s + pi / abs(fall), start.angle_rad, fall)]
         self.shaft.follow(time_s, falls)
 
     def go(self, goal: int, time_s: float) -> None:
-        """Begin the move to a goal, where it is one of this mode; the shaft follows a moment later."""
+        """Begin a move to `goal` (register units) in the modes that move to goals. The shaft follows with its lag."""
         memory = self._memory
         if not self.torque or memory["Operating Mode"] not in (POSITION, EXTENDED):
             return
@@ -124,34 +124,34 @@ class Drive:
         goal_rad = (self._sign * (goal - memory["Homing Offset"]) + 0.5) * PULSE_RAD + self._turns_rad
         most = min(memory["Velocity Limit"] * SPEED_RAD_S, self._model.no_load_rpm * 2 * pi / 60)
         velocity, acceleration = memory["Profile Velocity"], memory["Profile Acceleration"]
-        pieces: list[Piece]
+        segments: list[ProfileSegment]
         if memory["Drive Mode"] & TIME_BASED and velocity:
-            pieces = timed(start, goal_rad, 1e-3 * velocity, 1e-3 * acceleration, most)
+            segments = plan_timed(start, goal_rad, 1e-3 * velocity, 1e-3 * acceleration, most)
         elif memory["Drive Mode"] & TIME_BASED:
-            pieces = limited(start, goal_rad, most, FASTEST_RAD_S2)
+            segments = plan_limited(start, goal_rad, most, FASTEST_RAD_S2)
         else:
             speed = min(velocity * SPEED_RAD_S, most) if velocity else most
             ramp = min(acceleration * ACCELERATION_RAD_S2, FASTEST_RAD_S2) if acceleration else FASTEST_RAD_S2
-            pieces = limited(start, goal_rad, speed, ramp)
-        self.shaft.follow(start.time_s, pieces)
+            segments = plan_limited(start, goal_rad, speed, ramp)
+        self.shaft.follow(start.time_s, segments)
 
-    # -- what registers show of it -----------------------------------------------------------------------------------
+    # -- measured values in the registers ----------------------------------------------------------------------------
     def measure(self, time_s: float) -> None:
-        """Put what is measured into the registers that show it."""
+        """Update the registers of measured values."""
         memory, shaft = self._memory, self.shaft
         planned = shaft.start_at(time_s + self._truth.lag_s)
         encoder_s = 0.005  # the rate is the difference of two readings
         rate = (shaft.encoder_at(time_s) - shaft.encoder_at(time_s - encoder_s)) / encoder_s
-        moving = self.moving(time_s)
-        since_s = (time_s - self._began_s) * (1 + 1e-6 * self._truth.tick_ppm)
-        memory["Realtime Tick"] = floor(1e3 * since_s) % TICKS
+        moving = self.is_moving(time_s)
+        elapsed_s = (time_s - self._began_s) * (1 + 1e-6 * self._truth.tick_ppm)
+        memory["Realtime Tick"] = floor(1e3 * elapsed_s) % TICKS
         memory["Present Position"] = self._pulses(time_s, noisy=True)
         memory["Present Velocity"] = round(self._sign * rate / SPEED_RAD_S)
         memory["Moving"] = int(moving or abs(rate) > memory["Moving Threshold"] * SPEED_RAD_S)
         arrived = not moving and self.torque
         memory["Moving Status"] = (0x32 if moving else 0) | int(arrived)  # trapezoid, in progress; arrived
         memory["Velocity Trajectory"] = round(self._sign * planned.rate_rad_s / SPEED_RAD_S)
-        memory["Position Trajectory"] = self._to_pulses(planned.angle_rad)
+        memory["Position Trajectory"] = self._count_pulses(planned.angle_rad)
         effort = 1000 if self._strained_s < inf else 40 * moving
         memory["Present Current" if self._model.senses_current else "Present Load"] = effort * self.torque
         memory["Present Input Voltage"] = round(10 * self.faults.voltage_v)
@@ -159,9 +159,9 @@ class Drive:
 
     def _pulses(self, time_s: float, noisy: bool) -> int:
         noise = self._random.normal(0.0, radians(self._truth.encoder_noise_deg)) if noisy else 0.0
-        return self._to_pulses(self.shaft.encoder_at(time_s) + noise)
+        return self._count_pulses(self.shaft.encoder_at(time_s) + noise)
 
-    def _to_pulses(self, encoder_rad: float) -> int:
+    def _count_pulses(self, encoder_rad: float) -> int:
         return self._sign * floor((encoder_rad - self._turns_rad) / PULSE_RAD) + self._memory["Homing Offset"]
 
     @property

@@ -1,9 +1,9 @@
 """The control tables of three Dynamixel X servos, and the memory behind them.
 
 Source: ROBOTIS e-Manual, pages of XL430-W250, XM430-W350 and XM430-W210, "Control Table of EEPROM/RAM Area": addresses,
-sizes, initial values, ranges. Where the manual gives no range, all values of the size are let through. The XM430-W350's
-Velocity Limit is 200 in the manual of the firmware that the rig drives; 350 stood there in that of before 38, which had
-an Acceleration Limit too.
+sizes, initial values, ranges. Where the manual gives no range, all values of the size are accepted. The XM430-W350's
+Velocity Limit is 200 in the manual of the firmware that the rig drives; manuals of firmware before 38 have 350, and an
+Acceleration Limit too.
 """
 
 from collections.abc import Mapping
@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 from rig.world.servo.wire_format import ACCESS_ERROR, LENGTH_ERROR, LIMIT_ERROR, RANGE_ERROR
 
-RAM = 64  # registers before it are in the EEPROM
+RAM = 64  # its first address; registers below are in the EEPROM
 SIZE = 662
 MOST_TURNS = 1_048_575  # pulses in extended position mode, ±256 turns
 
 
-class Register(NamedTuple):
-    """One row of a control table. A register of firmware older than `since` is not there."""
+class RegisterRow(NamedTuple):
+    """A row of a control table. Firmware older than `since` does not have the register."""
 
     address: int
     size: int
@@ -31,7 +31,7 @@ class Register(NamedTuple):
 
 
 class Model(NamedTuple):
-    """What differs from model to model. Speeds and currents in register units."""
+    """The properties of a servo model. Speeds and currents are in register units."""
 
     number: int
     velocity_limit: int
@@ -53,97 +53,97 @@ TRIPPED = 255  # Bus Watchdog: −1 in its one byte
 MODES = {True: (0, 1, 3, 4, 5, 16), False: (1, 3, 4, 16)}  # with and without a current sensor
 
 
-def control_table(model: Model, firmware: int) -> tuple[Register, ...]:
-    """The rows of a model, in the order of their addresses."""
+def build_control_table(model: Model, firmware: int) -> tuple[RegisterRow, ...]:
+    """Return a model's rows in the order of their addresses."""
     low, high = model.voltage_limits
     velocity_i, velocity_p, position_d, position_p = model.gains
     rows = [
-        Register(0, 2, "Model Number", initial=model.number),
-        Register(2, 4, "Model Information"),
-        Register(6, 1, "Firmware Version", initial=firmware),
-        Register(7, 1, "ID", True, 1, 0, 252),
-        Register(8, 1, "Baud Rate", True, 1, 0, 7),
-        Register(9, 1, "Return Delay Time", True, 250, 0, 254),
-        Register(10, 1, "Drive Mode", True, 0, 0, 13),
-        Register(11, 1, "Operating Mode", True, 3, 0, 16),
-        Register(12, 1, "Secondary ID", True, 255, 0, 255),
-        Register(13, 1, "Protocol Type", True, 2, 1, 2),
-        Register(20, 4, "Homing Offset", True, 0, -1_044_479, 1_044_479),
-        Register(24, 4, "Moving Threshold", True, 10, 0, 1023),
-        Register(31, 1, "Temperature Limit", True, model.temperature_limit, 0, 100),
-        Register(32, 2, "Max Voltage Limit", True, high, low, high),
-        Register(34, 2, "Min Voltage Limit", True, low, low, high),
-        Register(36, 2, "PWM Limit", True, 885, 0, 885),
-        Register(44, 4, "Velocity Limit", True, model.velocity_limit, 0, 1023),
-        Register(48, 4, "Max Position Limit", True, 4095, 0, 4095),
-        Register(52, 4, "Min Position Limit", True, 0, 0, 4095),
-        Register(60, 1, "Startup Configuration", True, 0, 0, 3, since=45),
-        Register(63, 1, "Shutdown", True, 52, 0, 255),
-        Register(64, 1, "Torque Enable", True, 0, 0, 1),
-        Register(65, 1, "LED", True, 0, 0, 1),
-        Register(68, 1, "Status Return Level", True, 2, 0, 2),
-        Register(69, 1, "Registered Instruction"),
-        Register(70, 1, "Hardware Error Status"),
-        Register(76, 2, "Velocity I Gain", True, velocity_i, 0, 16383),
-        Register(78, 2, "Velocity P Gain", True, velocity_p, 0, 16383),
-        Register(80, 2, "Position D Gain", True, position_d, 0, 16383),
-        Register(82, 2, "Position I Gain", True, 0, 0, 16383),
-        Register(84, 2, "Position P Gain", True, position_p, 0, 16383),
-        Register(88, 2, "Feedforward 2nd Gain", True, 0, 0, 16383),
-        Register(90, 2, "Feedforward 1st Gain", True, 0, 0, 16383),
-        Register(98, 1, "Bus Watchdog", True, 0, 0, 127, since=38),
-        Register(100, 2, "Goal PWM", True, 885, -885, 885),
-        Register(104, 4, "Goal Velocity", True, 0, -1023, 1023),
-        Register(108, 4, "Profile Acceleration", True, 0, 0, 32767),
-        Register(112, 4, "Profile Velocity", True, 0, 0, 32767),
-        Register(116, 4, "Goal Position", True, 0, -MOST_TURNS, MOST_TURNS),
-        Register(120, 2, "Realtime Tick"),
-        Register(122, 1, "Moving"),
-        Register(123, 1, "Moving Status"),
-        Register(124, 2, "Present PWM"),
-        Register(126, 2, "Present Current" if model.senses_current else "Present Load"),
-        Register(128, 4, "Present Velocity"),
-        Register(132, 4, "Present Position"),
-        Register(136, 4, "Velocity Trajectory"),
-        Register(140, 4, "Position Trajectory"),
-        Register(144, 2, "Present Input Voltage"),
-        Register(146, 1, "Present Temperature"),
-        Register(147, 1, "Backup Ready", since=45),
+        RegisterRow(0, 2, "Model Number", initial=model.number),
+        RegisterRow(2, 4, "Model Information"),
+        RegisterRow(6, 1, "Firmware Version", initial=firmware),
+        RegisterRow(7, 1, "ID", True, 1, 0, 252),
+        RegisterRow(8, 1, "Baud Rate", True, 1, 0, 7),
+        RegisterRow(9, 1, "Return Delay Time", True, 250, 0, 254),
+        RegisterRow(10, 1, "Drive Mode", True, 0, 0, 13),
+        RegisterRow(11, 1, "Operating Mode", True, 3, 0, 16),
+        RegisterRow(12, 1, "Secondary ID", True, 255, 0, 255),
+        RegisterRow(13, 1, "Protocol Type", True, 2, 1, 2),
+        RegisterRow(20, 4, "Homing Offset", True, 0, -1_044_479, 1_044_479),
+        RegisterRow(24, 4, "Moving Threshold", True, 10, 0, 1023),
+        RegisterRow(31, 1, "Temperature Limit", True, model.temperature_limit, 0, 100),
+        RegisterRow(32, 2, "Max Voltage Limit", True, high, low, high),
+        RegisterRow(34, 2, "Min Voltage Limit", True, low, low, high),
+        RegisterRow(36, 2, "PWM Limit", True, 885, 0, 885),
+        RegisterRow(44, 4, "Velocity Limit", True, model.velocity_limit, 0, 1023),
+        RegisterRow(48, 4, "Max Position Limit", True, 4095, 0, 4095),
+        RegisterRow(52, 4, "Min Position Limit", True, 0, 0, 4095),
+        RegisterRow(60, 1, "Startup Configuration", True, 0, 0, 3, since=45),
+        RegisterRow(63, 1, "Shutdown", True, 52, 0, 255),
+        RegisterRow(64, 1, "Torque Enable", True, 0, 0, 1),
+        RegisterRow(65, 1, "LED", True, 0, 0, 1),
+        RegisterRow(68, 1, "Status Return Level", True, 2, 0, 2),
+        RegisterRow(69, 1, "Registered Instruction"),
+        RegisterRow(70, 1, "Hardware Error Status"),
+        RegisterRow(76, 2, "Velocity I Gain", True, velocity_i, 0, 16383),
+        RegisterRow(78, 2, "Velocity P Gain", True, velocity_p, 0, 16383),
+        RegisterRow(80, 2, "Position D Gain", True, position_d, 0, 16383),
+        RegisterRow(82, 2, "Position I Gain", True, 0, 0, 16383),
+        RegisterRow(84, 2, "Position P Gain", True, position_p, 0, 16383),
+        RegisterRow(88, 2, "Feedforward 2nd Gain", True, 0, 0, 16383),
+        RegisterRow(90, 2, "Feedforward 1st Gain", True, 0, 0, 16383),
+        RegisterRow(98, 1, "Bus Watchdog", True, 0, 0, 127, since=38),
+        RegisterRow(100, 2, "Goal PWM", True, 885, -885, 885),
+        RegisterRow(104, 4, "Goal Velocity", True, 0, -1023, 1023),
+        RegisterRow(108, 4, "Profile Acceleration", True, 0, 0, 32767),
+        RegisterRow(112, 4, "Profile Velocity", True, 0, 0, 32767),
+        RegisterRow(116, 4, "Goal Position", True, 0, -MOST_TURNS, MOST_TURNS),
+        RegisterRow(120, 2, "Realtime Tick"),
+        RegisterRow(122, 1, "Moving"),
+        RegisterRow(123, 1, "Moving Status"),
+        RegisterRow(124, 2, "Present PWM"),
+        RegisterRow(126, 2, "Present Current" if model.senses_current else "Present Load"),
+        RegisterRow(128, 4, "Present Velocity"),
+        RegisterRow(132, 4, "Present Position"),
+        RegisterRow(136, 4, "Velocity Trajectory"),
+        RegisterRow(140, 4, "Position Trajectory"),
+        RegisterRow(144, 2, "Present Input Voltage"),
+        RegisterRow(146, 1, "Present Temperature"),
+        RegisterRow(147, 1, "Backup Ready", since=45),
     ]
     if model.senses_current:
         rows += [
-            Register(38, 2, "Current Limit", True, 1193, 0, 1193),
-            Register(102, 2, "Goal Current", True, 1193, -1193, 1193),
+            RegisterRow(38, 2, "Current Limit", True, 1193, 0, 1193),
+            RegisterRow(102, 2, "Goal Current", True, 1193, -1193, 1193),
         ]
     for first, address_at, data_at in ((1, 168, 224), (29, 578, 634)):
         for i in range(28):
-            rows.append(Register(address_at + 2 * i, 2, f"Indirect Address {first + i}", True, data_at + i, 64, 661))
-            rows.append(Register(data_at + i, 1, f"Indirect Data {first + i}", True, 0, 0, 255))
+            rows.append(RegisterRow(address_at + 2 * i, 2, f"Indirect Address {first + i}", True, data_at + i, 64, 661))
+            rows.append(RegisterRow(data_at + i, 1, f"Indirect Data {first + i}", True, 0, 0, 255))
     return tuple(sorted(row for row in rows if row.since <= firmware))
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """A register and what is to be written into it."""
+    """A register and the value to write into it."""
 
-    register: Register
+    register: RegisterRow
     value: int
 
 
-class Memory:
-    """The bytes of one servo. `left`: EEPROM settings other than the factory's, as its last user left them.
+class ServoMemory:
+    """The bytes of one servo. `settings`: EEPROM values other than the factory's, as its last user stored them.
 
-    Indirect data are plain bytes here: they stand for no other register.
+    Indirect data are plain bytes here: they do not map to other registers.
     """
 
-    def __init__(self, table: tuple[Register, ...], left: Mapping[str, int]) -> None:
+    def __init__(self, table: tuple[RegisterRow, ...], settings: Mapping[str, int]) -> None:
         self._by_name = {register.name: register for register in table}
-        self._at = {register.address: register for register in table}
+        self._by_address = {register.address: register for register in table}
         self._defined = {a for register in table for a in range(register.address, register.address + register.size)}
         self._bytes = bytearray(SIZE)
         for register in table:
             self[register.name] = register.initial
-        for name, value in left.items():
+        for name, value in settings.items():
             self[name] = value
 
     def __contains__(self, name: str) -> bool:
@@ -160,24 +160,24 @@ class Memory:
         self._bytes[register.address : register.address + register.size] = data
 
     def forget(self) -> None:
-        """Bring the RAM back to what it is after power-up."""
+        """Reset the RAM to its state after power-up."""
         for register in self._by_name.values():
             if register.address >= RAM:
                 self[register.name] = register.initial
 
     def read(self, address: int, length: int) -> bytes | int:
-        """The bytes, or an error number where a register that is not there is among them."""
+        """Return the bytes, or an error number if one of them belongs to no register."""
         if length == 0 or any(a not in self._defined for a in range(address, address + length)):
             return ACCESS_ERROR
         return bytes(self._bytes[address : address + length])
 
     def parse(self, address: int, data: bytes, locked: bool) -> list[Write] | int:
-        """What a write means, or its error number; `locked`: the EEPROM is, because torque is on."""
+        """Return the register writes in `data`, or an error number. `locked`: the EEPROM is, because torque is on."""
         writes = []
         if not data:
             return LENGTH_ERROR
         while data:
-            register = self._at.get(address)
+            register = self._by_address.get(address)
             if register is None or not register.writable or (locked and address < RAM):
                 return ACCESS_ERROR
             if len(data) < register.size:
@@ -190,16 +190,16 @@ class Memory:
         return writes
 
 
-def refusal(memory: Memory, write: Write, senses_current: bool, firmware: int) -> int:
-    """The error of a value that its register could hold, as the servo is set at present; 0: none.
+def find_write_error(memory: ServoMemory, write: Write, senses_current: bool, firmware: int) -> int:
+    """Return the error of a value that fits its register but not the servo's present state; 0 if there is none.
 
-    A goal while the watchdog's error is active is out of range (bus_watchdog.md, step 6); after a shutdown torque comes
-    back by a reboot alone (shutdown.md; with which error it is refused, the manual does not say).
+    A goal is out of range while the watchdog's error is active (bus_watchdog.md, step 6). After a shutdown only a
+    reboot brings torque back (shutdown.md; the manual does not state the error number).
     """
     name, value = write.register.name, write.value
-    goal = name in ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
+    is_goal = name in ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
     out_of_range = (
-        (goal and "Bus Watchdog" in memory and memory["Bus Watchdog"] == TRIPPED)
+        (is_goal and "Bus Watchdog" in memory and memory["Bus Watchdog"] == TRIPPED)
         or (name == "Operating Mode" and value not in MODES[senses_current])
         or (name == "Drive Mode" and value & TIME_BASED and firmware < 42)
     )

@@ -1,4 +1,4 @@
-"""The simulated servo on its bus: what it does with instructions.
+"""The simulated servo on its bus: its response to instructions.
 
 Source: ROBOTIS e-Manual, pages of the models and the includes named beside each rule. Not simulated: factory reset,
 bulk instructions, backup.
@@ -6,8 +6,8 @@ bulk instructions, backup.
 
 from collections.abc import Callable
 
-from rig.world.servo.drive import Drive, Faults
-from rig.world.servo.registers import MODELS, Memory, Write, control_table, refusal
+from rig.world.servo.drive import Drive, ServoFaults
+from rig.world.servo.registers import MODELS, ServoMemory, Write, build_control_table, find_write_error
 from rig.world.servo.shaft import Shaft
 from rig.world.servo.truth import ServoTruth
 from rig.world.servo.wire_format import (
@@ -26,7 +26,7 @@ from rig.world.servo.wire_format import (
     SYNC_READ,
     SYNC_WRITE,
     WRITE,
-    Packet,
+    ServoPacket,
     encode_status,
 )
 
@@ -34,35 +34,35 @@ BAUDS = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_
 CLEAR_TURNS = b"\x01\x44\x58\x4c\x22"
 
 
-class Servo:
-    """One servo, switched on at the virtual time `time_s`. Times are the world's, seconds."""
+class SimulatedServo:
+    """One servo, switched on at the virtual time `time_s`. Times are the world's, s."""
 
     def __init__(self, truth: ServoTruth, time_s: float) -> None:
         self.truth = truth
         self._model = MODELS[truth.model]
-        self.memory = Memory(control_table(self._model, truth.firmware), truth.left)
+        self.memory = ServoMemory(build_control_table(self._model, truth.firmware), truth.settings)
         self.drive = Drive(truth, self._model, self.memory, time_s)
         self._powered = True
         self._registered: list[Write] | None = None
         self._start(time_s)
 
-    # -- what the world may know ---------------------------------------------------------------------------------
+    # -- true values, for the world only -------------------------------------------------------------------------
     def angle_at(self, time_s: float) -> float:
-        """The shaft's true angle, rad, ccw positive."""
+        """Return the shaft's true angle, rad, ccw positive."""
         return self.shaft.angle_at(time_s)
 
     def rate_at(self, time_s: float) -> float:
-        """The shaft's true rate, rad/s."""
+        """Return the shaft's true rate, rad/s."""
         return self.shaft.rate_at(time_s)
 
     @property
     def shaft(self) -> Shaft:
-        """The shaft."""
+        """The shaft of its drive."""
         return self.drive.shaft
 
     @property
-    def faults(self) -> Faults:
-        """What is wrong with it."""
+    def faults(self) -> ServoFaults:
+        """The drive's faults."""
         return self.drive.faults
 
     @property
@@ -71,12 +71,12 @@ class Servo:
         return float(BAUDS[self.memory["Baud Rate"]]) if self._powered else None
 
     def answers_to(self, servo_id: int) -> bool:
-        """Whether an instruction for that ID is obeyed here."""
+        """Return whether it obeys instructions for the ID `servo_id`."""
         return servo_id in (self.memory["ID"], BROADCAST) or servo_id == self.memory["Secondary ID"] < 253
 
     # -- life ----------------------------------------------------------------------------------------------------
-    def switch(self, on: bool, time_s: float) -> None:
-        """Give it its supply, or take it away."""
+    def switch_supply(self, on: bool, time_s: float) -> None:
+        """Switch the supply on or off."""
         if self._powered and not on:
             self.drive.torque_off(time_s)
         elif on and not self._powered:
@@ -84,42 +84,42 @@ class Servo:
         self._powered = on
 
     def advance(self, time_s: float) -> None:
-        """Live until `time_s`: what comes without being asked for."""
+        """Simulate until `time_s` without instructions."""
         if self._powered:
             self.drive.advance(time_s)
 
-    def hear_later(self, by_s: float) -> None:
-        """Nobody could be heard for so long: the watchdog has so much more time."""
-        self.drive.fed_s += by_s
+    def extend_watchdog(self, duration_s: float) -> None:
+        """Give the watchdog `duration_s` more, a time in which no client could be heard."""
+        self.drive.fed_s += duration_s
 
-    def moving(self, time_s: float) -> bool:
-        """Whether a profile goes on."""
-        return self.drive.moving(time_s)
+    def is_moving(self, time_s: float) -> bool:
+        """Return whether a profile is in progress."""
+        return self.drive.is_moving(time_s)
 
-    def obey(self, packet: Packet, time_s: float) -> bytes | None:
-        """What it answers to a packet of the bus, whoever it is for; None: nothing."""
+    def obey(self, packet: ServoPacket, time_s: float) -> bytes | None:
+        """Return the answer to a packet on the bus, which may be for another servo; None if there is none."""
         if not self._powered or time_s < self._awake_s:
             return None
-        if packet.whole:
+        if packet.is_valid:
             self.drive.fed_s = time_s  # any instruction feeds the watchdog (bus_watchdog.md)
-        if packet.instruction in (SYNC_READ, SYNC_WRITE) and packet.whole:
+        if packet.instruction in (SYNC_READ, SYNC_WRITE) and packet.is_valid:
             return self._sync(packet, time_s)
         if not self.answers_to(packet.servo_id) or self.faults.dumb:
             return None
-        error, data = self._answer(packet, time_s) if packet.whole else (CRC_ERROR, b"")
+        error, data = self._answer(packet, time_s) if packet.is_valid else (CRC_ERROR, b"")
         level = self.memory["Status Return Level"]
-        answered = packet.instruction == PING or level == 2 or (level == 1 and packet.instruction == READ)
-        if not answered or (packet.servo_id == BROADCAST and packet.instruction != PING):
+        has_answer = packet.instruction == PING or level == 2 or (level == 1 and packet.instruction == READ)
+        if not has_answer or (packet.servo_id == BROADCAST and packet.instruction != PING):
             return None
         return self._status(error, data)
 
     def return_delay_s(self) -> float:
-        """The time between an instruction's end and its answer's beginning."""
+        """Return the time from an instruction's end to its answer's start, s."""
         return 2e-6 * self.memory["Return Delay Time"]
 
     # -- instructions --------------------------------------------------------------------------------------------
-    def _answer(self, packet: Packet, time_s: float) -> tuple[int, bytes]:
-        """Error number and data."""
+    def _answer(self, packet: ServoPacket, time_s: float) -> tuple[int, bytes]:
+        """Return error number and data."""
         answers: dict[int, Callable[[bytes, float], tuple[int, bytes]]] = {
             PING: self._ping,
             READ: self._read,
@@ -142,15 +142,15 @@ class Servo:
         if len(data) != 4:
             return LENGTH_ERROR, b""
         self.drive.measure(time_s)
-        found = self.memory.read(*_numbers(data))
-        return (found, b"") if isinstance(found, int) else (0, found)
+        data_or_error = self.memory.read(*_parse_address_and_length(data))
+        return (data_or_error, b"") if isinstance(data_or_error, int) else (0, data_or_error)
 
     def _write(self, data: bytes, time_s: float) -> tuple[int, bytes]:
-        writes = self.memory.parse(_numbers(data)[0], data[2:], self.drive.torque)
+        writes = self.memory.parse(_parse_address_and_length(data)[0], data[2:], self.drive.torque)
         return writes if isinstance(writes, int) else self._apply(writes, time_s), b""
 
     def _register(self, data: bytes, time_s: float) -> tuple[int, bytes]:
-        writes = self.memory.parse(_numbers(data)[0], data[2:], self.drive.torque)
+        writes = self.memory.parse(_parse_address_and_length(data)[0], data[2:], self.drive.torque)
         if isinstance(writes, int):
             return writes, b""
         self._registered, self.memory["Registered Instruction"] = writes, 1
@@ -169,23 +169,23 @@ class Servo:
         return 0, b""
 
     def _clear(self, data: bytes, time_s: float) -> tuple[int, bytes]:
-        if data != CLEAR_TURNS or self.moving(time_s):
+        if data != CLEAR_TURNS or self.is_moving(time_s):
             return RESULT_FAIL, b""
         self.drive.forget_turns(time_s)
         return 0, b""
 
-    def _sync(self, packet: Packet, time_s: float) -> bytes | None:
+    def _sync(self, packet: ServoPacket, time_s: float) -> bytes | None:
         head, rest = packet.parameters[:4], packet.parameters[4:]
         if packet.servo_id != BROADCAST or not rest:
             return None
-        own, length = self.memory["ID"], _numbers(head)[1]
+        servo_id, length = self.memory["ID"], _parse_address_and_length(head)[1]
         if packet.instruction == SYNC_READ:
-            if own not in rest or self.memory["Status Return Level"] == 0 or self.faults.dumb:
+            if servo_id not in rest or self.memory["Status Return Level"] == 0 or self.faults.dumb:
                 return None
             return self._status(*self._read(head, time_s))
-        for at in range(0, len(rest) - length, length + 1):
-            if rest[at] == own:
-                self._write(head[:2] + rest[at + 1 : at + 1 + length], time_s)
+        for offset in range(0, len(rest) - length, length + 1):
+            if rest[offset] == servo_id:
+                self._write(head[:2] + rest[offset + 1 : offset + 1 + length], time_s)
         return None
 
     def _status(self, error: int, data: bytes) -> bytes:
@@ -194,15 +194,15 @@ class Servo:
 
     def _apply(self, writes: list[Write], time_s: float) -> int:
         for write in writes:
-            if error := refusal(self.memory, write, self._model.senses_current, self.truth.firmware):
+            if error := find_write_error(self.memory, write, self._model.senses_current, self.truth.firmware):
                 return error
         for write in writes:
             self.memory[write.register.name] = write.value
-            self._after(write.register.name, write.value, time_s)
+            self._apply_side_effects(write.register.name, write.value, time_s)
         return 0
 
-    def _after(self, name: str, value: int, time_s: float) -> None:
-        """The side effects of a write."""
+    def _apply_side_effects(self, name: str, value: int, time_s: float) -> None:
+        """Apply the side effects of a write."""
         memory = self.memory
         if name == "Operating Mode":  # operating_mode_xl.md
             memory["Profile Velocity"] = memory["Profile Acceleration"] = 0
@@ -216,15 +216,15 @@ class Servo:
 
     # -- states --------------------------------------------------------------------------------------------------
     def _start(self, time_s: float) -> None:
-        """Begin anew, as after power-up."""
+        """Start as after power-up."""
         self.memory.forget()
         self._awake_s, self._registered = time_s, None
         self.drive.start(time_s)
         if "Startup Configuration" in self.memory and self.memory["Startup Configuration"] & 1:
             self.memory["Torque Enable"] = 1
-            self._after("Torque Enable", 1, time_s)
+            self._apply_side_effects("Torque Enable", 1, time_s)
 
 
-def _numbers(data: bytes) -> tuple[int, int]:
-    """Address and length, as they begin the parameters."""
+def _parse_address_and_length(data: bytes) -> tuple[int, int]:
+    """Return the address and the length with which the parameters begin."""
     return int.from_bytes(data[:2], "little"), int.from_bytes(data[2:4], "little")

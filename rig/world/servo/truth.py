@@ -1,4 +1,4 @@
-"""What a simulated servo and its line are in truth: nobody but the world knows it."""
+"""The true properties of a simulated servo and its line, known only to the world."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,15 +8,18 @@ from dataclasses import dataclass, field
 class ServoTruth:
     """One servo. Angles and rates are the shaft's.
 
-    `left` are EEPROM settings other than the factory's, by the manual's names. The encoder reads e₁ sin(θ + φ₁) +
-    e₂ sin(2θ + φ₂) too much; AS5045-class parts are out by ±1.3° in all. The gear's ripple is a share of the rate,
-    `ripple_per_turn` times a turn; the shaft follows the profile by `lag_s` later. `tick_ppm` is how much too fast its
-    clock goes. With torque off the shaft falls with `fall_deg_s` (0: what it carries is balanced).
+    - `settings`: EEPROM values other than the factory's, by the manual's names.
+    - `encoder_once_…`, `encoder_twice_…`: the encoder's error e₁ sin(θ + φ₁) + e₂ sin(2θ + φ₂); AS5045-class parts are
+      within ±1.3° in all.
+    - `ripple_fraction`: the gear's ripple as a fraction of the rate, `ripple_per_turn` times a revolution.
+    - `lag_s`: by which the shaft follows the profile.
+    - `tick_ppm`: the error of its clock, positive if fast.
+    - `fall_deg_s`: the rate at which the shaft falls with torque off; 0: its load is balanced.
     """
 
     model: str = "XM430-W350"
     firmware: int = 48
-    left: Mapping[str, int] = field(default_factory=dict)
+    settings: Mapping[str, int] = field(default_factory=dict)
     start_deg: float = 30.0
     encoder_once_deg: float = 1.0
     encoder_once_phase_deg: float = 40.0
@@ -38,9 +41,11 @@ class ServoTruth:
 
 @dataclass(frozen=True, slots=True)
 class LineTruth:
-    """The way between host and servos. `latency_ms`: the converter hands on what came this often (0: at once).
+    """The connection between host and servos.
 
-    `echo`: the host hears itself, as with converters of one wire. `reply_delay_ms`: every reply comes so much later.
+    - `latency_ms`: the interval at which the converter passes bytes on (0: at once).
+    - `echo`: whether the host receives its own bytes, as with one-wire converters.
+    - `reply_delay_ms`: an additional delay of every reply.
     """
 
     latency_ms: float = 0.0

@@ -27,7 +27,7 @@ class ReportLevel(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorCode:
+class ErrorReport:
     """What the pendant shows as `C100A7`: code and argument (error_code_texts.h of the maker's client library)."""
 
     code: int
@@ -37,9 +37,9 @@ class ErrorCode:
 
 MODE_CHANGED = 100  # the argument is the mode
 # The levels are assumed, and that a line out of reach is an invalid setpoint: the maker's tests want an error there.
-INVALID_SETPOINT = ErrorCode(204, 5, ReportLevel.VIOLATION)
-STOPPED_FOR_TEST = ErrorCode(209, 0, ReportLevel.VIOLATION)
-READ_ONLY = ErrorCode(210, 0, ReportLevel.WARNING)  # the socket, in local control
+INVALID_SETPOINT = ErrorReport(204, 5, ReportLevel.VIOLATION)
+STOPPED_FOR_TEST = ErrorReport(209, 0, ReportLevel.VIOLATION)
+READ_ONLY = ErrorReport(210, 0, ReportLevel.WARNING)  # the socket, in local control
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Message:
     text: str
     title: str = ""
     place: tuple[int, int] = (0, 0)
-    error: ErrorCode | None = None
+    error: ErrorReport | None = None
 
 
 class ProgramError(Exception):
@@ -81,7 +81,7 @@ class Messages:
     ) -> None:
         self._keep(Message(self.last + 1, kind, text[:TEXT_MAX], title, place))
 
-    def report(self, error: ErrorCode) -> None:
+    def report(self, error: ErrorReport) -> None:
         """Say an error by its code."""
         self._keep(Message(self.last + 1, MessageKind.ERROR_CODE, "", error=error))
 

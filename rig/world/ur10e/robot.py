@@ -10,7 +10,7 @@ from rig.world.ur10e.controller_messages import (
     INVALID_SETPOINT,
     MODE_CHANGED,
     STOPPED_FOR_TEST,
-    ErrorCode,
+    ErrorReport,
     MessageKind,
     Messages,
     OutOfReach,
@@ -19,8 +19,8 @@ from rig.world.ur10e.controller_messages import (
 )
 from rig.world.ur10e.faults import ArmFaults
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
-from rig.world.ur10e.motion.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
-from rig.world.ur10e.motion.joint_motion import Motion
+from rig.world.ur10e.motion.forward_kinematics import Vector, flange_pose, rotate_pose, rotation_from_vector
+from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.links import NOMINAL, Links
 from rig.world.ur10e.motion.models import MODELS, ArmModel
 from rig.world.ur10e.motion.tcp_motion import TcpMotion, tcp_motion
@@ -50,7 +50,7 @@ class Program(Protocol):
 
 
 @dataclass(slots=True)
-class Registers:
+class RegisterBank:
     """General-purpose registers of one direction."""
 
     bits: list[bool] = field(default_factory=lambda: [False] * 128)
@@ -72,7 +72,7 @@ class Robot:
     def __init__(
         self,
         identity: Identity,
-        motion: Motion,
+        motion: JointMotion,
         remote_control: bool,
         speed_slider: float,
         links: Links = NOMINAL,
@@ -92,8 +92,8 @@ class Robot:
         self._robot_mode = RobotMode.RUNNING
         self._safety_mode = SafetyMode.NORMAL
         self.runtime_state = RuntimeState.STOPPED
-        self.inputs = Registers()
-        self.outputs = Registers()
+        self.inputs = RegisterBank()
+        self.outputs = RegisterBank()
         self.claims: dict[str, object] = {}  # RTDE input → the connection that writes it
         self.digital_outputs = 0
         self.analog_outputs = [0.0, 0.0]
@@ -121,7 +121,7 @@ class Robot:
     def robot_mode(self, mode: RobotMode) -> None:
         """Every change is told at the primary interface, this and the safety mode's."""
         if mode != self._robot_mode:
-            self.messages.report(ErrorCode(MODE_CHANGED, mode, ReportLevel.INFO))
+            self.messages.report(ErrorReport(MODE_CHANGED, mode, ReportLevel.INFO))
         self._robot_mode = mode
 
     @property
@@ -270,7 +270,7 @@ class Robot:
         return True
 
     # -- safety and power ------------------------------------------------------------------------------------------
-    def protective_stop(self, why: ErrorCode = STOPPED_FOR_TEST) -> None:
+    def protective_stop(self, why: ErrorReport = STOPPED_FOR_TEST) -> None:
         if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
             self.messages.report(why)
             self._safety_stop(SafetyMode.PROTECTIVE_STOP)
@@ -384,7 +384,7 @@ class Robot:
 
     def _turned(self, pose: Sequence[float], sign: int) -> tuple[float, ...]:
         turn = [sign * angle for angle in self.tcp_offset[3:]]
-        return turned_pose(pose, rotation_from_vector(turn)) if any(turn) else tuple(pose)
+        return rotate_pose(pose, rotation_from_vector(turn)) if any(turn) else tuple(pose)
 
     def within_limits(self, q_rad: Sequence[float]) -> bool:
         """Whether the joints may stand so."""

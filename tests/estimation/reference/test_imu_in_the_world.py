@@ -7,15 +7,15 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import DELAY, Dwells
 from rig.estimation.reference.imu import solve_imu
 from rig.motion.geometry import flange_pose
-from rig.world.site import Site
-from rig.world.ur10e.motion.flange_motion import felt_of_turns, moved
+from rig.world.site import SiteTruth
+from rig.world.ur10e.motion.flange_motion import find_motion_from_cosines, transfer_force
 from rig.world.ur10e.motion.links import links
 from support.motions.arm_attitudes import joints_rad
 from support.motions.arm_sweeps import MICRO_G, joints_at, planned, signed_speed, with_readings
 
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])
-SITE = Site((0.0, 0.0, 0.0), (UP[0], UP[1], UP[2]))
+SITE = SiteTruth((0.0, 0.0, 0.0), (UP[0], UP[1], UP[2]))
 MATRIX = np.array([[1.013, 0.004, -0.011], [-0.006, 0.985, 0.008], [0.009, -0.012, 1.021]])
 BIAS_M_S2 = np.array([0.31, -0.22, 0.12])
 LEVER_M = np.array([0.025, 0.01, 0.03])
@@ -28,8 +28,8 @@ def read(joints: Array, speeds: Array) -> Array:
     drawing = links()
     angles = [q + link.theta_rad for q, link in zip(joints.T, drawing, strict=True)]
     turns = [(np.cos(angle), np.sin(angle)) for angle in angles]
-    felt = felt_of_turns(turns, list(speeds), [0.0] * 6, drawing, SITE)
-    force = moved(felt.rate_rad_s, felt.change_rad_s2, felt.force_m_s2, list(LEVER_M))
+    felt = find_motion_from_cosines(turns, list(speeds), [0.0] * 6, drawing, SITE)
+    force = transfer_force(felt.rate_rad_s, felt.change_rad_s2, felt.force_m_s2, list(LEVER_M))
     whole = np.array([component * np.ones(len(joints)) for component in force]).T
     return np.asarray(whole @ MATRIX.T + BIAS_M_S2, dtype=np.float64)
 

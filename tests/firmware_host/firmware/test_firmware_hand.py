@@ -10,7 +10,7 @@ from firmware_host.emulator.chip.gpio import Port
 from firmware_host.hand_answers import HandReport, HandSolved
 from rig.analysis.by_hand.on_board import BIAS_LIMIT_RAD_S, SCALE_LIMIT, BoardReadings, hand_agreement
 from rig.errors import Fault
-from rig.world.hand.habits import Action, Flip, Kind, Mistake, Turn
+from rig.world.hand.habits import Action, FlipAction, Mistake, MistakeKind, TurnAction
 from support.board.emulated_session import Session
 from support.board.hand_on_board import Played, alone, asked, begun, give, handled_alone, in_counts, play, pressed
 from support.board.host_board import HostBoard, configured, core, error_of
@@ -20,15 +20,15 @@ pytestmark = pytest.mark.slow
 
 REST_S = 1.6
 BUTTON = 6  # of port B
-SIXTEEN: tuple[Action, ...] = (*TWELVE, Turn(1), Turn(-1), Flip("+x"), Turn(1))
+SIXTEEN: tuple[Action, ...] = (*TWELVE, TurnAction(1), TurnAction(-1), FlipAction("+x"), TurnAction(1))
 
 
-def twelve(mistake_at: int | None = None, kind: Kind = "held", seed: int = 3) -> Recorded:
+def twelve(mistake_at: int | None = None, kind: MistakeKind = "held", seed: int = 3) -> Recorded:
     """Twelve flips, one of them with a mistake."""
     actions = list(TWELVE)
     if mistake_at is not None:
         flip = actions[mistake_at]
-        assert isinstance(flip, Flip)
+        assert isinstance(flip, FlipAction)
         actions[mistake_at] = replace(flip, mistake=Mistake(kind))
     return handle(actions, seed, rest_s=REST_S)
 
@@ -47,7 +47,7 @@ def played() -> Played:
 
 def test_twelve_flips_are_found_and_taken(played: Played) -> None:
     assert played.outcomes == ["taken"] * 12
-    assert [report.after for report in played.reports] == [flip.to for flip in TWELVE if isinstance(flip, Flip)]
+    assert [report.after for report in played.reports] == [flip.to for flip in TWELVE if isinstance(flip, FlipAction)]
     assert played.solved.state == "done"
     assert played.solved.taken == 12
 
@@ -76,14 +76,18 @@ def test_a_scale_of_the_turntables_part_needs_more_moves_and_whole_turns_count()
 
 
 def test_a_slow_part_that_is_left_alone_for_a_minute() -> None:
-    actions = (*TWELVE[:4], Flip("-y", Mistake("left", 60.0)), *TWELVE[5:])
+    actions = (*TWELVE[:4], FlipAction("-y", Mistake("left", 60.0)), *TWELVE[5:])
     slow = play(handle(actions, 1, replace(LSM9DS1, rate_hz=59.5), rest_s=2.0))
     assert slow.outcomes == ["taken"] * 12
     assert slow.agreement.matrix_difference < SCALE_LIMIT
 
 
 def test_a_touched_box_costs_nothing() -> None:
-    actions = (*TWELVE[:4], Flip("-x", Mistake("lifted")), *TWELVE[4:])  # lifted by a corner, and on that face already
+    actions = (
+        *TWELVE[:4],
+        FlipAction("-x", Mistake("lifted")),
+        *TWELVE[4:],
+    )  # lifted by a corner, and on that face already
     played = play(handle(actions, 1, rest_s=REST_S))
     assert [each for each in played.outcomes if each != "nothing"] == ["taken"] * 12
     assert "nothing" in played.outcomes
@@ -121,7 +125,7 @@ def test_a_box_that_lies_on_no_face_is_asked_again_and_the_move_from_there_tells
 
 
 def test_a_turn_that_ends_short_contradicts_what_is_known() -> None:
-    played = play(handle((*TWELVE, Turn(1, Mistake("short")), Turn(1)), 3, rest_s=REST_S), moves=14)
+    played = play(handle((*TWELVE, TurnAction(1, Mistake("short")), TurnAction(1)), 3, rest_s=REST_S), moves=14)
     assert played.outcomes == [*["taken"] * 12, "contradicts", "taken"]
 
 
@@ -181,7 +185,7 @@ def test_a_sensor_set_up_anew_ends_its_session_and_no_other() -> None:
 
 
 def test_the_lamp_tells_rest_taken_again_and_done() -> None:
-    recorded = handle((*TWELVE[:4], Turn(1), *TWELVE[4:]), 3, rest_s=4.0)
+    recorded = handle((*TWELVE[:4], TurnAction(1), *TWELVE[4:]), 3, rest_s=4.0)
     board, setup = begun()
     times_us, counts, forces = in_counts(recorded, setup)
     lit: dict[str, list[bool]] = {}

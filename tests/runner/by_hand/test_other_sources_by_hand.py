@@ -18,7 +18,7 @@ from rig.config.load import ConfigurationRefused, load, parse
 from rig.data.recording.hand_events import HandRested
 from rig.data.recording.run_file import read_run
 from rig.turners.registry import sections
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.external.handled_body import FAST_RAD_S, LSM9DS1
 from support.laboratories.commands import rig_here, wait_for_log
 from support.laboratories.drawn_laboratory import truth
@@ -101,7 +101,7 @@ def ran(source: str, folder: Path, *changes: dict[str, Any]) -> Ran:
 
 def began(laboratory: dict[str, Any], log: str) -> float:
     """When the run's own world began, by this computer's clock, while it goes on as fast as it is to."""
-    section = world_section(parse(yaml.safe_dump(laboratory), turners=sections()))
+    section = read_world_section(parse(yaml.safe_dump(laboratory), turners=sections()))
     (host,) = set(re.findall(r" at socket://([\d.]+):", log))
     with socket.create_connection((host, section.control_port), PATIENCE_S) as control:
         control.sendall(b'{"do": "state"}\n')

@@ -7,17 +7,26 @@ from pathlib import Path
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.world.hand.habits import FLIPS, Action, Flip, Habits, Turn
-from rig.world.hand.hand import Hand
+from rig.world.hand.habits import FLIPS, Action, FlipAction, Habits, TurnAction
+from rig.world.hand.hand import SimulatedHand
 from support.external.csv_tables import write_table
 
-TWELVE: tuple[Action, ...] = tuple(Flip(face) for face in FLIPS)
+TWELVE: tuple[Action, ...] = tuple(FlipAction(face) for face in FLIPS)
 SIX_TURNS: tuple[Action, ...] = (
-    Turn(1),
-    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (Flip(face), Turn(1))),
+    TurnAction(1),
+    *(each for face in ("+x", "+y", "-z", "-x", "-y") for each in (FlipAction(face), TurnAction(1))),
 )
 # Three faces, a turn either way on each.
-BOTH_WAYS: tuple[Action, ...] = (Turn(1), Turn(-1), Flip("+x"), Turn(1), Turn(-1), Flip("+y"), Turn(1), Turn(-1))
+BOTH_WAYS: tuple[Action, ...] = (
+    TurnAction(1),
+    TurnAction(-1),
+    FlipAction("+x"),
+    TurnAction(1),
+    TurnAction(-1),
+    FlipAction("+y"),
+    TurnAction(1),
+    TurnAction(-1),
+)
 RATE, LEVEL = ("x_rad_s", "y_rad_s", "z_rad_s"), ("x_m_s2", "y_m_s2", "z_m_s2")
 
 
@@ -59,11 +68,11 @@ def handle(
     actions: Sequence[Action], seed: int, part: Part = LSM9DS1, habits: Habits | None = None, rest_s: float = 1.2
 ) -> Recorded:
     rng = np.random.default_rng(seed + 1_000_000)
-    hand, now_s = Hand(habits or Habits(), seed), 1.5
+    hand, now_s = SimulatedHand(habits or Habits(), seed), 1.5
     for action in actions:
         now_s = hand.act(action, now_s) + rest_s
     time_s = np.arange(0, now_s, 1 / part.rate_hz)
-    felt = hand.felt_at(time_s)
+    felt = hand.motion_at(time_s)
     matrix, bias = np.eye(3) + 0.02 * rng.normal(size=(3, 3)), 0.01 * rng.normal(size=3)
     walk = part.walk_rad_s_sqrt_s / np.sqrt(part.rate_hz) * np.cumsum(rng.normal(size=(len(time_s), 3)), axis=0)
     sensitivity = np.radians(part.g_sensitivity_deg_s) / 9.81 * rng.normal(size=(3, 3))

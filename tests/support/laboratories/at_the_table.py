@@ -116,7 +116,7 @@ class Table:
         for time_s in times.tolist():
             while self.operator.time_s < time_s:
                 self.operator.step()
-            felt.append(self.operator.felt_at(time_s))
+            felt.append(self.operator.motion_at(time_s))
         self.time_s = float(times[-1])
         if self.time_s > LONGEST_S:
             raise TimeoutError("the session has no end")

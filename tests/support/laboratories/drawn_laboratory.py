@@ -12,7 +12,7 @@ from firmware_host.emulator.parts.gyroscope import readings
 from rig.config.load import parse
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.laboratories.ideal import ideal_document
 from support.laboratories.worlds import merge
 from support.paths import CONFIGS
@@ -168,7 +168,7 @@ def bias_at_0_g(document: Mapping[str, Any], name: str, windows_s: Iterable[tupl
 
 def _sensor_and_seed(document: Mapping[str, Any], name: str) -> tuple[SensorTruth, np.random.SeedSequence]:
     loaded = parse(yaml.safe_dump(dict(document)))
-    world = world_section(loaded)
+    world = read_world_section(loaded)
     sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
     return sensor, np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
 

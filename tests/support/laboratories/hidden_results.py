@@ -18,7 +18,7 @@ from rig.errors import RigError
 from rig.estimation.gyroscope.budget import Budget
 from rig.observation.observed_run import ObservedRun
 from rig.plans.recorded import judged, open_run
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from support.laboratories.drawn_laboratory import bias_at_0_g, truth
 
 SCALE, BIAS = "gyroscope scale", "gyroscope bias"
@@ -95,7 +95,7 @@ def true_accelerometer(document: Mapping[str, Any], name: str, found: Accelerome
     Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. A bias that wanders is its mean
     over the dwells.
     """
-    sensor = world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
+    sensor = read_world_section(parse(yaml.safe_dump(dict(document)))).sensors[name]
     drawn = sensor.accelerometer
     at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
     warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))

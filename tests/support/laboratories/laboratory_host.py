@@ -10,7 +10,7 @@ from firmware_host.parts import GYROSCOPES
 from rig.config.load import Loaded
 from rig.world.board.serial_line import SerialLine
 from rig.world.laboratory import Laboratory
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 
 SENSORS = tuple(GYROSCOPES)  # the board's table
 
@@ -24,13 +24,13 @@ class Host:
     received: bytearray
 
     def ask(self, name: str, sequence: int, values: dict[str, Any] | None = None) -> None:
-        self.line.to_device(encode(name, sequence, values), None)
+        self.line.send_to_device(encode(name, sequence, values), None)
 
     def ticks(self, count: int) -> None:
         for _ in range(count):
             self.laboratory.step()
             self.line.tick()
-            self.received += self.line.to_host(None)
+            self.received += self.line.read_as_host(None)
 
     def samples(self, sensor: int = 0) -> np.ndarray:
         """(n, 3) counts of every sample of one sensor received so far."""
@@ -50,7 +50,7 @@ class Host:
 
 def booted(loaded: Loaded) -> Host:
     """A laboratory whose board has started."""
-    laboratory = Laboratory(loaded.config, world_section(loaded))
+    laboratory = Laboratory(loaded.config, read_world_section(loaded))
     new = Host(laboratory, SerialLine(lambda: laboratory.board), bytearray())
     new.ticks(200)
     return new

@@ -28,10 +28,10 @@ from rig.turners.servo.models import named
 from rig.turners.servo.moves import move_of
 from rig.turners.servo.registers import DRIVE_MODE, GOAL, OPERATING_MODE, PROFILE, STATE, TORQUE, Register
 from rig.turners.servo.state import JOINTS, SERVO_STATE_DTYPE, decode
-from rig.world.servo.servo import Servo
+from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.shaft import Shaft
 from rig.world.servo.truth import ServoTruth
-from rig.world.servo.wire_format import READ, WRITE, Packet
+from rig.world.servo.wire_format import READ, WRITE, ServoPacket
 from support.paths import ROOT
 from support.recordings.synthetic_run import PROVENANCE, SENSITIVITY, SENSOR
 
@@ -56,25 +56,27 @@ class Drawn:
 
 Until = tuple[float, float, float]  # when a stage ends, s, by how much the sensor's clock is off, and its noise, rad/s
 # What reads a `servo` by `rows` (3, 3) in the sensor, of such scale and bias, and how a recording describes it.
-Source = Callable[[Servo, Array, tuple[Array, Array], Until, np.random.Generator], tuple[RecordedSensor, np.ndarray]]
+Source = Callable[
+    [SimulatedServo, Array, tuple[Array, Array], Until, np.random.Generator], tuple[RecordedSensor, np.ndarray]
+]
 
 
 class Far:
     """A servo, spoken to in virtual time."""
 
     def __init__(self, truth: ServoTruth) -> None:
-        self.servo = Servo(truth, BEGINS_S - 1.0)
+        self.servo = SimulatedServo(truth, BEGINS_S - 1.0)
         self.model = named(truth.model.lower().replace("-", "_"))
 
     def write(self, time_s: float, register: Register, *values: int) -> None:
         data = register.address.to_bytes(2, "little") + register.pack(*values)
         self.servo.advance(time_s)
-        self.servo.obey(Packet(1, WRITE, data, True), time_s)
+        self.servo.obey(ServoPacket(1, WRITE, data, True), time_s)
 
     def read(self, time_s: float, register: Register) -> bytes:
         asked = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
         self.servo.advance(time_s)
-        answer = self.servo.obey(Packet(1, READ, asked, True), time_s)
+        answer = self.servo.obey(ServoPacket(1, READ, asked, True), time_s)
         assert answer is not None and answer[8] & 0x7F == 0
         return answer[9:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
 
@@ -206,7 +208,13 @@ def _driven(
 
 
 def _sampled(
-    servo: Servo, rows: Array, model: tuple[Array, Array], until: Until, rng: np.random.Generator, *, rate_hz: float
+    servo: SimulatedServo,
+    rows: Array,
+    model: tuple[Array, Array],
+    until: Until,
+    rng: np.random.Generator,
+    *,
+    rate_hz: float,
 ) -> tuple[RecordedSensor, np.ndarray]:
     """The samples of a gyroscope that sits by `rows` (3, 3) on the shaft, `until` a time, by a drifting clock."""
     (scale, bias), (end_s, drift, noise_rad_s) = model, until

@@ -14,7 +14,7 @@ from rig.estimation.reference.magnetometer import Uniformity, uniformity
 from rig.estimation.reference.reference_model import KnownNorm
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.world.board.magnetometer_truth import MountedMagnetometer
-from rig.world.magnetic_field import magnetic_field_of
+from rig.world.magnetic_field import build_magnetic_field
 from rig.world.ur10e.motion.forward_kinematics import frames
 
 FIELD_UT = 48.0
@@ -55,12 +55,12 @@ def seen(
     section = MountingSection.model_validate(mounting)
     simulated = SimulatedMagnetometerSection.model_validate(TRUTH)
     mounted = MountedMagnetometer(section, simulated, offset_mm=(0.0, 0.0, extension_mm))
-    field = magnetic_field_of(
+    field = build_magnetic_field(
         SiteSection.model_validate({"magnetic_field_ut": FIELD_UT, "magnetic_dip_deg": 65.0} | dict(site or {})),
         [IronSection.model_validate(each) for each in iron],
     )
     poses = [list(frames([*ARM, *np.radians(wrists)])) for wrists in SETS["magnetic"]]
-    felt = np.array([mounted.feels(field, pose, 0.0) for pose in poses])
+    felt = np.array([mounted.sense(field, pose, 0.0) for pose in poses])
     matrix = _matrix()
     rng = np.random.default_rng(seed)
     readings = felt @ matrix.T + np.array(mounted.truth.bias_t) + rng.normal(0.0, NOISE_T, felt.shape)

@@ -16,7 +16,7 @@ from rig.sensors.mavlink.source import mavlink
 from rig.sensors.source import SampleSource
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.lines.printer import Printer
-from rig.world.servo.servo import Servo
+from rig.world.servo.servo import SimulatedServo
 from support.motions.drawn_servo import BEGINS_S, Until
 from support.processes.waiting import PATIENCE_S
 from support.wires.autopilot_on_a_wire import autopilot_on_a_wire, section
@@ -31,7 +31,7 @@ Model = tuple[Array, Array]
 
 
 def by_lines(
-    servo: Servo, rows: Array, model: Model, until: Until, rng: np.random.Generator
+    servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
     """A device that prints its time and three rates in steps of 0.001 °/s."""
     end_s, drift, _ = until
@@ -75,7 +75,7 @@ def by_lines(
 
 
 def by_autopilot(
-    servo: Servo, rows: Array, model: Model, until: Until, rng: np.random.Generator
+    servo: SimulatedServo, rows: Array, model: Model, until: Until, rng: np.random.Generator
 ) -> tuple[RecordedSensor, np.ndarray]:
     """ArduPilot's first IMU behind its low-pass, with offsets to be undone."""
     end_s, drift, _ = until
@@ -123,7 +123,7 @@ class _Taken:
         return np.concatenate(self._parts)
 
 
-def _felt(servo: Servo, rows: Array) -> Callable[[float], Sequence[float]]:
+def _felt(servo: SimulatedServo, rows: Array) -> Callable[[float], Sequence[float]]:
     """Rate, rad/s, and specific force, g, on a shaft that stands upright."""
     along = rows[:, 2]
 

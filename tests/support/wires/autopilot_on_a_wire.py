@@ -10,7 +10,7 @@ import numpy as np
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.config.world.laboratory import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.autopilot.autopilot import SimulatedAutopilot
-from rig.world.autopilot.imu import Imu
+from rig.world.autopilot.imu import SimulatedImu
 from rig.world.autopilot.parameters import Parameters
 from rig.world.board.sensor_truth import SensorTruth
 from support.wires.device_on_a_wire import DeviceOnAWire
@@ -74,7 +74,7 @@ class AutopilotOnAWire:
         truth = SensorTruth(section("x"), self._simulated)
         px4 = self._firmware == "px4"
         imus = [
-            Imu(place, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(place))
+            SimulatedImu(place, truth, self._motion_at, self.parameters, px4=px4, seed=np.random.SeedSequence(place))
             for place in range(self._imus)
         ]
         self.autopilot = SimulatedAutopilot(

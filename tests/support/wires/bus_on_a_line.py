@@ -9,7 +9,7 @@ from typing import Protocol
 
 from rig.world.board.pty_port import PtyPort
 from rig.world.board.serial_line import SerialLine
-from rig.world.servo.bus import Bus
+from rig.world.servo.bus import SimulatedBus
 
 TICK_S = 0.002  # the world looks at its servos at least this often
 
@@ -49,13 +49,13 @@ class TcpPort:
             with suppress(OSError):
                 data = self._client.recv(4096)
         if data:
-            self._line.to_device(data, None)
+            self._line.send_to_device(data, None)
         else:
             self._hang_up()
 
     def tick(self) -> None:
         """Hand on what the servos sent."""
-        if self._line.fresh and self._client is not None and (data := self._line.to_host(None)):
+        if self._line.fresh and self._client is not None and (data := self._line.read_as_host(None)):
             with suppress(OSError):
                 self._client.sendall(data)
 
@@ -80,7 +80,7 @@ class BusOnALine:
 
     def __init__(
         self,
-        make: Callable[[Callable[[], float]], Bus],
+        make: Callable[[Callable[[], float]], SimulatedBus],
         now: Callable[[], float],
         move_on: Callable[[], None],
         *,

@@ -15,8 +15,8 @@ from random import Random
 
 from rig.turners.ur.controller import dashboard, primary, rtde_packages, state_stream
 from rig.world.laboratory import Laboratory
-from rig.world.network import Session
-from rig.world.section import world_section
+from rig.world.network import ClientSession
+from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
 from rig.world.ur10e.interfaces.primary import CONFIGURATION, STATE, PrimarySession
 from rig.world.ur10e.interfaces.primary import package as primary_package
@@ -207,7 +207,7 @@ ORDERS = (
 
 def _laboratory() -> Laboratory:
     loaded = ideal(DEMO)
-    laboratory = Laboratory(loaded.config, world_section(loaded))
+    laboratory = Laboratory(loaded.config, read_world_section(loaded))
     laboratory.unplug()
     return laboratory
 
@@ -229,7 +229,7 @@ def _program(random: Random) -> bytes:
     return f"{random.choice(('def', 'sec'))} odd():\n{lines}\nend\n".encode()
 
 
-SESSIONS: Mapping[str, Callable[[Robot], Session]] = {
+SESSIONS: Mapping[str, Callable[[Robot], ClientSession]] = {
     "RTDE": RtdeSession,
     "dashboard": DashboardSession,
     "primary": PrimarySession,
@@ -243,11 +243,11 @@ def carry_to_world(name: str, count: int, seed: int) -> Counter[str]:
     waits for the rest of a message hears none of those that follow.
     """
     random, ends, laboratory = Random(f"{name} {seed}"), Counter[str](), _laboratory()
-    session: Session | None = None
+    session: ClientSession | None = None
     for number in range(count):
         if session is None or session.closing or number % SESSION == 0:
             if session is not None:
-                session.closed()
+                session.handle_close()
                 ends["hung up on"] += session.closing
             if number % RECOVERY == 0:
                 _recover(laboratory)

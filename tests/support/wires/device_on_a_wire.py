@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from rig.world.board.pty_port import PtyPort
 from rig.world.board.serial_line import Device, SerialLine
-from rig.world.clock import Clock
+from rig.world.clock import WorldClock
 from support.processes.waiting import PATIENCE_S
 
 IDLE_S = 0.001
@@ -30,7 +30,7 @@ class DeviceOnAWire:
         self.time_s, self.limit_s = 0.0, float("inf")
         self.line = SerialLine(device, seed=5)
         self.line.silent = dead  # before a byte is under way
-        self.clock = Clock(pace, time.monotonic, tick_s)
+        self.clock = WorldClock(pace, time.monotonic, tick_s)
         self._selector = selectors.DefaultSelector()
         self._pty = PtyPort(self.line, self._selector)
         self.port = self._pty.path

@@ -8,8 +8,8 @@ import numpy as np
 from rig.config.sensors.sensor_sections import SensorSection
 from rig.config.world.laboratory import SimulatedKvhSection, SimulatedSensorSection
 from rig.world.board.sensor_truth import SensorTruth
-from rig.world.kvh1775.instrument import Kvh1775, no_field
-from rig.world.kvh1775.memory import Memory
+from rig.world.kvh1775.instrument import SimulatedKvh1775, no_field
+from rig.world.kvh1775.memory import KvhMemory
 from support.wires.device_on_a_wire import DeviceOnAWire
 
 SERIAL_NUMBER = "1775-7"
@@ -43,10 +43,10 @@ class KvhOnAWire:
         *,
         dead: bool = False,
     ) -> None:
-        self.memory = Memory(left)
+        self.memory = KvhMemory(left)
         self._field_at = field_at
         self._motion_at, self._on_for_s = motion_at, uptime_s
-        self.kvh: Kvh1775 | None = None
+        self.kvh: SimulatedKvh1775 | None = None
         self.wire = DeviceOnAWire(lambda: self.kvh, TICK_S, pace, dead=dead)
         self.line, self.port = self.wire.line, self.wire.port
         self.switch_on()
@@ -55,7 +55,7 @@ class KvhOnAWire:
     def switch_on(self) -> None:
         sensor = section("x", acceleration={"range_g": 10})
         truth = SensorTruth(sensor, SimulatedSensorSection(scale=(1, 1, 1), bias_rad_s=(0, 0, 0), noise_rad_s=1e-5))
-        self.kvh = Kvh1775(
+        self.kvh = SimulatedKvh1775(
             truth,
             self._motion_at,
             self.memory,
@@ -67,7 +67,7 @@ class KvhOnAWire:
             time_s=self.wire.time_s,
         )
 
-    def order(self, what: Callable[[Kvh1775], None]) -> None:
+    def order(self, what: Callable[[SimulatedKvh1775], None]) -> None:
         """Let the instrument's own thread do it, and wait until it is done."""
 
         def carry_out() -> None:

@@ -5,10 +5,10 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
-from rig.world.servo.bus import Bus
-from rig.world.servo.servo import Servo
+from rig.world.servo.bus import SimulatedBus
+from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
-from rig.world.servo.wire_format import REBOOT, WRITE, Packet
+from rig.world.servo.wire_format import REBOOT, WRITE, ServoPacket
 from support.processes.forked import forked
 from support.processes.yoked_clock import YokedClock
 from support.wires.bus_on_a_line import BusOnALine
@@ -26,14 +26,14 @@ class _FarEnd:
     def __init__(self, clock: YokedClock, truths: tuple[ServoTruth, ...], line: LineTruth, pty: bool) -> None:
         self._now = clock.time_s
 
-        def bus(now: Callable[[], float]) -> Bus:
-            return Bus([Servo(each, now()) for each in truths], line, now, seed=7)
+        def bus(now: Callable[[], float]) -> SimulatedBus:
+            return SimulatedBus([SimulatedServo(each, now()) for each in truths], line, now, seed=7)
 
         self.far = BusOnALine(bus, self._now, clock.move_on, pty=pty)
         self.far.line.host_baud = None if pty else BAUD
 
     @property
-    def servo(self) -> Servo:
+    def servo(self) -> SimulatedServo:
         return self.far.bus.servos[0]
 
     def port(self) -> str:
@@ -61,11 +61,11 @@ class _FarEnd:
         setattr(self.far.bus, name, value)
 
     def switch(self, on: bool) -> None:
-        self.servo.switch(on, self._now())
+        self.servo.switch_supply(on, self._now())
 
     def let_go(self) -> None:
         """Somebody else switches torque off."""
-        self.servo.obey(Packet(1, WRITE, b"\x40\0\0", True), self._now())
+        self.servo.obey(ServoPacket(1, WRITE, b"\x40\0\0", True), self._now())
 
     def trip(self) -> None:
         """Let the watchdog run out."""
@@ -73,11 +73,11 @@ class _FarEnd:
 
     def reboot(self) -> None:
         """Somebody else starts it anew."""
-        self.servo.obey(Packet(1, REBOOT, b"", True), self._now())
+        self.servo.obey(ServoPacket(1, REBOOT, b"", True), self._now())
 
     def add(self, truth: ServoTruth) -> None:
         """Another servo is plugged in."""
-        self.far.bus.servos = [*self.far.bus.servos, Servo(truth, self._now())]
+        self.far.bus.servos = [*self.far.bus.servos, SimulatedServo(truth, self._now())]
 
     def pull_out(self) -> None:
         self.far.pull_out()
@@ -153,7 +153,7 @@ def servo_on_a_wire(*truths: ServoTruth, line: LineTruth = PLAIN, pty: bool = Fa
 
     Its port is a pseudo-terminal (`pty`), or one at socket://, which carries no baud rate: the host's is `BAUD`.
     """
-    wire = ServoOnAWire(truths or (ServoTruth(left=SET_UP),), line, pty=pty)
+    wire = ServoOnAWire(truths or (ServoTruth(settings=SET_UP),), line, pty=pty)
     try:
         yield wire
     finally:

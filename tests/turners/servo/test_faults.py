@@ -40,7 +40,7 @@ FAULTS: dict[str, tuple[Act, set[str]]] = {
     "every reply damaged": (lambda wire: wire.do("of_bus", "spoil", MANY), {"servo_replies_damaged"}),
     "every reply lost": (lambda wire: wire.do("of_bus", "lose", MANY), {"servo_link_lost"}),
     "a second servo with its ID": (
-        lambda wire: wire.do("add", ServoTruth(left=SET_UP, start_deg=200.0, seed=9)),
+        lambda wire: wire.do("add", ServoTruth(settings=SET_UP, start_deg=200.0, seed=9)),
         {"servo_replies_damaged", "servo_link_lost", "servo_restarted", "servo_hardware_error"},
     ),
     "watchdog tripped": (lambda wire: wire.do("trip"), {"servo_watchdog_tripped"}),
@@ -52,7 +52,7 @@ FAULTS: dict[str, tuple[Act, set[str]]] = {
 @pytest.mark.parametrize("what", FAULTS)
 def test_a_fault_is_named_and_the_shaft_stands_within_a_second_of_it(what: str) -> None:
     act, names = FAULTS[what]
-    truth = ServoTruth(left=SET_UP | {"Shutdown": 0x35}, overload_after_s=0.3)
+    truth = ServoTruth(settings=SET_UP | {"Shutdown": 0x35}, overload_after_s=0.3)
     with servo_on_a_wire(truth) as wire:
         with pytest.raises(Fault) as fault, held(wire, WATCHDOG_S) as servo:
             servo.move(turn(servo.latest.q_rad[0], 340.0), at_speed(wire, lambda: act(wire)))
@@ -107,7 +107,7 @@ def test_a_driver_that_says_nothing_for_too_long_is_stopped_by_the_watchdog() ->
 
 
 def test_a_shaft_that_does_not_arrive_is_stopped() -> None:
-    truth = ServoTruth(left=SET_UP, overload_after_s=1000.0)
+    truth = ServoTruth(settings=SET_UP, overload_after_s=1000.0)
     with servo_on_a_wire(truth) as wire:
         with pytest.raises(Fault) as fault, held(wire) as servo:
             watch = at_speed(wire, lambda: wire.do("fault", "held_fast", True))
@@ -116,7 +116,7 @@ def test_a_shaft_that_does_not_arrive_is_stopped() -> None:
 
 
 def test_a_falling_board_is_told_where_torque_is_gone() -> None:
-    truth = ServoTruth(left=SET_UP, fall_deg_s=-40.0)
+    truth = ServoTruth(settings=SET_UP, fall_deg_s=-40.0)
     with servo_on_a_wire(truth) as wire:
         with pytest.raises(Fault) as fault, held(wire) as servo:
             watch = at_speed(wire, lambda: wire.do("fault", "temperature_c", 85.0))

@@ -56,7 +56,7 @@ def test_moves_arrive_and_the_shaft_stays_held_without_anybody_speaking_to_it() 
 def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured() -> None:
     states: list[ServoState] = []
     with (
-        servo_on_a_wire(ServoTruth("XM430-W210", left=SET_UP)) as wire,
+        servo_on_a_wire(ServoTruth("XM430-W210", settings=SET_UP)) as wire,
         Servo(wire.port, "xm430_w210", states.append, watchdog_s=2.0, clock=wire.clock) as servo,
     ):
         servo.take_control(BOARD)
@@ -72,7 +72,7 @@ def test_a_whole_turn_is_asked_for_to_the_millisecond_and_its_speed_is_measured(
 
 @pytest.mark.slow
 def test_a_servo_as_delivered_is_put_into_extended_position_and_time_based_profile() -> None:
-    with servo_on_a_wire(ServoTruth(left={"Baud Rate": 3})) as wire:
+    with servo_on_a_wire(ServoTruth(settings={"Baud Rate": 3})) as wire:
         with held(wire) as servo:
             servo.move(turn(servo.latest.q_rad[0], 20.0))
         assert (wire.do("register", "Operating Mode"), wire.do("register", "Drive Mode")) == (4, 4)

@@ -20,18 +20,18 @@ from support.wires.servo_on_a_wire import PLAIN, SET_UP, servo_on_a_wire
 
 pytestmark = pytest.mark.usefixtures("no_crowd")  # their clock stands while the machine is busy
 
-GOOD = ServoTruth(left=SET_UP)
+GOOD = ServoTruth(settings=SET_UP)
 
 
 def set_up(**registers: int) -> ServoTruth:
-    return replace(GOOD, left=SET_UP | {name.replace("_", " "): value for name, value in registers.items()})
+    return replace(GOOD, settings=SET_UP | {name.replace("_", " "): value for name, value in registers.items()})
 
 
 REFUSED: dict[str, tuple[str, tuple[ServoTruth, ...], LineTruth]] = {
     "another model": ("other_servo", (replace(GOOD, model="XM430-W210"),), PLAIN),
     "a model nobody knows": ("other_servo", (set_up(Model_Number=1200),), PLAIN),
-    "no watchdog": ("servo_firmware_old", (replace(GOOD, firmware=37, left={"Baud Rate": 3}),), PLAIN),
-    "no time-based profile": ("servo_firmware_old", (replace(GOOD, firmware=41, left={"Baud Rate": 3}),), PLAIN),
+    "no watchdog": ("servo_firmware_old", (replace(GOOD, firmware=37, settings={"Baud Rate": 3}),), PLAIN),
+    "no time-based profile": ("servo_firmware_old", (replace(GOOD, firmware=41, settings={"Baud Rate": 3}),), PLAIN),
     "torque on by itself": ("servo_starts_by_itself", (set_up(Startup_Configuration=1),), PLAIN),
     "RAM restored": ("servo_starts_by_itself", (set_up(Startup_Configuration=2),), PLAIN),
     "homing offset": ("servo_homing_offset", (set_up(Homing_Offset=-100),), PLAIN),

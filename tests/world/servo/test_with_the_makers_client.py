@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from rig.world.servo.registers import MODELS
-from rig.world.servo.servo import Servo
+from rig.world.servo.servo import SimulatedServo
 from rig.world.servo.truth import LineTruth, ServoTruth
-from rig.world.servo.wire_format import Packet, Receiver, encode, encode_status
+from rig.world.servo.wire_format import Receiver, ServoPacket, encode, encode_status
 from support.processes.waiting import wait_for
 from support.wires.servo_on_a_wire import PLAIN, ServoOnAWire, servo_on_a_wire
 
@@ -42,13 +42,13 @@ def client(
 @pytest.mark.parametrize("model", MODELS)
 def test_every_register_of_the_maker_s_own_table_is_there(model: str) -> None:
     table = ControlTable.getControlTable(MODELS[model].number)
-    with client(ServoTruth(model, left=FAST)) as (port, packets, _):
+    with client(ServoTruth(model, settings=FAST)) as (port, packets, _):
         assert packets.ping(port, 1) == (MODELS[model].number, 0, 0)
-        own = Servo(ServoTruth(model), 0.0).memory
+        own = SimulatedServo(ServoTruth(model), 0.0).memory
         for name, item in table.items():
             data, result, error = packets.readTxRx(port, 1, item.address, item.size)
             assert (result, error, len(data)) == (0, 0, item.size), name
-            register = own._at[item.address]
+            register = own._by_address[item.address]
             assert (register.size, register.name) == (item.size, OTHER_NAMES.get(name, name))
 
 
@@ -56,13 +56,13 @@ def test_every_register_of_the_maker_s_own_table_is_there(model: str) -> None:
 def test_there_is_no_register_of_which_the_maker_s_table_knows_nothing(model: str) -> None:
     table = ControlTable.getControlTable(MODELS[model].number)
     known = {item.address for item in table.values()} | {60, 147}  # the manual has these two
-    own = Servo(ServoTruth(model), 0.0).memory
+    own = SimulatedServo(ServoTruth(model), 0.0).memory
     spare = {r.name for r in own._by_name.values() if r.address not in known and not r.name.startswith("Indirect")}
     assert spare == set()
 
 
 def test_a_negative_position_comes_as_two_s_complement_and_the_block_in_one_packet() -> None:
-    with client(ServoTruth(left=FAST | {"Homing Offset": -1000}, start_deg=1.0)) as (port, packets, _):
+    with client(ServoTruth(settings=FAST | {"Homing Offset": -1000}, start_deg=1.0)) as (port, packets, _):
         position, *_ = packets.read4ByteTxRx(port, 1, 132)
         assert 2**32 - 1000 <= position < 2**32
         data, result, error = packets.readTxRx(port, 1, 120, 27)
@@ -70,7 +70,7 @@ def test_a_negative_position_comes_as_two_s_complement_and_the_block_in_one_pack
 
 
 def test_errors_have_the_manual_s_numbers() -> None:
-    with client(ServoTruth(left=FAST | {"Operating Mode": 4})) as (port, packets, _):
+    with client(ServoTruth(settings=FAST | {"Operating Mode": 4})) as (port, packets, _):
         assert packets.write1ByteTxRx(port, 1, 11, 2) == (0, 4), "no such mode: data range"
         assert packets.write2ByteTxRx(port, 1, 116, 5) == (0, 5), "half a goal: data length"
         assert packets.write2ByteTxRx(port, 1, 120, 5) == (0, 7), "read only: access"
@@ -85,7 +85,7 @@ def test_errors_have_the_manual_s_numbers() -> None:
 
 @pytest.mark.slow
 def test_sync_read_is_answered_by_one_after_the_other() -> None:
-    with client(ServoTruth(left=FAST), ServoTruth(left=FAST | {"ID": 2}, start_deg=90.0)) as (port, packets, _):
+    with client(ServoTruth(settings=FAST), ServoTruth(settings=FAST | {"ID": 2}, start_deg=90.0)) as (port, packets, _):
         group = dynamixel_sdk.GroupSyncRead(port, packets, 132, 4)
         assert group.addParam(1) and group.addParam(2)
         assert group.txRxPacket() == 0
@@ -97,25 +97,29 @@ def test_sync_read_is_answered_by_one_after_the_other() -> None:
 
 @pytest.mark.slow
 def test_two_with_one_id_spoil_each_other_s_answers() -> None:
-    with client(ServoTruth(left=FAST), ServoTruth(left=FAST, start_deg=200.0), patience_ms=200.0) as (port, packets, _):
+    with client(ServoTruth(settings=FAST), ServoTruth(settings=FAST, start_deg=200.0), patience_ms=200.0) as (
+        port,
+        packets,
+        _,
+    ):
         results = [packets.readTxRx(port, 1, 120, 27)[1] for _ in range(5)]
         assert CORRUPT in results
 
 
 def test_an_echo_is_skipped_by_the_client() -> None:
-    with client(ServoTruth(left=FAST), line=LineTruth(echo=True)) as (port, packets, _):
+    with client(ServoTruth(settings=FAST), line=LineTruth(echo=True)) as (port, packets, _):
         assert packets.read2ByteTxRx(port, 1, 0) == (1020, 0, 0)
 
 
 def test_another_baud_rate_is_silence() -> None:
-    with client(ServoTruth(left=FAST | {"Baud Rate": 1}), patience_ms=200.0) as (port, packets, _):
+    with client(ServoTruth(settings=FAST | {"Baud Rate": 1}), patience_ms=200.0) as (port, packets, _):
         assert packets.ping(port, 1)[1] in (NO_REPLY, CORRUPT)
         assert port.setBaudRate(57600)
         wait_for(lambda: packets.ping(port, 1) == (1020, 0, 0), "its answer")
 
 
 def test_the_alert_bit_is_in_every_reply_until_a_reboot() -> None:
-    with client(ServoTruth(left=FAST, boot_s=0.02)) as (port, packets, far):
+    with client(ServoTruth(settings=FAST, boot_s=0.02)) as (port, packets, far):
         assert packets.write1ByteTxRx(port, 1, 64, 1) == (0, 0)
         far.do("fault", "temperature_c", 85.0)
         data, result, error = packets.readTxRx(port, 1, 64, 1)
@@ -153,10 +157,10 @@ EXAMPLES = {
 
 def test_the_manual_s_examples_are_answered_byte_by_byte() -> None:
     still = ServoTruth("XM430-W210", 38, start_deg=166.5 / 4096 * 360, encoder_noise_deg=0.0, ripple_fraction=0.0)
-    servo, receiver = Servo(still, 0.0), Receiver()
+    servo, receiver = SimulatedServo(still, 0.0), Receiver()
     for time_s, (name, (sent, answered)) in enumerate(EXAMPLES.items()):
-        packets = list(receiver.hear(bytes.fromhex(sent), float(time_s)))
-        assert [packet.whole for packet in packets] == [True], name
+        packets = list(receiver.receive(bytes.fromhex(sent), float(time_s)))
+        assert [packet.is_valid for packet in packets] == [True], name
         assert servo.obey(packets[0], float(time_s)) == bytes.fromhex(answered), name
     clear = "FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC"  # firmware 42 and later; 38 does not know it
     assert encode(1, 0x10, b"\x01DXL\x22") == bytes.fromhex(clear)
@@ -170,14 +174,14 @@ def test_a_header_inside_a_packet_is_stuffed_and_found_again_after_garbage_and_i
     packet = encode(1, 3, data)
     assert len(packet) == 7 + 1 + len(data) + 2 + 2
     receiver = Receiver()
-    heard = [found for byte in b"\x00\xff\xff\xfd" + packet for found in receiver.hear(bytes([byte]), 0.0)]
-    assert heard == [Packet(1, 3, data, True)]
+    heard = [found for byte in b"\x00\xff\xff\xfd" + packet for found in receiver.receive(bytes([byte]), 0.0)]
+    assert heard == [ServoPacket(1, 3, data, True)]
 
 
 def test_a_damaged_instruction_is_answered_by_crc_error_and_not_obeyed() -> None:
-    servo, receiver = Servo(ServoTruth(), 0.0), Receiver()
+    servo, receiver = SimulatedServo(ServoTruth(), 0.0), Receiver()
     packet = bytearray(encode(1, 3, b"\x40\x00\x01"))
     packet[-3] ^= 0x02
-    (damaged,) = receiver.hear(bytes(packet), 0.0)
+    (damaged,) = receiver.receive(bytes(packet), 0.0)
     assert servo.obey(damaged, 0.0) == encode_status(1, 3)
     assert servo.memory["Torque Enable"] == 0

@@ -8,15 +8,15 @@ from scipy.spatial.transform import Rotation
 from rig.config.load import load
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import MessageKind, ProgramError
 from rig.world.ur10e.interfaces.dashboard_server import DashboardSession
 from rig.world.ur10e.interfaces.primary import ROBOT_MESSAGE, PrimarySession
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.motion.forward_kinematics import flange_pose
-from rig.world.ur10e.programs.ur_rtde_questions import questions
-from rig.world.ur10e.programs.ur_rtde_registers import Registers
-from rig.world.ur10e.programs.urscript import arguments
+from rig.world.ur10e.programs.ur_rtde_questions import build_questions
+from rig.world.ur10e.programs.ur_rtde_registers import ProgramRegisters
+from rig.world.ur10e.programs.urscript import parse_arguments
 from rig.world.ur10e.robot import Robot
 from support.paths import DEMO
 
@@ -25,7 +25,7 @@ LOADED = load(DEMO)
 
 @pytest.fixture
 def robot() -> Robot:
-    here = Laboratory(LOADED.config, world_section(LOADED))
+    here = Laboratory(LOADED.config, read_world_section(LOADED))
     here.unplug()
     return here.robot
 
@@ -50,19 +50,19 @@ def test_the_dashboard_saves_its_log_and_loads_no_installation_without_a_name(ro
 
 def test_arguments_may_be_expressions_of_constants() -> None:
     """As the client's own script functions have them."""
-    said = arguments("write_output_integer_register(0 + 0, 2 * (3 - 1))")
+    said = parse_arguments("write_output_integer_register(0 + 0, 2 * (3 - 1))")
     assert said == {"0": 0, "1": 4}
-    assert arguments("movej([1/2, -0.5 - 1, 0, 0, 0, 0], a=2*1.5)") == {"0": [0.5, -1.5, 0, 0, 0, 0], "a": 3.0}
+    assert parse_arguments("movej([1/2, -0.5 - 1, 0, 0, 0, 0], a=2*1.5)") == {"0": [0.5, -1.5, 0, 0, 0, 0], "a": 3.0}
     for wrong in ("sleep(x + 1)", "sleep(1/0)", "sleep('a' * 999999999)", "sleep(2 ** 9)"):
         with pytest.raises(ProgramError, match="not simulated"):
-            arguments(wrong)
+            parse_arguments(wrong)
 
 
 def test_the_forward_kinematics_of_given_joints(robot: Robot) -> None:
     """By its command alone: version 1.6.5 of the client hangs before it sends it."""
     q, offset = (0.2, -1.4, 1.5, -1.3, -1.2, 0.3), (0.01, 0.02, 0.1, 0.0, 0.3, 0.0)
     robot.inputs.doubles[24:36] = [*q, *offset]
-    questions(robot, Registers(robot, 24))[44]()
+    build_questions(robot, ProgramRegisters(robot, 24))[44]()
     flange = flange_pose(q, robot.links)
     turned = Rotation.from_rotvec(flange[3:])
     assert robot.outputs.doubles[24:27] == pytest.approx(flange[:3] + turned.apply(offset[:3]), abs=1e-12)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rig.world.clock import TICK_S
 from rig.world.laboratory import Laboratory
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from rig.world.ur10e.interfaces.primary import PrimarySession
 from rig.world.ur10e.interfaces.rtde import Output, RtdeSession, package
 from rig.world.ur10e.interfaces.variables import OUTPUTS, TYPES
@@ -66,7 +66,7 @@ GUIDE = {
 
 def laboratory(*overrides: str) -> Laboratory:
     loaded = ideal(DEMO, overrides)
-    new = Laboratory(loaded.config, world_section(loaded))
+    new = Laboratory(loaded.config, read_world_section(loaded))
     new.unplug()
     return new
 

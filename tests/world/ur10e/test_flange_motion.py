@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rig.config.world.laboratory import CalibrationSection, SiteSection
-from rig.world.site import site_of
-from rig.world.ur10e.motion.flange_motion import felt, felt_of_turns, moved
+from rig.world.site import build_site
+from rig.world.ur10e.motion.flange_motion import find_flange_motion, find_motion_from_cosines, transfer_force
 from rig.world.ur10e.motion.forward_kinematics import flange_pose, flange_rate
 from rig.world.ur10e.motion.links import NOMINAL, links
-from rig.world.ur10e.motion.true_arm import known_links
+from rig.world.ur10e.motion.true_arm import build_calibrated_links
 
 Array = np.ndarray
 
@@ -51,7 +51,7 @@ def test_rate_and_force_are_the_derivatives_of_the_path_among_the_stars(
     q: tuple[float, ...], qd: tuple[float, ...], qdd: tuple[float, ...], offset_m: tuple[float, ...]
 ) -> None:
     """A thousand times the Earth's rate, so that what it does is far above what differences resolve."""
-    site = site_of(SiteSection(latitude_deg=40, heading_deg=70, base_tilt_deg=(3, -2)))
+    site = build_site(SiteSection(latitude_deg=40, heading_deg=70, base_tilt_deg=(3, -2)))
     ground = 1000 * np.array(site.earth_rate_rad_s)
     site = type(site)(tuple(ground.tolist()), site.specific_force_m_s2)
 
@@ -64,15 +64,15 @@ def test_rate_and_force_are_the_derivatives_of_the_path_among_the_stars(
     (before, p), (here, r), (after, s) = (place(time_s) for time_s in (-step, 0.0, step))
     rate = Rotation.from_matrix(before.T @ after).as_rotvec() / (2 * step)
     force = here.T @ ((p - 2 * r + s) / step**2 + np.array(site.specific_force_m_s2))
-    now = felt(q, qd, qdd, known_links(CALIBRATION), site)
+    now = find_flange_motion(q, qd, qdd, build_calibrated_links(CALIBRATION), site)
     assert now.rate_rad_s == pytest.approx(rate, abs=2e-4)
-    assert moved(now.rate_rad_s, now.change_rad_s2, now.force_m_s2, offset_m) == pytest.approx(force, abs=2e-3)
+    assert transfer_force(now.rate_rad_s, now.change_rad_s2, now.force_m_s2, offset_m) == pytest.approx(force, abs=2e-3)
 
 
 def test_the_pose_of_a_calibrated_arm_is_that_of_its_own_links() -> None:
     q = (0.3, -1.2, 1.4, -0.7, -1.5, 2.0)
     rotation, position = chain(np.array(q))
-    pose = flange_pose(q, known_links(CALIBRATION))
+    pose = flange_pose(q, build_calibrated_links(CALIBRATION))
     assert pose[:3] == pytest.approx(position, abs=1e-12)
     assert Rotation.from_rotvec(pose[3:]).as_matrix() == pytest.approx(rotation, abs=1e-12)
     assert math.dist(pose[:3], flange_pose(q)[:3]) > 1e-3  # the drawing's arm is elsewhere
@@ -81,19 +81,19 @@ def test_the_pose_of_a_calibrated_arm_is_that_of_its_own_links() -> None:
 def test_without_deviations_the_links_are_the_drawings() -> None:
     assert links() == NOMINAL
     assert [link.alpha_rad for link in NOMINAL] == np.radians(ALPHA).tolist()
-    assert felt((0.1,) * 6, (0.2,) * 6, (0.0,) * 6, NOMINAL, site_of(SiteSection())).rate_rad_s == flange_rate(
-        (0.1,) * 6, (0.2,) * 6
-    )
+    assert find_flange_motion(
+        (0.1,) * 6, (0.2,) * 6, (0.0,) * 6, NOMINAL, build_site(SiteSection())
+    ).rate_rad_s == flange_rate((0.1,) * 6, (0.2,) * 6)
 
 
 def test_arrays_of_instants_are_felt_as_single_ones() -> None:
     rng = np.random.default_rng(1)
     q, qd, qdd = rng.normal(size=(3, 6, 4))
-    arm, site = known_links(CALIBRATION), site_of(SiteSection(latitude_deg=-33))
+    arm, site = build_calibrated_links(CALIBRATION), build_site(SiteSection(latitude_deg=-33))
     turns = [(np.cos(q[j] + arm[j].theta_rad), np.sin(q[j] + arm[j].theta_rad)) for j in range(6)]
-    all_at_once = felt_of_turns(turns, list(qd), list(qdd), arm, site)
+    all_at_once = find_motion_from_cosines(turns, list(qd), list(qdd), arm, site)
     for instant in range(4):
-        alone = felt(q[:, instant].tolist(), qd[:, instant].tolist(), qdd[:, instant].tolist(), arm, site)
+        alone = find_flange_motion(q[:, instant].tolist(), qd[:, instant].tolist(), qdd[:, instant].tolist(), arm, site)
         for many, one in zip(all_at_once, alone, strict=True):
             assert [component[instant] for component in many] == pytest.approx(one)
 
@@ -103,7 +103,7 @@ def test_arrays_of_instants_are_felt_as_single_ones() -> None:
 )
 def test_the_ground_turns_about_the_poles_axis(heading_deg: float, north: tuple[float, ...]) -> None:
     """At heading 90° the base's x axis looks east, so its y axis looks north."""
-    site = site_of(SiteSection(latitude_deg=52, heading_deg=heading_deg, gravity_m_s2=9.81))
+    site = build_site(SiteSection(latitude_deg=52, heading_deg=heading_deg, gravity_m_s2=9.81))
     latitude = math.radians(52)
     expected = EARTH * (math.cos(latitude) * np.array(north) + math.sin(latitude) * np.array([0, 0, 1]))
     assert site.earth_rate_rad_s == pytest.approx(expected, abs=1e-12)
@@ -112,7 +112,7 @@ def test_the_ground_turns_about_the_poles_axis(heading_deg: float, north: tuple[
 
 def test_a_tilted_base_sees_gravity_and_the_pole_from_the_side() -> None:
     upright, tilted = (
-        site_of(SiteSection(latitude_deg=52, heading_deg=20, base_tilt_deg=tilt)) for tilt in ((0, 0), (2, -1))
+        build_site(SiteSection(latitude_deg=52, heading_deg=20, base_tilt_deg=tilt)) for tilt in ((0, 0), (2, -1))
     )
     base = Rotation.from_euler("XY", [2, -1], degrees=True)  # first about x, then about the new y
     for name in ("earth_rate_rad_s", "specific_force_m_s2"):
@@ -120,4 +120,4 @@ def test_a_tilted_base_sees_gravity_and_the_pole_from_the_side() -> None:
 
 
 def test_without_a_latitude_the_ground_does_not_turn() -> None:
-    assert site_of(SiteSection()).earth_rate_rad_s == (0, 0, 0)
+    assert build_site(SiteSection()).earth_rate_rad_s == (0, 0, 0)

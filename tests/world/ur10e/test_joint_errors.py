@@ -8,8 +8,8 @@ import pytest
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
-from rig.world.ur10e.motion.joint_motion import Motion
-from rig.world.ur10e.motion.ripple import ripple
+from rig.world.ur10e.motion.joint_motion import JointMotion
+from rig.world.ur10e.motion.ripple import draw_ripple
 from rig.world.ur10e.motion.trajectory import Joints
 
 STILL: Joints = (0.0,) * 6
@@ -21,8 +21,8 @@ class Player:
 
     def __init__(self, errors: Errors = ALL, memory_s: float = 0.0) -> None:
         random = Random(7)
-        ripples = [ripple(0.05, (18, 31, 50), random) for _ in range(6)]
-        self.motion = Motion(STILL, ripples, memory_s=memory_s)
+        ripples = [draw_ripple(0.05, (18, 31, 50), random) for _ in range(6)]
+        self.motion = JointMotion(STILL, ripples, memory_s=memory_s)
         self.errors = JointErrors(errors, random)
         self.time_s = 0.0
 
@@ -41,7 +41,7 @@ class Player:
         self.ticks(round(wait_s / TICK_S))
 
     def true(self, time_s: float) -> tuple[Joints, Joints, Joints]:
-        return self.errors.at(time_s, *self.motion.with_accelerations(time_s))
+        return self.errors.at(time_s, *self.motion.state_at(time_s))
 
 
 def test_rates_and_accelerations_are_the_derivatives_of_the_true_angles() -> None:
@@ -119,12 +119,12 @@ def test_the_motion_of_a_while_ago_is_remembered() -> None:
     seen = []
     for _ in range(200):
         now.ticks(1)
-        seen.append(now.motion.with_accelerations(now.time_s - 0.0007))
+        seen.append(now.motion.state_at(now.time_s - 0.0007))
     later.ticks(15)
     for tick in range(185):
         later.ticks(1)
         at_s = later.time_s - 0.03 - 0.0007
-        for was, remembered in zip(seen[tick], later.motion.with_accelerations(at_s), strict=True):
+        for was, remembered in zip(seen[tick], later.motion.state_at(at_s), strict=True):
             assert remembered == pytest.approx(was, abs=1e-9)
 
 
@@ -136,7 +136,7 @@ def test_the_encoders_are_read_early_or_late_by_what_is_asked() -> None:
         late_s.append(rng.gauss(0.0, 1e-4))
         return late_s[-1]
 
-    motion = Motion(STILL, [ripple(0.0, (), rng)] * 6, lateness_s=lateness_s)
+    motion = JointMotion(STILL, [draw_ripple(0.0, (), rng)] * 6, lateness_s=lateness_s)
     motion.speed((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 100.0)
     for tick in range(1, 200):
         motion.step(tick * TICK_S)

@@ -9,7 +9,7 @@ import pytest
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
-from rig.world.section import world_section
+from rig.world.section import read_world_section
 from rig.world.ur10e.controller_messages import READ_ONLY
 from rig.world.ur10e.interfaces.dashboard_server import NOT_ALLOWED, DashboardSession
 from rig.world.ur10e.interfaces.primary import PrimarySession
@@ -34,7 +34,7 @@ def plays(robot: Robot) -> bool:
 def playing(overrides: tuple[str, ...] = ()) -> Robot:
     """A controller that plays a program, on its pendant's word in remote control."""
     loaded = ideal(DEMO, list(overrides))
-    robot = Laboratory(loaded.config, world_section(loaded)).robot
+    robot = Laboratory(loaded.config, read_world_section(loaded)).robot
     PrimarySession(robot).receive(PROGRAM)
     for _ in range(TICKS_PER_SECOND // 10):
         robot.step()

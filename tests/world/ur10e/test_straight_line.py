@@ -8,7 +8,7 @@ import pytest
 
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.motion import forward_kinematics
-from rig.world.ur10e.motion.cartesian import straight_line
+from rig.world.ur10e.motion.cartesian import plan_straight_line
 from rig.world.ur10e.motion.joint_motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.ur10e.motion.trajectory import Joints, Trajectory
 
@@ -40,7 +40,7 @@ def played(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_flange_keeps_to_the_line_and_to_its_attitude() -> None:
-    trajectory, _ = planned(straight_line(HOME, pose_by((0.1, 0.05, -0.2)), 0.25, 0.5))
+    trajectory, _ = planned(plan_straight_line(HOME, pose_by((0.1, 0.05, -0.2)), 0.25, 0.5))
     poses = np.array([forward_kinematics.flange_pose(q) for q in played(trajectory)[0].tolist()])
     way = poses[:, :3] - poses[0, :3]
     along = np.array([0.1, 0.05, -0.2]) / np.linalg.norm([0.1, 0.05, -0.2])
@@ -51,13 +51,13 @@ def test_the_flange_keeps_to_the_line_and_to_its_attitude() -> None:
 
 def test_a_long_line_is_planned_in_many_small_parts() -> None:
     """4 s of motion: planned at once, every stream of the world would stand still meanwhile."""
-    trajectory, parts = planned(straight_line(HOME, pose_by((0.0, 0.0, -0.2)), 0.05, 1.2))
+    trajectory, parts = planned(plan_straight_line(HOME, pose_by((0.0, 0.0, -0.2)), 0.05, 1.2))
     assert trajectory.duration_s > 4
     assert parts >= 20 * trajectory.duration_s
 
 
 def test_where_a_joint_would_be_too_fast_the_line_is_slower() -> None:
-    fast, _ = planned(straight_line(HOME, pose_by((0.2, 0.0, 0.1)), 4.0, 100.0))
+    fast, _ = planned(plan_straight_line(HOME, pose_by((0.2, 0.0, 0.1)), 4.0, 100.0))
     _, speeds = played(fast)
     share = np.abs(speeds).max(axis=0) / JOINT_SPEED_LIMIT_RAD_S
     assert 0.9 < share.max() <= 1.0
@@ -65,4 +65,4 @@ def test_where_a_joint_would_be_too_fast_the_line_is_slower() -> None:
 
 def test_a_line_out_of_reach_is_refused() -> None:
     with pytest.raises(ProgramError):
-        planned(straight_line(HOME, pose_by((2.0, 0.0, 0.0)), 0.25, 0.5))
+        planned(plan_straight_line(HOME, pose_by((2.0, 0.0, 0.0)), 0.25, 0.5))

@@ -112,7 +112,7 @@ class DashboardSession:
     def tick(self) -> bytes:
         return b""
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
     def answer(self, line: str) -> str:

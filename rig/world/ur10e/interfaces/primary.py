@@ -59,7 +59,7 @@ class PrimarySession:
             data += _state(self._robot, STATE)
         return data
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
 

@@ -38,7 +38,7 @@ QUESTIONS: dict[str, tuple[tuple[int, int], Answer]] = {
 }
 
 
-def offered(robot: Robot) -> bool:
+def has_robot_api(robot: Robot) -> bool:
     """Whether its software has a Robot API."""
     return robot.identity.polyscope >= SINCE
 
@@ -70,7 +70,7 @@ class RobotApiSession:
     def tick(self) -> bytes:
         return b""
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
     def _answer(self, method: str, path: str, body: bytes) -> bytes:

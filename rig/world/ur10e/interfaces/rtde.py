@@ -120,7 +120,7 @@ class RtdeSession:
             return self._output.pack(self._robot)
         return b""
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         """The connection is gone: its inputs are free again."""
         claims = self._robot.claims
         for name in [name for name, owner in claims.items() if owner is self]:

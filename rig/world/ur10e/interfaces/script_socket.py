@@ -10,9 +10,9 @@ import re
 from collections.abc import Callable, Iterator
 
 from rig.world.ur10e.controller_messages import READ_ONLY, ProgramError
-from rig.world.ur10e.programs.program_threads import Move
+from rig.world.ur10e.programs.program_threads import ScriptMove
 from rig.world.ur10e.programs.ur_rtde_program import ControlProgram
-from rig.world.ur10e.programs.urscript import Arguments, ScriptProgram, move
+from rig.world.ur10e.programs.urscript import Arguments, ScriptProgram, read_move
 from rig.world.ur10e.robot import Program, Robot
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
@@ -68,7 +68,7 @@ def _register_offset(text: str) -> int:
     return offset
 
 
-def _path(lines: list[str]) -> Iterator[Move]:
+def _path(lines: list[str]) -> Iterator[ScriptMove]:
     """The moves that ur_rtde injected into `exec_move_path`."""
     start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
     for line in lines[start + 1 :]:
@@ -77,7 +77,7 @@ def _path(lines: list[str]) -> Iterator[Move]:
         if statement == "end":
             return
         if name in ("movej", "movel"):
-            yield move(name, Arguments(statement))
+            yield read_move(name, Arguments(statement))
         elif name != "signal_async_progress":
             raise ProgramError(f"not simulated: {statement} in a path")
 
@@ -123,7 +123,7 @@ class ScriptSession:
     def tick(self) -> bytes:
         return b""
 
-    def closed(self) -> None:
+    def handle_close(self) -> None:
         pass
 
     def _obey(self, lines: list[str]) -> None:
@@ -134,7 +134,7 @@ class ScriptSession:
         try:
             program = compile_program(self._robot, lines)
             if lines[0].lstrip().startswith("sec "):
-                run_beside(program)
+                run_secondary(program)
             else:
                 self._robot.start_program(program)
         except ProgramError as error:
@@ -143,7 +143,7 @@ class ScriptSession:
             self._robot.messages.complain(ProgramError(str(error)))
 
 
-def run_beside(program: Program) -> None:
+def run_secondary(program: Program) -> None:
     """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
     if program.step():
         raise ProgramError("a secondary program may not take time")

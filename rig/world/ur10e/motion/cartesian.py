@@ -10,7 +10,7 @@ from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
 from rig.world.ur10e.motion.forward_kinematics import flange_frame, frames, rotation_from_vector, rotation_vector
 from rig.world.ur10e.motion.joint_motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.ur10e.motion.links import NOMINAL, Links
-from rig.world.ur10e.motion.trajectory import Joints, Piece, Trajectory, rest
+from rig.world.ur10e.motion.trajectory import Joints, MotionSegment, Trajectory, build_rest
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def _jacobian(q: Sequence[float] | Array, links: Links) -> Array:
     return np.hstack([np.cross(axes, levers), axes]).T
 
 
-def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> Joints:
+def solve_inverse_kinematics(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> Joints:
     """The joints that put the flange at `pose` (m, rotation vector rad), by Newton's method from `near`.
 
     Raises `ProgramError` when it does not get there: out of reach, or singular on the way.
@@ -58,7 +58,7 @@ def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> J
     raise ProgramError("no inverse kinematics solution was found")
 
 
-def joint_speeds(q: Joints, tool: Sequence[float], links: Links = NOMINAL) -> Joints:
+def solve_joint_speeds(q: Joints, tool: Sequence[float], links: Links = NOMINAL) -> Joints:
     """The joint speeds that move the flange by `tool` (m/s, rad/s, in the base's frame), all slower if one is too fast.
 
     Raises `ProgramError` where the arm is singular.
@@ -71,14 +71,14 @@ def joint_speeds(q: Joints, tool: Sequence[float], links: Links = NOMINAL) -> Jo
     return tuple((speeds / excess).tolist())
 
 
-def approaching(tool: Sequence[float], wanted: Sequence[float], step: float) -> Sequence[float]:
+def approach_speed(tool: Sequence[float], wanted: Sequence[float], step: float) -> Sequence[float]:
     """The speed of the tool after it has changed by `step` (m/s) towards the one that is wanted."""
     change = np.array(wanted) - np.array(tool)
     size = _length(change)
     return wanted if size <= step else tuple((np.array(tool) + change * (step / size)).tolist())
 
 
-def straight_line(
+def plan_straight_line(
     start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
 ) -> Generator[None, None, Trajectory]:
     """A moveL from rest to rest, planned in small parts, so that the world goes on meanwhile.
@@ -90,25 +90,25 @@ def straight_line(
     twist = _twist(start, rotation, position, links)
     length = _length(twist)
     if length < ACCURACY:
-        return rest(start)
+        return build_rest(start)
     try:
-        joints_for(pose, start, links)
+        solve_inverse_kinematics(pose, start, links)
     except ProgramError as error:  # that pose is not planned for
         raise OutOfReach(str(error)) from None
     top = min(speed_m_s, sqrt(length * acceleration_m_s2))
     slowest = SLOWEST * top
     while top > slowest:
-        pieces, excess = yield from _along(start, twist, top, acceleration_m_s2, links)
+        pieces, excess = yield from _sample_line(start, twist, top, acceleration_m_s2, links)
         if excess <= 1.0:
             end_rad, _, _ = pieces[-1].at(pieces[-1].duration_s)
-            return Trajectory(pieces, joints_for(pose, end_rad, links))
+            return Trajectory(pieces, solve_inverse_kinematics(pose, end_rad, links))
         top /= 1.001 * excess
     raise OutOfReach("joint speed limit exceeded on the way of movel")
 
 
-def _along(
+def _sample_line(
     start: Joints, twist: Array, top: float, acceleration: float, links: Links
-) -> Generator[None, None, tuple[list[Piece], float]]:
+) -> Generator[None, None, tuple[list[MotionSegment], float]]:
     """The pieces of a way at the speed `top`, and by how many times its fastest joint is too fast."""
     length = _length(twist)
     ramp_s = top / acceleration
@@ -118,7 +118,7 @@ def _along(
     limits = np.array(JOINT_SPEED_LIMIT_RAD_S)
     q: Array = np.array(start)
     qd: Array = np.zeros(6)
-    pieces: list[Piece] = []
+    pieces: list[MotionSegment] = []
     excess = 0.0
     for knot in range(1, knots + 1):
         if knot % KNOTS_A_TICK == 0:
@@ -131,6 +131,8 @@ def _along(
         except np.linalg.LinAlgError:
             return pieces, inf
         excess = max(excess, float(np.max(np.abs(next_qd) / limits)))
-        pieces.append(Piece(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(((next_qd - qd) / step_s).tolist())))
+        pieces.append(
+            MotionSegment(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(((next_qd - qd) / step_s).tolist()))
+        )
         q, qd = q + (qd + next_qd) * (step_s / 2.0), next_qd
     return pieces, excess

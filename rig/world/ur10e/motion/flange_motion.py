@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from math import cos, sin
 from typing import Any, NamedTuple
 
-from rig.world.site import Site
-from rig.world.ur10e.motion.links import Link, Links
+from rig.world.site import SiteTruth
+from rig.world.ur10e.motion.links import ArmLink, Links
 
 Components = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of one shape
 
 
-class Felt(NamedTuple):
+class InertialMotion(NamedTuple):
     """What the flange feels at its origin, in its axes: rate (rad/s) and its change (rad/s²) against the stars, force
     (m/s²)."""
 
@@ -24,38 +24,38 @@ class Felt(NamedTuple):
     force_m_s2: Components
 
 
-def felt(
-    q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float], links: Links, site: Site
-) -> Felt:
+def find_flange_motion(
+    q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float], links: Links, site: SiteTruth
+) -> InertialMotion:
     """What the flange feels at one instant, from angles, speeds and accelerations of the six joints."""
-    return felt_of_turns(turns_of(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
+    return find_motion_from_cosines(find_cosines(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
 
 
-def turns_of(q_rad: Sequence[float], links: Sequence[Link]) -> list[tuple[float, float]]:
+def find_cosines(q_rad: Sequence[float], links: Sequence[ArmLink]) -> list[tuple[float, float]]:
     """Cosine and sine of each joint's whole angle."""
     turned = [angle + link.theta_rad for angle, link in zip(q_rad, links, strict=True)]
     return [(cos(angle), sin(angle)) for angle in turned]
 
 
-def felt_of_turns(
-    turns: Sequence[tuple[Any, Any]], qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: Site
-) -> Felt:
+def find_motion_from_cosines(
+    turns: Sequence[tuple[Any, Any]], qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: SiteTruth
+) -> InertialMotion:
     """What the flange feels, from cosine and sine of each joint's whole angle, its `theta_rad` included."""
-    return carried(base(site), turns, qd_rad_s, qdd_rad_s2, links)
+    return propagate_motion(find_base_motion(site), turns, qd_rad_s, qdd_rad_s2, links)
 
 
-def base(site: Site) -> Felt:
+def find_base_motion(site: SiteTruth) -> InertialMotion:
     """What the arm's base feels."""
-    return Felt(site.earth_rate_rad_s, (0.0, 0.0, 0.0), site.specific_force_m_s2)
+    return InertialMotion(site.earth_rate_rad_s, (0.0, 0.0, 0.0), site.specific_force_m_s2)
 
 
-def carried(
-    inner: Felt,
+def propagate_motion(
+    inner: InertialMotion,
     turns: Sequence[tuple[Any, Any]],
     qd_rad_s: Sequence[Any],
     qdd_rad_s2: Sequence[Any],
-    links: Sequence[Link],
-) -> Felt:
+    links: Sequence[ArmLink],
+) -> InertialMotion:
     """What the last of these links feels, when the one before the first feels `inner`."""
     (x, y, z), (u, v, w), (f, g, h) = inner
     for (cosine, sine), speed, acceleration, link in zip(turns, qd_rad_s, qdd_rad_s2, links, strict=True):
@@ -68,11 +68,11 @@ def carried(
         y, z = c * y + s * z, c * z - s * y
         v, w = c * v + s * w, c * w - s * v
         g, h = c * g + s * h, c * h - s * g
-        f, g, h = moved((x, y, z), (u, v, w), (f, g, h), (link.a_m, link.d_m * s, link.d_m * c))
-    return Felt((x, y, z), (u, v, w), (f, g, h))
+        f, g, h = transfer_force((x, y, z), (u, v, w), (f, g, h), (link.a_m, link.d_m * s, link.d_m * c))
+    return InertialMotion((x, y, z), (u, v, w), (f, g, h))
 
 
-def moved(rate: Components, change: Components, force: Components, way_m: Sequence[float]) -> Components:
+def transfer_force(rate: Components, change: Components, force: Components, way_m: Sequence[float]) -> Components:
     """Specific force at another point of the same body, `way_m` away, all in the body's axes."""
     x, y, z = rate
     u, v, w = change

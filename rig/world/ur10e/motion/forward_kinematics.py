@@ -33,14 +33,14 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
         c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         ca, sa = link.cos_alpha, link.sin_alpha
         x, y, z = position
-        along = turned(rotation, (link.a_m * c, link.a_m * s, link.d_m))
+        along = rotate(rotation, (link.a_m * c, link.a_m * s, link.d_m))
         position = x + along[0], y + along[1], z + along[2]
         turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
         rotation = _product(rotation, turn)
         yield rotation, position
 
 
-def turned(rotation: Rotation, vector: Vector) -> Vector:
+def rotate(rotation: Rotation, vector: Vector) -> Vector:
     """The vector as it is after a rotation (rows)."""
     x, y, z = vector
     (a, b, c), (d, e, f), (g, h, i) = rotation
@@ -48,7 +48,7 @@ def turned(rotation: Rotation, vector: Vector) -> Vector:
 
 
 def _product(left: Rotation, right: Rotation) -> Rotation:
-    first, second, third = (turned(left, column) for column in zip(*right, strict=True))
+    first, second, third = (rotate(left, column) for column in zip(*right, strict=True))
     (a, b, c), (d, e, f), (g, h, i) = first, second, third
     return (a, d, g), (b, e, h), (c, f, i)
 
@@ -65,12 +65,12 @@ def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, 
     return (*position, *rotation_vector(rotation))
 
 
-def turned_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
+def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
     """The pose of a frame in the same place, turned: `turn` takes its vectors into the frame at `pose`."""
     return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
-def placed_pose(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
+def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
     """A pose that is told in a frame, in that in which the frame's own pose is told: `pose_trans` of URScript."""
     rotation = rotation_from_vector(frame[3:])
     moved = (

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.motion.ripple import Ripple
-from rig.world.ur10e.motion.trajectory import ZERO, Joints, Trajectory, change_speed, line, rest
+from rig.world.ur10e.motion.trajectory import ZERO, Joints, Trajectory, build_rest, plan_joint_move, plan_speed_change
 from rig.world.ur10e.motion.vibration import Vibration
 
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
@@ -39,7 +39,7 @@ class _Tick(NamedTuple):
     gain: Joints
 
 
-class Motion:
+class JointMotion:
     """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
 
     `memory_s`: how long before the end of the last tick `at` answers as well. `lateness_s`: drawn once a tick, how much
@@ -66,7 +66,7 @@ class Motion:
         self._ripples = tuple(ripples)
         self._encoder_step_rad = encoder_step_rad
         self._lateness_s, self._late_s = lateness_s, 0.0
-        self._trajectory = rest(tuple(start_rad))
+        self._trajectory = build_rest(tuple(start_rad))
         self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
         self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
         self._scaled = True  # a stop is not stretched by the speed slider
@@ -116,7 +116,7 @@ class Motion:
     @property
     def qdd_rad_s2(self) -> Joints:
         """Accelerations at the end of the last tick."""
-        return ZERO if self.still else self.with_accelerations(self._end_s)[2]
+        return ZERO if self.still else self.state_at(self._end_s)[2]
 
     @property
     def _end_s(self) -> float:
@@ -154,7 +154,7 @@ class Motion:
         tick, fraction, target, velocity, _ = self._played(time_s)
         return self._joints(tick.offset, tick.gain, target, velocity, fraction)
 
-    def with_accelerations(self, time_s: float) -> tuple[Joints, Joints, Joints]:
+    def state_at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
         """The joints' angles, speeds and accelerations, those of the ripple included."""
         if self.still:
             return self.now.q_rad, ZERO, ZERO
@@ -215,7 +215,7 @@ class Motion:
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """A moveJ from standstill."""
         # From where the joints stand: after a stop that need not be where the program wanted them.
-        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
+        self.follow(plan_joint_move(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
 
     def follow(self, trajectory: Trajectory) -> None:
         """Any trajectory from standstill that begins where the joints are."""
@@ -226,15 +226,15 @@ class Motion:
         """A speedJ, from whatever the joints do now: to this velocity, and on."""
         wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
         velocity = self._trajectory.at(self._trajectory_s)[1]
-        self._play(change_speed(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
+        self._play(plan_speed_change(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
 
     def stop(self, deceleration_rad_s2: float) -> None:
         """Bring the joints to rest along their present direction."""
         if self.moving:
-            stopping = change_speed(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
+            stopping = plan_speed_change(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
             self._play(stopping, scaled=False)
         else:
-            self._play(rest(self.now.target_q_rad), scaled=True)
+            self._play(build_rest(self.now.target_q_rad), scaled=True)
 
     def _play(self, trajectory: Trajectory, scaled: bool) -> None:
         self._trajectory, self._scaled, self._trajectory_s = trajectory, scaled, 0.0

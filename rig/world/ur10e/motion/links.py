@@ -11,7 +11,7 @@ ZERO6 = (0.0,) * 6
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class ArmLink:
     """One link: a turn by its joint's angle and `theta_rad`, a way d along z and a along x, a turn by alpha about x."""
 
     theta_rad: float
@@ -22,18 +22,18 @@ class Link:
     sin_alpha: float
 
 
-Links = tuple[Link, ...]
+Links = tuple[ArmLink, ...]
 
 Drawing = tuple[tuple[float, float, int], ...]  # of each link length a, offset d (m), twist alpha in quarter turns
 
 
-def drawn(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:
+def build_drawing(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:
     """The drawing of an arm of this maker, of a2 a3 and d1 d4 d5 d6; all are bent alike."""
     (a2, a3), (d1, d4, d5, d6) = a_m, d_m
     return ((0.0, d1, 1), (a2, 0.0, 0), (a3, 0.0, 0), (0.0, d4, 1), (0.0, d5, -1), (0.0, d6, 0))
 
 
-UR10E = drawn((-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655))  # maker's article 45257
+UR10E = build_drawing((-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655))  # maker's article 45257
 
 
 def links(
@@ -50,10 +50,10 @@ def links(
     )
 
 
-def _link(theta_rad: float, a_m: float, d_m: float, quarters: int, twist_rad: float) -> Link:
+def _link(theta_rad: float, a_m: float, d_m: float, quarters: int, twist_rad: float) -> ArmLink:
     c, s = cos(twist_rad), sin(twist_rad)
     cosine, sine = {-1: (s, -c), 0: (c, s), 1: (-s, c)}[quarters]
-    return Link(theta_rad, a_m, d_m, quarters * pi / 2 + twist_rad, cosine, sine)
+    return ArmLink(theta_rad, a_m, d_m, quarters * pi / 2 + twist_rad, cosine, sine)
 
 
 LINKS = ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from rig.config.ranges import ModelName
 from rig.config.world.laboratory import SimulatedArmSection
-from rig.world.ur10e.motion.links import UR10E, Drawing, drawn
+from rig.world.ur10e.motion.links import UR10E, Drawing, build_drawing
 from rig.world.ur10e.motion.moments import Bodies
 from rig.world.ur10e.motion.trajectory import Joints
 
@@ -84,12 +84,12 @@ _UR10 = _bodies(
 )  # fmt: skip
 _BASE_SLOWER = (120.0, 120.0, 180.0, 180.0, 180.0, 180.0)
 _HEAVY = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
-_DRAWN_3E = drawn((-0.24355, -0.2132), (0.15185, 0.13105, 0.08535, 0.0921))
-_DRAWN_5E = drawn((-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996))
-_DRAWN_16E = drawn((-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655))
-_DRAWN_20 = drawn((-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543))
-_DRAWN_30 = drawn((-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543))
-_DRAWN_10 = drawn((-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922))
+_DRAWN_3E = build_drawing((-0.24355, -0.2132), (0.15185, 0.13105, 0.08535, 0.0921))
+_DRAWN_5E = build_drawing((-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996))
+_DRAWN_16E = build_drawing((-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655))
+_DRAWN_20 = build_drawing((-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543))
+_DRAWN_30 = build_drawing((-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543))
+_DRAWN_10 = build_drawing((-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922))
 
 MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
     {
@@ -112,7 +112,7 @@ MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
 )
 
 
-def simulated_model(section: SimulatedArmSection, configured: ModelName) -> ArmModel:
+def select_model(section: SimulatedArmSection, configured: ModelName) -> ArmModel:
     """The model of a laboratory's arm, with what its safety settings leave of what its joints can do.
 
     It is the one `configured` where the laboratory's section says no other.

@@ -52,7 +52,7 @@ class Ripple:
         return 0.5 * (low + high)
 
 
-def ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
+def draw_ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
     """Components of equal rate, random phases; the RMS of the rate ripple over a turn is `fraction` of the rate."""
     if fraction == 0.0:
         return Ripple()

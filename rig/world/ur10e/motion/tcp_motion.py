@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from rig.world.site import Site
-from rig.world.ur10e.motion.flange_motion import felt
+from rig.world.site import SiteTruth
+from rig.world.ur10e.motion.flange_motion import find_flange_motion
 from rig.world.ur10e.motion.forward_kinematics import Vector, flange_frame, flange_rate
 from rig.world.ur10e.motion.links import Links
 from rig.world.ur10e.motion.trajectory import ZERO, Joints
 
 GRAVITY: Vector = (0.0, 0.0, 9.82)  # m/s², what an arm says of gravity, against its direction
-UPRIGHT = Site((0.0, 0.0, 0.0), GRAVITY)
+UPRIGHT = SiteTruth((0.0, 0.0, 0.0), GRAVITY)
 STEP_S = 1e-4
 
 
@@ -31,7 +31,7 @@ class TcpMotion:
 @lru_cache(maxsize=4)  # several outputs and several clients ask for the same
 def tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: Links) -> TcpMotion:
     """The tool's motion with joints at these angles, speeds and accelerations."""
-    _, change, force = felt(q_rad, qd_rad_s, qdd_rad_s2, links, UPRIGHT)
+    _, change, force = find_flange_motion(q_rad, qd_rad_s, qdd_rad_s2, links, UPRIGHT)
     if not any(qd_rad_s) and not any(qdd_rad_s2):
         return TcpMotion(ZERO, ZERO, force)
     rotation, _ = flange_frame(q_rad, links)

@@ -10,7 +10,7 @@ ROUNDING_S = 1e-9  # so many seconds before its end a trajectory counts as over
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class MotionSegment:
     """A stretch of `duration_s`: starts at `q_rad` with `qd_rad_s`, keeps `qdd_rad_s2` (six joints each)."""
 
     duration_s: float
@@ -38,7 +38,7 @@ class Piece:
 class Trajectory:
     """Pieces one after another; before the first and after the last it stands still there."""
 
-    def __init__(self, pieces: Sequence[Piece], end_rad: Joints | None = None) -> None:
+    def __init__(self, pieces: Sequence[MotionSegment], end_rad: Joints | None = None) -> None:
         self._pieces = tuple(pieces)
         self.duration_s = sum(piece.duration_s for piece in pieces)
         last = pieces[-1]
@@ -61,11 +61,11 @@ class Trajectory:
         return self.end_rad, ZERO, ZERO
 
 
-def rest(q_rad: Joints) -> Trajectory:
-    return Trajectory([Piece(0.0, q_rad)], q_rad)
+def build_rest(q_rad: Joints) -> Trajectory:
+    return Trajectory([MotionSegment(0.0, q_rad)], q_rad)
 
 
-def line(
+def plan_joint_move(
     start_rad: Joints, end_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float, limits_rad_s: Joints
 ) -> Trajectory:
     """A moveJ from rest to rest: all joints in step, the one with the longest way at `speed_rad_s` after a ramp.
@@ -75,7 +75,7 @@ def line(
     way = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in way)
     if longest == 0.0:
-        return rest(end_rad)
+        return build_rest(end_rad)
     share = tuple(w / longest for w in way)
     top = min([speed_rad_s, *(limit / abs(s) for s, limit in zip(share, limits_rad_s, strict=True) if s != 0.0)])
     speed = min(top, sqrt(longest * acceleration_rad_s2))
@@ -90,22 +90,22 @@ def line(
     velocity = tuple(s * speed for s in share)
     return Trajectory(
         [
-            Piece(ramp_s, start_rad, ZERO, up),
-            Piece(cruise_s, along(ramp), velocity),
-            Piece(ramp_s, along(longest - ramp), velocity, tuple(-a for a in up)),
+            MotionSegment(ramp_s, start_rad, ZERO, up),
+            MotionSegment(cruise_s, along(ramp), velocity),
+            MotionSegment(ramp_s, along(longest - ramp), velocity, tuple(-a for a in up)),
         ],
         end_rad,
     )
 
 
-def change_speed(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
+def plan_speed_change(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
     """A change of velocity, the joint that changes most at the acceleration; then on for ever, or at rest."""
     change = tuple(b - a for a, b in zip(from_rad_s, to_rad_s, strict=True))
     ramp_s = max(abs(c) for c in change) / acceleration_rad_s2
     pieces = []
     if ramp_s > 0.0:
-        pieces.append(Piece(ramp_s, q_rad, from_rad_s, tuple(c / ramp_s for c in change)))
+        pieces.append(MotionSegment(ramp_s, q_rad, from_rad_s, tuple(c / ramp_s for c in change)))
         q_rad = pieces[0].at(ramp_s)[0]
     if any(to_rad_s):
-        pieces.append(Piece(inf, q_rad, to_rad_s))
-    return Trajectory(pieces, q_rad) if pieces else rest(q_rad)
+        pieces.append(MotionSegment(inf, q_rad, to_rad_s))
+    return Trajectory(pieces, q_rad) if pieces else build_rest(q_rad)

@@ -5,11 +5,11 @@ from random import Random
 
 from rig.config.world.laboratory import CalibrationSection, SimulatedArmSection
 from rig.world.clock import TICK_S
-from rig.world.site import Site
-from rig.world.ur10e.motion.flange_motion import Felt, base, carried, turns_of
+from rig.world.site import SiteTruth
+from rig.world.ur10e.motion.flange_motion import InertialMotion, find_base_motion, find_cosines, propagate_motion
 from rig.world.ur10e.motion.forward_kinematics import Rotation, Vector, flange_rate, frames
 from rig.world.ur10e.motion.joint_errors import Errors, JointErrors
-from rig.world.ur10e.motion.joint_motion import Motion
+from rig.world.ur10e.motion.joint_motion import JointMotion
 from rig.world.ur10e.motion.links import UR10E, ZERO6, Drawing, Links, links
 from rig.world.ur10e.motion.trajectory import Joints
 
@@ -17,7 +17,7 @@ STILL: Vector = (0.0, 0.0, 0.0)
 WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
 
 
-def known_links(
+def build_calibrated_links(
     calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
 ) -> Links:
     """The links as the maker calibrated them; with the twists that he does not know, as they are."""
@@ -37,15 +37,23 @@ class TrueArm:
     """
 
     def __init__(
-        self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random, drawing: Drawing = UR10E
+        self,
+        section: SimulatedArmSection,
+        site: SiteTruth,
+        motion: JointMotion,
+        random: Random,
+        drawing: Drawing = UR10E,
     ) -> None:
         self._motion, self._site = motion, site
         self._speed = 1.0 + 1e-6 * section.clock_ppm
-        self._links = known_links(section.calibration, section.unmodelled.twist_rad, drawing)
+        self._links = build_calibrated_links(section.calibration, section.unmodelled.twist_rad, drawing)
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
-        self._at_rest: Felt | None = None
-        self._forearm: tuple[tuple[tuple[float, ...], ...], Felt] = ((), base(site))  # felt there, and how joints were
+        self._at_rest: InertialMotion | None = None
+        self._forearm: tuple[tuple[tuple[float, ...], ...], InertialMotion] = (
+            (),
+            find_base_motion(site),
+        )  # felt there, and how joints were
         self.ideal = (
             self._speed == 1.0
             and self._links == links(drawing=drawing)
@@ -74,7 +82,7 @@ class TrueArm:
         """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
         return STILL if self._motion.still else flange_rate(*self._motion.at(time_s), self._links)
 
-    def felt_at(self, time_s: float) -> Felt:
+    def motion_at(self, time_s: float) -> InertialMotion:
         """All that a body on the flange feels at a time inside the last tick or the motion's memory."""
         controller_s = time_s * self._speed
         resting = (
@@ -91,9 +99,12 @@ class TrueArm:
         inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
         if self._forearm[0] != inner:
             forearm = self._links[:WRIST]
-            self._forearm = inner, carried(base(self._site), turns_of(inner[0], forearm), *inner[1:], forearm)
+            self._forearm = (
+                inner,
+                propagate_motion(find_base_motion(self._site), find_cosines(inner[0], forearm), *inner[1:], forearm),
+            )
         wrist = self._links[WRIST:]
-        now = carried(self._forearm[1], turns_of(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
+        now = propagate_motion(self._forearm[1], find_cosines(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
         self._at_rest = now if resting else None
         return now
 
@@ -105,7 +116,7 @@ class TrueArm:
 
     def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
         """Angles, speeds and accelerations of the joints by the controller's seconds."""
-        joints, seen = self._motion.with_accelerations(controller_s), self._motion.vibration
+        joints, seen = self._motion.state_at(controller_s), self._motion.vibration
         if self._errors is not None:
             joints = self._errors.at(controller_s, *joints)
         return joints if seen is None else seen.added(controller_s, *joints)

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.motion.cartesian import joints_for, straight_line
+from rig.world.ur10e.motion.cartesian import plan_straight_line, solve_inverse_kinematics
 from rig.world.ur10e.motion.forward_kinematics import flange_pose
-from rig.world.ur10e.motion.trajectory import line
+from rig.world.ur10e.motion.trajectory import plan_joint_move
 from rig.world.ur10e.robot import Robot
 
 Steps = Iterator[None]
@@ -17,7 +17,7 @@ HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come 
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class ScriptMove:
     """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose of the tool's frame.
 
     Speed and acceleration in rad/s and rad/s², straight: m/s and m/s².
@@ -30,7 +30,7 @@ class Move:
     is_pose: bool = False
 
 
-def finite(values: Sequence[float]) -> None:
+def check_finite(values: Sequence[float]) -> None:
     """Raises `ProgramError` for a number no joint can follow."""
     if not all(abs(value) <= NUMBER_MAX for value in values):
         raise ProgramError(f"a number no joint can follow among {list(values)}")
@@ -75,23 +75,23 @@ class Threads:
         if self._mover == name:
             self._mover = None
 
-    def move(self, name: str, move: Move) -> Steps:
+    def move(self, name: str, move: ScriptMove) -> Steps:
         """A move on behalf of the thread `name`: ends when the joints stand at the target."""
         if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
             raise ProgramError("a move needs a speed and an acceleration above zero")
-        finite([*move.target, move.speed, move.acceleration])
+        check_finite([*move.target, move.speed, move.acceleration])
         self.take(name)
         yield from self.stopj(name, HAND_OVER_RAD_S2)
         self.take(name)
         motion, links = self.robot.motion, self.robot.links
         if move.straight:
             pose = self.robot.flange_for(move.target) if move.is_pose else flange_pose(move.target, links)
-            trajectory = yield from straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
+            trajectory = yield from plan_straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
         else:
             target = move.target
             if move.is_pose:
-                target = joints_for(self.robot.flange_for(target), motion.q_rad, links)
-            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
+                target = solve_inverse_kinematics(self.robot.flange_for(target), motion.q_rad, links)
+            trajectory = plan_joint_move(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
         if not self.robot.within_limits(trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
         motion.follow(trajectory)

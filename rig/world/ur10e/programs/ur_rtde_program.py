@@ -10,11 +10,11 @@ from functools import partial
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.motion.cartesian import approaching, joint_speeds, joints_for
+from rig.world.ur10e.motion.cartesian import approach_speed, solve_inverse_kinematics, solve_joint_speeds
 from rig.world.ur10e.motion.trajectory import Joints
-from rig.world.ur10e.programs.program_threads import Move, Steps, Threads, finite
-from rig.world.ur10e.programs.ur_rtde_questions import NOT_ACTED_OUT, questions
-from rig.world.ur10e.programs.ur_rtde_registers import Registers
+from rig.world.ur10e.programs.program_threads import ScriptMove, Steps, Threads, check_finite
+from rig.world.ur10e.programs.ur_rtde_questions import NOT_ACTED_OUT, build_questions
+from rig.world.ur10e.programs.ur_rtde_registers import ProgramRegisters
 from rig.world.ur10e.robot import Robot
 
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
@@ -27,7 +27,7 @@ Command = Callable[[], Steps]
 
 
 @dataclass(frozen=True, slots=True)
-class Speed:
+class SpeedTarget:
     """Speed the joints are to have, rad/s and rad/s²; `of_tool`: the tool in the base's frame, m/s, rad/s and m/s²."""
 
     speed: Joints
@@ -40,13 +40,13 @@ class ControlProgram:
 
     name = "rtde_control"
 
-    def __init__(self, robot: Robot, register_offset: int, path: Sequence[Move]) -> None:
+    def __init__(self, robot: Robot, register_offset: int, path: Sequence[ScriptMove]) -> None:
         self._robot = robot
-        self._registers = Registers(robot, register_offset)
+        self._registers = ProgramRegisters(robot, register_offset)
         self._path = tuple(path)
         self._threads = Threads(robot)
         self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
-        self._speed_target = Speed((0.0,) * 6, 0.5)
+        self._speed_target = SpeedTarget((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
         self._heard: int | None = None  # the command that was there when the main thread last gave way between two
         self._commands: dict[int, Command] = {
@@ -64,7 +64,7 @@ class ControlProgram:
             34: self._stop,
             45: self._move_path,
         }
-        self._questions = questions(robot, self._registers)
+        self._questions = build_questions(robot, self._registers)
         self._main = self._loop()
 
     def step(self) -> bool:
@@ -99,7 +99,7 @@ class ControlProgram:
 
     def _command(self, code: int) -> Command:
         if code in self._questions:
-            return partial(_at_once, self._questions[code])
+            return partial(_run_instant, self._questions[code])
         if code not in self._commands:
             name = f" ({NOT_ACTED_OUT[code]})" if code in NOT_ACTED_OUT else ""
             raise ProgramError(f"not simulated: command {code}{name} of rtde_control")
@@ -121,7 +121,7 @@ class ControlProgram:
     # -- moves ---------------------------------------------------------------------------------------------------
     def _asked(self, straight: bool, is_pose: bool) -> Steps:
         *target, speed, acceleration = self._registers.doubles(0, 8)
-        return self._move([Move(tuple(target), speed, acceleration, straight, is_pose)])
+        return self._move([ScriptMove(tuple(target), speed, acceleration, straight, is_pose)])
 
     def _movej(self) -> Steps:
         return self._asked(straight=False, is_pose=False)
@@ -138,7 +138,7 @@ class ControlProgram:
     def _move_path(self) -> Steps:
         return self._move(self._path)
 
-    def _move(self, path: Sequence[Move]) -> Steps:
+    def _move(self, path: Sequence[ScriptMove]) -> Steps:
         self._kill_async("move")
         if self._asynchronously():
             self._threads.run("move", self._async_move(path))
@@ -146,7 +146,7 @@ class ControlProgram:
         for step in path:
             yield from self._threads.move("main", step)
 
-    def _async_move(self, path: Sequence[Move]) -> Steps:
+    def _async_move(self, path: Sequence[ScriptMove]) -> Steps:
         for index, step in enumerate(path):
             self._signal_async(index)
             yield from self._threads.move("move", step)
@@ -179,8 +179,8 @@ class ControlProgram:
 
     def _speed(self, of_tool: bool) -> Steps:
         *velocity, acceleration, _ = self._registers.doubles(0, 8)
-        finite([*velocity, acceleration])
-        self._speed_target = Speed(tuple(velocity), max(acceleration, 0.01), of_tool)
+        check_finite([*velocity, acceleration])
+        self._speed_target = SpeedTarget(tuple(velocity), max(acceleration, 0.01), of_tool)
         if not self._threads.running("speed"):
             self._threads.run("speed", self._speed_thread())
         return _nothing()
@@ -192,9 +192,9 @@ class ControlProgram:
             self._threads.take("speed")
             wanted = self._speed_target
             if wanted.of_tool:
-                tool = approaching(tool, wanted.speed, wanted.acceleration * TICK_S)
+                tool = approach_speed(tool, wanted.speed, wanted.acceleration * TICK_S)
                 here = self._robot.motion.now.target_q_rad
-                self._robot.motion.speed(joint_speeds(here, tool, self._robot.links), FOLLOWING_RAD_S2)
+                self._robot.motion.speed(solve_joint_speeds(here, tool, self._robot.links), FOLLOWING_RAD_S2)
             elif wanted != done:
                 self._robot.motion.speed(wanted.speed, wanted.acceleration)
             done = wanted
@@ -206,14 +206,14 @@ class ControlProgram:
 
     def _servoj(self) -> Steps:
         values = self._registers.doubles(0, 11)
-        finite(values)
+        check_finite(values)
         return self._servo(values[:6], values[9])
 
     def _servol(self) -> Steps:
         values = self._registers.doubles(0, 11)
-        finite(values)
+        check_finite(values)
         pose = self._robot.flange_for(values[:6])
-        return self._servo(joints_for(pose, self._robot.motion.q_rad, self._robot.links), values[9])
+        return self._servo(solve_inverse_kinematics(pose, self._robot.motion.q_rad, self._robot.links), values[9])
 
     def _servo(self, target: Joints, lookahead_s: float) -> Steps:
         self._servo_target = (target, max(lookahead_s, 0.03))
@@ -236,7 +236,7 @@ class ControlProgram:
         return self._threads.stopj("main", self._registers.doubles(0, 1)[0])
 
 
-def _at_once(act: Callable[[], None]) -> Steps:
+def _run_instant(act: Callable[[], None]) -> Steps:
     act()
     return iter(())
 

@@ -4,15 +4,15 @@ from collections.abc import Callable, Sequence
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.motion.cartesian import joints_for
-from rig.world.ur10e.motion.forward_kinematics import flange_pose, placed_pose
+from rig.world.ur10e.motion.cartesian import solve_inverse_kinematics
+from rig.world.ur10e.motion.forward_kinematics import compose_poses, flange_pose
 from rig.world.ur10e.motion.trajectory import Joints
-from rig.world.ur10e.programs.program_threads import finite
-from rig.world.ur10e.programs.ur_rtde_registers import Registers
+from rig.world.ur10e.programs.program_threads import check_finite
+from rig.world.ur10e.programs.ur_rtde_registers import ProgramRegisters
 from rig.world.ur10e.robot import Robot
 
 
-def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None]]:
+def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Callable[[], None]]:
     """Each command as a function that takes no time. Raises `ProgramError` where the program would end."""
 
     def put(values: Sequence[float]) -> None:
@@ -27,8 +27,8 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
     def joints(nearest: Joints) -> Joints:
         """The joints that bring the tool to the asked pose."""
         pose = registers.doubles(0, 6)
-        finite([*pose, *nearest])
-        return joints_for(robot.flange_for(pose), nearest, robot.links)
+        check_finite([*pose, *nearest])
+        return solve_inverse_kinematics(robot.flange_for(pose), nearest, robot.links)
 
     def reached(nearest: Joints) -> bool:
         try:
@@ -42,7 +42,7 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
 
     def forward_kinematics() -> None:
         q, offset = registers.doubles(0, 6), registers.doubles(6, 6)
-        put(placed_pose(flange_pose(q, robot.links), offset))
+        put(compose_poses(flange_pose(q, robot.links), offset))
 
     return {
         8: lambda: None,  # zeroFtSensor: nothing pulls at the simulated one
@@ -55,7 +55,7 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
         36: lambda: say(reached(robot.motion.q_rad)),
         37: lambda: say(robot.within_limits(registers.doubles(0, 6))),
         38: lambda: put([0.0] * 6),
-        39: lambda: put(placed_pose(registers.doubles(0, 6), registers.doubles(6, 6))),
+        39: lambda: put(compose_poses(registers.doubles(0, 6), registers.doubles(6, 6))),
         40: lambda: put(robot.tcp_offset),
         43: lambda: put(robot.tcp_pose(robot.motion.actual_q_rad)),
         44: forward_kinematics,

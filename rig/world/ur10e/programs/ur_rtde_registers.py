@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rig.world.ur10e.robot import Robot
 
 
-class Registers:
+class ProgramRegisters:
     """The registers of one program: the first is number `offset` of the controller's."""
 
     def __init__(self, robot: Robot, offset: int) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
 from rig.world.ur10e.motion.trajectory import Joints
-from rig.world.ur10e.programs.program_threads import Move, Steps, Threads, finite
+from rig.world.ur10e.programs.program_threads import ScriptMove, Steps, Threads, check_finite
 from rig.world.ur10e.robot import Robot
 
 NESTED = 50  # loops in one another
@@ -19,7 +19,7 @@ TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # in which brackets and # mean nothing
 FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
-def arguments(statement: str) -> dict[str, Any]:
+def parse_arguments(statement: str) -> dict[str, Any]:
     """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but constants."""
     match = CALL.match(statement)
     if match is None:
@@ -29,8 +29,8 @@ def arguments(statement: str) -> dict[str, Any]:
         call = ast.parse(f"f({source})", mode="eval").body
         if not isinstance(call, ast.Call):
             raise ValueError("more than a call")
-        values = {str(i): constant(value) for i, value in enumerate(call.args)}
-        return values | {str(item.arg): constant(item.value) for item in call.keywords}
+        values = {str(i): evaluate_constant(value) for i, value in enumerate(call.args)}
+        return values | {str(item.arg): evaluate_constant(item.value) for item in call.keywords}
     except (SyntaxError, ValueError, ArithmeticError, TypeError, RecursionError, MemoryError):
         # The last two: the parser's way of saying that brackets are nested too deeply.
         raise ProgramError(f"not simulated: {statement}") from None
@@ -41,23 +41,23 @@ OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 }  # fmt: skip
 
 
-def constant(node: ast.expr) -> Any:
+def evaluate_constant(node: ast.expr) -> Any:
     """What an expression of numbers is worth (`0 + 0`), or a literal. Raises ValueError, ArithmeticError."""
     match node:
         case ast.BinOp(left, operation, right) if type(operation) in OPERATIONS:
-            one, other = constant(left), constant(right)
+            one, other = evaluate_constant(left), evaluate_constant(right)
             if not (isinstance(one, int | float) and isinstance(other, int | float)):
                 raise ValueError("no number")
             return OPERATIONS[type(operation)](one, other)
         case ast.List(values):
-            return [constant(value) for value in values]
+            return [evaluate_constant(value) for value in values]
         case ast.Tuple(values):
-            return tuple(constant(value) for value in values)
+            return tuple(evaluate_constant(value) for value in values)
         case _:
             return ast.literal_eval(node)
 
 
-def joints(value: Any) -> Joints:
+def read_joints(value: Any) -> Joints:
     """Six joint angles. Raises `ProgramError` when it is something else."""
     if not isinstance(value, list) or len(value) != 6:
         raise ProgramError(f"six joint angles expected, got {value}")
@@ -82,7 +82,7 @@ class Loop:
 Block = tuple[Call | Loop, ...]
 
 
-def syntax(lines: Sequence[str]) -> None:
+def check_brackets(lines: Sequence[str]) -> None:
     """Raises `ProgramError` at the line at which the controller's compiler finds that brackets do not match.
 
     A bracket that is left open is noticed on the line after, and the line is said as it is written.
@@ -103,7 +103,7 @@ def parse(lines: Sequence[str]) -> tuple[str, Block]:
     Raises `ProgramError` at the first line the simulation does not know, in the words of the maker's compiler where the
     line is one that this would not know either.
     """
-    syntax(lines)
+    check_brackets(lines)
     name = "unnamed"
     stack: list[list[Call | Loop]] = [[]]
     for number, line in enumerate(lines, 1):
@@ -161,7 +161,7 @@ class Arguments:
     """The arguments of one call, found by keyword or place."""
 
     def __init__(self, statement: str) -> None:
-        self._statement, self._values = statement, arguments(statement)
+        self._statement, self._values = statement, parse_arguments(statement)
 
     def all(self) -> list[Any]:
         return list(self._values.values())
@@ -173,7 +173,7 @@ class Arguments:
         return found
 
 
-def move(name: str, value: Arguments) -> Move:
+def read_move(name: str, value: Arguments) -> ScriptMove:
     """The move a `movej` or `movel` asks for; a blend radius is not used: it stops at every target."""
     target = value("0", "pose" if name == "movel" else "q")
     if not isinstance(target, list | tuple) or len(target) != 6:
@@ -181,21 +181,21 @@ def move(name: str, value: Arguments) -> Move:
     speed, acceleration = (0.25, 1.2) if name == "movel" else (1.05, 1.4)
     numbers = tuple(float(number) for number in target)
     speed, acceleration = float(value("2", "v", speed)), float(value("1", "a", acceleration))
-    return Move(numbers, speed, acceleration, straight=name == "movel", is_pose=isinstance(target, tuple))
+    return ScriptMove(numbers, speed, acceleration, straight=name == "movel", is_pose=isinstance(target, tuple))
 
 
 def _movej(robot: Robot, threads: Threads, value: Arguments) -> Steps:
-    return threads.move("main", move("movej", value))
+    return threads.move("main", read_move("movej", value))
 
 
 def _movel(robot: Robot, threads: Threads, value: Arguments) -> Steps:
-    return threads.move("main", move("movel", value))
+    return threads.move("main", read_move("movel", value))
 
 
 def _speedj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     threads.take("main")
-    velocity, acceleration = joints(value("0", "qd")), float(value("1", "a"))
-    finite([*velocity, acceleration])
+    velocity, acceleration = read_joints(value("0", "qd")), float(value("1", "a"))
+    check_finite([*velocity, acceleration])
     robot.motion.speed(velocity, max(acceleration, 0.01))
     yield from _wait(float(value("2", "t", 0.0)))
     threads.let_go("main")
@@ -218,7 +218,7 @@ def _sync(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     yield
 
 
-def _at_once(action: Callable[[Robot, Arguments], None]) -> Callable[[Robot, Threads, Arguments], Steps]:
+def _wrap(action: Callable[[Robot, Arguments], None]) -> Callable[[Robot, Threads, Arguments], Steps]:
     def steps(robot: Robot, threads: Threads, value: Arguments) -> Steps:
         action(robot, value)
         return iter(())
@@ -266,14 +266,14 @@ def _say(robot: Robot, value: Arguments) -> None:
 
 STATEMENTS: dict[str, Callable[[Robot, Threads, Arguments], Steps]] = {
     "movej": _movej, "movel": _movel, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
-    "textmsg": _at_once(_say), "popup": _at_once(_say),
-    "set_payload": _at_once(_payload), "set_target_payload": _at_once(_payload), "set_tcp": _at_once(_tcp),
-    "set_gravity": _at_once(lambda robot, value: None),
-    "set_digital_out": _at_once(_digital_out(0)), "set_standard_digital_out": _at_once(_digital_out(0)),
-    "set_configurable_digital_out": _at_once(_digital_out(8)), "set_tool_digital_out": _at_once(_digital_out(16)),
-    "write_output_integer_register": _at_once(_integer_register),
-    "write_output_float_register": _at_once(_float_register),
-    "write_output_boolean_register": _at_once(_boolean_register),
-    "protective_stop": _at_once(lambda robot, value: robot.protective_stop()),
-    "power_down": _at_once(lambda robot, value: robot.power_off()),
+    "textmsg": _wrap(_say), "popup": _wrap(_say),
+    "set_payload": _wrap(_payload), "set_target_payload": _wrap(_payload), "set_tcp": _wrap(_tcp),
+    "set_gravity": _wrap(lambda robot, value: None),
+    "set_digital_out": _wrap(_digital_out(0)), "set_standard_digital_out": _wrap(_digital_out(0)),
+    "set_configurable_digital_out": _wrap(_digital_out(8)), "set_tool_digital_out": _wrap(_digital_out(16)),
+    "write_output_integer_register": _wrap(_integer_register),
+    "write_output_float_register": _wrap(_float_register),
+    "write_output_boolean_register": _wrap(_boolean_register),
+    "protective_stop": _wrap(lambda robot, value: robot.protective_stop()),
+    "power_down": _wrap(lambda robot, value: robot.power_off()),
 }  # fmt: skip
