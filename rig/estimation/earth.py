@@ -1,4 +1,4 @@
-"""What every place on the Earth shares."""
+"""Constants of the Earth."""
 
 EARTH_RATE_RAD_S = 7.292115e-5  # of the WGS 84 ellipsoid
 STANDARD_GRAVITY_M_S2 = 9.80665  # of the unit g

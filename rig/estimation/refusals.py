@@ -1,6 +1,6 @@
-"""What no estimator averages into a result: every refusal by name, shared by all of them.
+"""Checks of input shared by all estimators, each of which raises `rig.errors.Fault` by name.
 
-Each function looks at one thing and raises `rig.errors.Fault`. `conditioning` judges what a design can tell.
+`condition_of` computes rank and condition number of a design.
 """
 
 from collections.abc import Iterator
@@ -13,27 +13,27 @@ from numpy.typing import ArrayLike
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
+MAX_SCALE = 4.0  # either way: a wrong unit gives more, no sensor does
 STUCK = 0.01  # of the axis that reads most
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
-CONFUSED = (  # ratios of reading over what is felt that a wrong unit gives
+CONFUSED = (  # ratios of reading over true value for wrong units
     (180 / np.pi, "the readings look like degrees per second given as rad/s"),
     (np.pi / 180, "the rates look like degrees per second given as rad/s"),
     (1 / 9.80665, "the readings look like g given as m/s²"),
 )
-MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
+MIN_SIDE = 0.05  # cosine between the reference and the direction that determines its sign
 NO_FIT = "the readings contradict the attitudes so much that no fit converges"
-CONSISTENT = 3.0  # residuals larger than so many times what the variances explain are worth a warning
+CONSISTENT = 3.0  # ratio of residuals to their standard deviations that is worth a warning
 
 
 def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
-    """Raises ValueError: a wrong shape is the caller's mistake, not the measurement's."""
+    """Raise ValueError for a wrong shape, which is the caller's mistake, not the measurement's."""
     if array.shape != shape:
         raise ValueError(f"{name} must be {shape}, not {array.shape}")
 
 
 def check_finite(**arrays: Array) -> None:
-    """Raises Fault `not_finite` naming the first array that holds a NaN or an infinity, and its row if it has more."""
+    """Raise Fault `not_finite` with the first array, and row, that holds a NaN or an infinity."""
     for name, array in arrays.items():
         finite = np.isfinite(array)
         if not finite.all():
@@ -46,7 +46,7 @@ def check_finite(**arrays: Array) -> None:
 
 
 def check_variances(variances: Array) -> None:
-    """Raises Fault `bad_variance` unless every variance is positive."""
+    """Raise Fault `bad_variance` unless every variance is positive."""
     if not (variances > 0).all():
         raise Fault(
             "bad_variance",
@@ -56,7 +56,7 @@ def check_variances(variances: Array) -> None:
 
 
 def check_count(observations: int, least: int, parameters: int) -> None:
-    """Raises Fault `too_few_observations`."""
+    """Raise Fault `too_few_observations` for fewer than `least` observations."""
     if observations < least:
         raise Fault(
             "too_few_observations",
@@ -66,7 +66,7 @@ def check_count(observations: int, least: int, parameters: int) -> None:
 
 
 def check_speeds(speeds_rad_s: Array) -> None:
-    """Raises Fault `bad_speed` unless every sweep's speed is positive."""
+    """Raise Fault `bad_speed` unless every sweep's speed is positive."""
     if not (speeds_rad_s > 0).all():
         raise Fault(
             "bad_speed",
@@ -76,7 +76,7 @@ def check_speeds(speeds_rad_s: Array) -> None:
 
 
 def check_signal(means: Array) -> None:
-    """Raises Fault `zero_reading` for a reading (…, 3) that is exactly zero on all three axes."""
+    """Raise Fault `zero_reading` for a reading (…, 3) that is exactly zero on all three axes."""
     if not means.any(axis=-1).all():
         raise Fault(
             "zero_reading",
@@ -86,9 +86,9 @@ def check_signal(means: Array) -> None:
 
 
 def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed_std_rad_s: Array) -> None:
-    """What every averaged revolution must be: means, variances (N, 3), speeds and their deviations (N,).
+    """Check averaged revolutions: means, variances (N, 3), speeds and their standard deviations (N,).
 
-    Raises Fault `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`; ValueError for a wrong shape.
+    Raise Fault  `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`; ValueError for a wrong shape.
     """
     count = len(means)
     require_shape("means", means, (count, 3))
@@ -102,7 +102,7 @@ def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed
 
 
 def check_duplicates(means: Array) -> None:
-    """Raises Fault `duplicated_observation` where two mean readings of (N, 3) agree to the last bit."""
+    """Raise Fault `duplicated_observation` if two mean readings of (N, 3) agree to the last bit."""
     order = np.lexsort(means.T)
     same = (means[order[1:]] == means[order[:-1]]).all(axis=-1)
     if same.any():
@@ -116,7 +116,7 @@ def check_duplicates(means: Array) -> None:
 
 
 def check_reads(matrix: Array) -> None:
-    """Raises Fault `stuck_sensor` where an axis, a row of F (3, 3), reads next to nothing of what the others do."""
+    """Raise Fault `stuck_sensor` if an axis, a row of F (3, 3), is much less sensitive than the others."""
     sizes = np.linalg.norm(matrix, axis=1)
     least = int(np.argmin(sizes))
     if sizes[least] < STUCK * sizes.max():
@@ -128,20 +128,20 @@ def check_reads(matrix: Array) -> None:
 
 
 def check_unit(scale: Array) -> None:
-    """Raises Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4, with the likely unit if it knows one."""
-    if not _believable(scale):
+    """Raise Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4, with the likely unit if there is one."""
+    if not _is_plausible(scale):
         typical = float(np.exp(np.mean(np.log(scale))))
         raise _wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical)
 
 
 def check_reading_ratio(ratio: float, where: str) -> None:
-    """Raises Fault `wrong_unit` where readings are `ratio` times the turn rate, beyond 4 or 1/4, as `check_unit`."""
-    if not _believable(ratio):
+    """Raise Fault `wrong_unit` if readings are `ratio` times the turn rate, beyond 4 or 1/4, as `check_unit`."""
+    if not _is_plausible(ratio):
         raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio)
 
 
-def _believable(ratio: ArrayLike) -> bool:
-    """Whether ratios of reading over what is felt, or their inverses, can be a sensor's."""
+def _is_plausible(ratio: ArrayLike) -> bool:
+    """Return whether a sensor can have these ratios of reading over true value, or their inverses."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return bool(np.all((ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)))
 
@@ -156,18 +156,18 @@ def _wrong_unit(what: str, ratio: float) -> Fault:
 
 
 def check_axes(axes: Array, nominal: Array | None) -> None:
-    """Whether the sensor's axes, rows of (3, 3) in the flange frame, can be a sensor, and the one expected.
+    """Check the sensor's axes, rows of (3, 3) in the flange frame, against their nominal directions.
 
-    `nominal` (3, 3) holds the rows where they should point; without it only a left-handed sensor is refused. Raises
-    Fault `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
+    `nominal` (3, 3) holds the expected rows; without it only a left-handed sensor is refused. Raise Fault
+    `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
     """
     remedy = "Correct the sensor's mounting in the configuration, the order of its axes, or how it is fixed"
     if nominal is not None:
         cosines = axes @ nominal.T
         where = np.argmax(np.abs(cosines), axis=1)
         if sorted(where) == [0, 1, 2] and np.any(where != np.arange(3)):
-            found = ", ".join(f"{'xyz'[i]} reads {'xyz'[where[i]]}" for i in range(3) if where[i] != i)
-            raise Fault("swapped_axes", f"the sensor's axes are swapped: {found}", remedy)
+            swaps = ", ".join(f"{'xyz'[i]} reads {'xyz'[where[i]]}" for i in range(3) if where[i] != i)
+            raise Fault("swapped_axes", f"the sensor's axes are swapped: {swaps}", remedy)
         mirrored = [i for i in range(3) if cosines[i, i] < -MIN_ALIGNMENT]
         if mirrored:
             names = ", ".join("xyz"[i] for i in mirrored)
@@ -185,18 +185,18 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
 
 
 def check_rotations(attitudes: Array) -> None:
-    """Raises Fault `bad_attitude` unless every matrix of (N, 3, 3) is a rotation."""
-    off = np.abs(attitudes @ np.swapaxes(attitudes, -1, -2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    if off.max(initial=0.0) > 1e-6 or (np.linalg.det(attitudes) < 0).any():
+    """Raise Fault `bad_attitude` unless every matrix of (N, 3, 3) is a rotation."""
+    deviations = np.abs(attitudes @ np.swapaxes(attitudes, -1, -2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    if deviations.max(initial=0.0) > 1e-6 or (np.linalg.det(attitudes) < 0).any():
         raise Fault(
             "bad_attitude",
-            f"attitude {int(np.argmax(off)) + 1} is not a rotation (it misses by {off.max():.2g})",
+            f"attitude {int(np.argmax(deviations)) + 1} is not a rotation (it misses by {deviations.max():.2g})",
             "Give attitudes as rotation matrices from body to table coordinates",
         )
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raises Fault `sign_unknown` unless more than noise tells the sign of v_ref (3,), by a direction (3,) near it."""
+    """Raise Fault `sign_unknown` if a direction (3,) is too far from v_ref (3,) to determine its sign."""
     if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",
@@ -206,7 +206,7 @@ def check_side(reference: Array, side: Array) -> None:
 
 
 def check_handedness(matrix: Array) -> None:
-    """Raises Fault `mirrored_axis` where F (3, 3) is that of a left-handed sensor."""
+    """Raise Fault `mirrored_axis` if F (3, 3) is that of a left-handed sensor."""
     if np.linalg.det(matrix) < 0:
         raise Fault(
             "mirrored_axis",
@@ -215,38 +215,38 @@ def check_handedness(matrix: Array) -> None:
         )
 
 
-def untrustworthy(what: str) -> Fault:
-    """The error for attitudes that the readings contradict."""
+def untrustworthy_attitudes(what: str) -> Fault:
+    """Return the error for attitudes that the readings contradict."""
     return Fault(
         "attitude_untrustworthy",
         what,
-        "Check the attitudes: their frame, their direction (body to table), headings that nobody measured, "
+        "Check the attitudes: their frame, their direction (body to table), headings that were not measured, "
         "an attitude that was not reached",
     )
 
 
 @contextmanager
-def converging() -> Iterator[None]:
-    """Raises Fault `attitude_untrustworthy` where the linear algebra of a fit in attitudes comes to no end."""
+def convergence_required() -> Iterator[None]:
+    """Raise Fault `attitude_untrustworthy` if the linear algebra of a fit in attitudes does not converge."""
     try:
         yield
     except np.linalg.LinAlgError:
-        raise untrustworthy(NO_FIT) from None
+        raise untrustworthy_attitudes(NO_FIT) from None
 
 
 @dataclass(frozen=True, slots=True)
 class Conditioning:
-    """Rank, condition number (largest over smallest singular value that should count)."""
+    """Rank, and condition number: the largest over the smallest of the needed singular values."""
 
     rank: int
     condition: float
 
 
-def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
-    """Conditioning of a design (n, p) with columns in comparable units, of which `needed` directions must be told.
+def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
+    """Return the conditioning of a design (n, p) with columns in comparable units, `needed` of them to be determined.
 
-    Singular values at rounding, or within three times `noise` (the norm that measurement noise gives a design which is
-    itself measured), do not count towards the rank.
+    Singular values at rounding, or within three times `noise` (the norm of measurement noise in a measured design), do
+    not count towards the rank.
     """
     singular = np.linalg.svd(design, compute_uv=False)
     floor = max(1e-10 * float(singular[0]), 3 * noise)
@@ -255,23 +255,24 @@ def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning
     return Conditioning(int(np.sum(singular > floor)), condition)
 
 
-def check_conditioning(told: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
-    """Raises Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the `limit` of the condition."""
-    if told.rank < needed:
-        raise Fault("rank_deficient", f"the observations leave {what} undetermined ({told.rank} of {needed})", remedy)
-    if not told.condition <= limit:
+def check_conditioning(conditioned: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
+    """Raise Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the `limit` of the condition."""
+    if conditioned.rank < needed:
+        undetermined = f"the observations leave {what} undetermined ({conditioned.rank} of {needed})"
+        raise Fault("rank_deficient", undetermined, remedy)
+    if not conditioned.condition <= limit:
         raise Fault(
             "ill_conditioned",
-            f"the observations hardly determine {what} (condition {told.condition:.3g}, {limit:g} is the most)",
+            f"the observations hardly determine {what} (condition {conditioned.condition:.3g}, {limit:g} is the most)",
             remedy,
         )
 
 
-def inconsistency(residuals: Array, variances: Array, freedom: int) -> tuple[str, ...]:
-    """A warning when residuals are much larger than their variances explain; `freedom` counts what the fit left."""
+def warn_of_residuals(residuals: Array, variances: Array, freedom: int) -> tuple[str, ...]:
+    """Return a warning if residuals exceed their variances; `freedom` is the fit's residual degrees of freedom."""
     if freedom <= 0:
         return ()
     ratio = float(np.sqrt(np.sum(residuals**2 / variances) / freedom))
     if ratio < CONSISTENT:
         return ()
-    return (f"residuals are {ratio:.1f} times what the variances explain: something beside noise is in the readings",)
+    return (f"residuals are {ratio:.1f} times what the variances explain: the readings contain more than noise",)

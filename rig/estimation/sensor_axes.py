@@ -1,4 +1,4 @@
-"""What a gyroscope's matrix F says of its axes: scale factors, the angles between them, how the sensor is mounted.
+"""The axes in a gyroscope's matrix F: scale factors, the angles between axes, the sensor's mounting.
 
 Row F_i = a_i / k_i, with a_i the unit vector of sensor axis i in the flange frame.
 """
@@ -16,7 +16,7 @@ PAIR = np.arange(3)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes that F has: `scale` factors (3,), unit vectors (3, 3), one a row, the rotation (3, 3) next to these."""
+    """The axes of F: `scale` factors (3,), unit vectors (3, 3) as rows, and the rotation (3, 3) nearest to them."""
 
     scale: Array
     axes: Array
@@ -24,7 +24,7 @@ class SensorAxes:
 
     @staticmethod
     def of(matrix: Array) -> "SensorAxes":
-        """The axes of `matrix` F (3, 3)."""
+        """Return the axes of `matrix` F (3, 3)."""
         scale = scale_of(matrix)
         axes = scale[:, None] * matrix
         return SensorAxes(scale, axes, nearest_rotation(axes))
@@ -46,32 +46,32 @@ class SensorAxes:
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """The covariance (6, 6) of non-orthogonality and mounting, by that of F (9, 9), row by row."""
+        """Return the covariance (6, 6) of non-orthogonality and mounting, by that of F (9, 9), row by row."""
         to_angles = self.to_angles
         covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance
 
     def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:
-        """The standard deviations (3,) of the non-orthogonality, by the covariance (9, 9) of F."""
+        """Return the standard deviations (3,) of the non-orthogonality, by the covariance (9, 9) of F."""
         std: Array = np.sqrt(np.diag(self.angles_covariance_rad2(of_matrix)))[:3]
         return std
 
 
 def non_orthogonality(axes: Array) -> Array:
-    """(3,) rad by which the angles between y and z, z and x, x and y fall short of 90°, from unit rows (3, 3)."""
+    """Return the rad (3,) by which the angles y z, z x, x y are smaller than 90°, from unit rows (3, 3)."""
     angles: Array = np.arcsin(np.clip((axes @ axes.T)[FIRST, SECOND], -1, 1))
     return angles
 
 
 def nearest_rotation(axes: Array) -> Array:
-    """The rotation (3, 3) nearest to three axes (rows) in the sum of squares: the orthogonal factor of axes = S R."""
-    left, _, right = np.linalg.svd(axes)
-    rotation: Array = left @ right
+    """Return the rotation (3, 3) nearest to three axes (rows): the factor R of the polar decomposition S R."""
+    first, _, second = np.linalg.svd(axes)
+    rotation: Array = first @ second
     return rotation
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """(6, 12) derivative of k and b with respect to F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
+    """Return the derivative (6, 12) of k and b by F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR, PAIR] = -(scale**3)[:, None] * matrix
     jacobian[3:, 9:] = -np.eye(3)
@@ -79,7 +79,7 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 
 
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
-    """(6, 9) derivative of the non-orthogonality and of the mounting's `rotation` with respect to F, row by row.
+    """Return the derivative (6, 9) of the non-orthogonality and of the mounting's `rotation` by F, row by row.
 
     δa_i = P_i δF_i with P_i = k_i (1 − a_i a_iᵀ). With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of
     M − Mᵀ, M = δA Rᵀ.

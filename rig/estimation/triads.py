@@ -1,4 +1,4 @@
-"""How two triads on one flange are turned against each other, a gyroscope and an accelerometer above all.
+"""The relative rotation of two triads on one flange, above all of a gyroscope and an accelerometer.
 
 Each triad's right-angled frame is the one nearest to its axes, the orthogonal factor of their polar decomposition, as
 `rig.estimation.sensor_axes` and the correction of readings have it. Both F hold the mounting to the same flange.
@@ -16,9 +16,9 @@ from rig.estimation.sensor_axes import SensorAxes
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """`rotation` (3, 3) takes a vector of the gyroscope's frame into the accelerometer's.
+    """`rotation` (3, 3) from the gyroscope's frame to the accelerometer's.
 
-    `vector_rad` (3,) is the same as a rotation vector; `covariance_rad2` (3, 3) of small turns about the
+    `vector_rad` (3,) is the same as a rotation vector; `covariance_rad2` (3, 3) is that of small rotations about the
     accelerometer's x, y, z.
     """
 
@@ -27,20 +27,20 @@ class Alignment:
     covariance_rad2: Array
 
 
-def alignment(
+def align_triads(
     gyroscope: ArrayLike,
     accelerometer: ArrayLike,
     gyroscope_covariance: ArrayLike,
     accelerometer_covariance: ArrayLike,
 ) -> Alignment:
-    """How two triads are aligned, from F (3, 3) of both and the covariances (9, 9) of their rows.
+    """Return the alignment of two triads from F (3, 3) of both and the covariances (9, 9) of their rows.
 
-    The two are taken to be independent: what an arm's error does to both alike is counted twice. Raises Fault
+    The two are treated as independent, so errors of the arm that both share are counted twice. Raise Fault
     `not_finite`, `mirrored_axis`; ValueError for a wrong shape.
     """
-    of_gyroscope, gyroscope_turns = _frame(gyroscope, gyroscope_covariance)
-    of_accelerometer, accelerometer_turns = _frame(accelerometer, accelerometer_covariance)
-    rotation = of_accelerometer @ of_gyroscope.T
+    gyroscope_frame, gyroscope_turns = _frame(gyroscope, gyroscope_covariance)
+    accelerometer_frame, accelerometer_turns = _frame(accelerometer, accelerometer_covariance)
+    rotation = accelerometer_frame @ gyroscope_frame.T
     return Alignment(
         rotation=rotation,
         vector_rad=rotation_vectors(rotation),
@@ -49,8 +49,8 @@ def alignment(
 
 
 def _frame(matrix: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
-    """The rotation (3, 3) from the flange's frame into the triad's, and the covariance (3, 3) of small turns there."""
-    f, of_rows = (np.asarray(each, dtype=np.float64) for each in (matrix, covariance))
+    """Return the rotation (3, 3) from the flange's frame to the triad's, and its covariance (3, 3)."""
+    f, of_rows = (np.asarray(value, dtype=np.float64) for value in (matrix, covariance))
     require_shape("matrix", f, (3, 3))
     require_shape("covariance", of_rows, (9, 9))
     check_finite(matrix=f, covariance=of_rows)

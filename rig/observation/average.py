@@ -88,7 +88,7 @@ class Stream:
         if quantity not in self.polynomials:
             return readings
         warm = self.sensor.channel(TEMPERATURE).values(self.raw[inside])
-        return self.polynomials[quantity].at_reference(readings, warm)
+        return self.polynomials[quantity].correct_to_reference(readings, warm)
 
     def temperature_c(self, inside: slice) -> float:
         """The mean of the samples inside, NaN of a sensor whose temperature nothing tells."""

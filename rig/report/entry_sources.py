@@ -49,7 +49,7 @@ from rig.estimation.reference.magnetometer import FieldDrift, Uniformity
 from rig.estimation.reference.reversal import Reversal
 from rig.estimation.reference.triaxial import TriaxialSolution
 from rig.estimation.statistics.bias_process import BiasProcess
-from rig.estimation.temperature.over_temperature import Line, OverTemperature
+from rig.estimation.temperature.over_temperature import OverTemperature, TemperatureLine
 from rig.estimation.triads import Alignment
 from rig.observation.average import Average
 from rig.observation.external.omitted import Omitted
@@ -211,7 +211,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     temperature.OverTemperatureEntry: (
         _row(OverTemperature, same="reference_c range_c orders scale lag_s lag_std_s repeats"),
     ),
-    temperature.TemperatureContributorEntry: (_row(Line, same="name kind distribution source"),),
+    temperature.TemperatureContributorEntry: (_row(TemperatureLine, same="name kind distribution source"),),
     temperature.AtTemperatureEntry: (),
     EarthRateEntry: (
         _row(

@@ -73,7 +73,7 @@ def test_the_polynomials_are_those_of_the_sensor(outcome: Outcome) -> None:
     assert (np.abs(found.scale[1] - SHARE * SETUP.scale) < 4 * stds[3:6]).all()
     assert found.hysteresis is not None and found.orders == (1, 1)
     assert np.allclose(
-        found.at(REFERENCE_C).values, np.r_[outcome.results["gyro"].scale, -outcome.results["gyro"].bias_rad_s]
+        found.evaluate(REFERENCE_C).values, np.r_[outcome.results["gyro"].scale, -outcome.results["gyro"].bias_rad_s]
     )
 
 
@@ -83,7 +83,7 @@ def test_u_at_the_reference_is_that_of_the_budget(outcome: Outcome) -> None:
     assert budget is not None
     entry = document_of(outcome).over_temperature["gyro"]["rate"]
 
-    assert np.allclose(outcome.polynomials["gyro"][RATE].at(REFERENCE_C).std, budget.std, rtol=1e-6)
+    assert np.allclose(outcome.polynomials["gyro"][RATE].evaluate(REFERENCE_C).std, budget.std, rtol=1e-6)
     assert {line.name for line in entry.contributors} > {"noise", "controller clock", "thermometer beside the sensor"}
 
 

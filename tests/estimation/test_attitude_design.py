@@ -7,7 +7,13 @@ import pytest
 
 from rig.config.procedures.attitude_sets import EIGHTEEN, FACES, WristAngles
 from rig.estimation.arrays import Array
-from rig.estimation.design.attitude_design import Expected, Order, expected, g_efficiency, telling
+from rig.estimation.design.attitude_design import (
+    ExpectedStds,
+    Order,
+    assess_identifiability,
+    expected_stds,
+    g_efficiency,
+)
 from rig.estimation.reference.attitude_error import effects, whitening_with
 from rig.estimation.reference.reference_model import KnownNorm, weighted_jacobian
 from rig.estimation.reference.triaxial import solve_triaxial
@@ -23,10 +29,10 @@ def flange_to_base(wrists_deg: tuple[WristAngles, ...]) -> Array:
     return attitudes_of(joints_rad(wrists_deg))
 
 
-def reached(wrists_deg: tuple[WristAngles, ...], error_rad: float, order: Order = 1) -> Expected:
+def reached(wrists_deg: tuple[WristAngles, ...], error_rad: float, order: Order = 1) -> ExpectedStds:
     """By a KVH 1775 in 10 s."""
     noise = np.full(len(wrists_deg), KVH / np.sqrt(10))
-    return expected(flange_to_base(wrists_deg), G * UP, noise, error_rad, order)
+    return expected_stds(flange_to_base(wrists_deg), G * UP, noise, error_rad, order)
 
 
 @pytest.mark.parametrize(
@@ -54,10 +60,10 @@ def test_faces_are_best_on_an_exact_table_and_lose_the_angles_on_a_real_arm(
 
 def test_condition_and_efficiency_are_those_of_the_best_designs() -> None:
     faces, eighteen = flange_to_base(FACES), flange_to_base(EIGHTEEN)
-    assert telling(faces, UP).condition == pytest.approx(np.sqrt(3))
-    assert telling(faces, UP, 2).condition == pytest.approx(1 + np.sqrt(2))
+    assert assess_identifiability(faces, UP).condition == pytest.approx(np.sqrt(3))
+    assert assess_identifiability(faces, UP, 2).condition == pytest.approx(1 + np.sqrt(2))
     assert [g_efficiency(faces, UP, order) for order in (1, 2)] == pytest.approx([1.0, 1.0], abs=1e-6)
-    assert telling(eighteen, UP).condition < 1.9
+    assert assess_identifiability(eighteen, UP).condition < 1.9
     assert 0.9 < g_efficiency(eighteen, UP) < 1
 
 
@@ -95,15 +101,15 @@ def test_no_other_eighteen_of_the_grid_are_noticeably_better() -> None:
 def test_attitudes_about_one_axis_or_too_few_are_said_to_tell_too_little(
     wrists_deg: tuple[WristAngles, ...], rank: int, undetermined: set[str]
 ) -> None:
-    told = telling(flange_to_base(wrists_deg), UP)
+    told = assess_identifiability(flange_to_base(wrists_deg), UP)
     assert (told.rank, told.needed, told.condition) == (rank, 14, np.inf)
     assert undetermined <= set(told.undetermined) and "bias of y" not in told.undetermined
     assert g_efficiency(flange_to_base(wrists_deg), UP) == 0.0
 
 
 def test_full_rank_leaves_nothing_undetermined() -> None:
-    assert telling(flange_to_base(EIGHTEEN), UP, 2).undetermined == ()
-    faces = telling(flange_to_base(FACES), UP)
+    assert assess_identifiability(flange_to_base(EIGHTEEN), UP, 2).undetermined == ()
+    faces = assess_identifiability(flange_to_base(FACES), UP)
     assert (faces.rank, faces.undetermined) == (14, ())
 
 
@@ -123,6 +129,6 @@ def test_what_is_expected_is_what_a_fit_reaches() -> None:
         )
         off.append([*(np.linalg.norm(fit.matrix, axis=1) - 1), *fit.bias])
     scale, bias = np.sqrt(np.mean(np.square(off).reshape(-1, 2, 3), axis=(0, 2)))
-    told = expected(attitudes, G * UP, np.full(18, std), 0.0)
+    told = expected_stds(attitudes, G * UP, np.full(18, std), 0.0)
     assert scale == pytest.approx(told.scale_std, rel=0.15)
     assert bias == pytest.approx(told.bias_std_m_s2, rel=0.15)

@@ -16,8 +16,8 @@ from rig.estimation.design.optimality import (
     PARAMETER_COUNT,
     Model,
     g_efficiency,
+    list_designs,
     maximum_prediction_variance,
-    named_designs,
     prediction_variance,
 )
 from rig.estimation.gyroscope.batch import algorithm_1_batch, newton_batch
@@ -115,7 +115,7 @@ def test_maximum_likelihood_reaches_the_triaxial_bound(second_order: Array | Non
 
 @pytest.mark.parametrize("model", ["squared", "vector"])
 def test_the_six_directions_are_g_optimal(model: Model) -> None:
-    six = named_designs()["six"]
+    six = list_designs()["six"]
     assert maximum_prediction_variance(six, model) == pytest.approx(PARAMETER_COUNT[model], abs=1e-6)
     assert g_efficiency(six, model) == pytest.approx(1.0, abs=1e-6)
     # The worst places are the design's own points, as the equivalence theorem wants it.
@@ -133,10 +133,10 @@ def test_no_design_is_better_than_the_number_of_parameters(model: Model) -> None
 
 
 def test_other_designs_compare_as_they_should() -> None:
-    worst = {name: maximum_prediction_variance(design) for name, design in named_designs().items()}
+    worst = {name: maximum_prediction_variance(design) for name, design in list_designs().items()}
     assert min(worst, key=lambda name: worst[name]) == "six"
     assert worst["icosahedron"] == pytest.approx(9.0) and worst["six, one direction twice"] == pytest.approx(7.0)
     singular = {name for name, value in worst.items() if np.isinf(value)}
     assert singular == {"tetrahedron", "eight corners", "one direction missing"}  # equal squares, or too few
-    known = {name: maximum_prediction_variance(design, "vector") for name, design in named_designs().items()}
+    known = {name: maximum_prediction_variance(design, "vector") for name, design in list_designs().items()}
     assert known["tetrahedron"] == pytest.approx(4.0) and known["one direction missing"] == pytest.approx(10.0)

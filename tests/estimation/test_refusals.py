@@ -20,9 +20,9 @@ from rig.estimation.refusals import (
     check_conditioning,
     check_reading_ratio,
     check_unit,
-    conditioning,
-    converging,
-    inconsistency,
+    condition_of,
+    convergence_required,
+    warn_of_residuals,
 )
 from support.motions.rate_table import attitudes
 
@@ -143,9 +143,9 @@ def test_what_is_hardly_told_is_ill_conditioned() -> None:
     with pytest.raises(Fault, match=r"ill_conditioned: .*condition .*100 is the most"):
         vector(readings(leaning), leaning)
     with pytest.raises(Fault, match="ill_conditioned"):
-        check_conditioning(conditioning(np.diag([1.0, 1e-3]), 2), 2, 100.0, "y", "Do more")
+        check_conditioning(condition_of(np.diag([1.0, 1e-3]), 2), 2, 100.0, "y", "Do more")
     with pytest.raises(Fault, match=r"rank_deficient: .*\(1 of 2\)"):
-        check_conditioning(conditioning(np.diag([1.0, 1e-3]), 2, noise=1e-3), 2, 100.0, "y", "Do more")
+        check_conditioning(condition_of(np.diag([1.0, 1e-3]), 2, noise=1e-3), 2, 100.0, "y", "Do more")
 
 
 def test_a_sensor_mounted_otherwise_than_said_is_refused() -> None:
@@ -179,9 +179,9 @@ def test_triaxial_readings_are_refused_alike() -> None:
 
 
 def test_residuals_are_compared_with_what_their_variances_explain() -> None:
-    assert inconsistency(np.ones((4, 3)), np.ones((4, 3)), 6) == ()
-    assert "5.7 times" in inconsistency(4 * np.ones((4, 3)), np.ones((4, 3)), 6)[0]
-    assert inconsistency(np.ones((4, 3)), np.ones((4, 3)), 0) == ()
+    assert warn_of_residuals(np.ones((4, 3)), np.ones((4, 3)), 6) == ()
+    assert "5.7 times" in warn_of_residuals(4 * np.ones((4, 3)), np.ones((4, 3)), 6)[0]
+    assert warn_of_residuals(np.ones((4, 3)), np.ones((4, 3)), 0) == ()
 
 
 def test_one_name_has_one_wording_whichever_estimator_refuses() -> None:
@@ -221,5 +221,5 @@ def test_a_wrong_unit_is_named_alike_by_scale_factor_and_by_turn_rate() -> None:
 
 
 def test_a_fit_that_comes_to_no_end_is_refused_by_name() -> None:
-    with pytest.raises(Fault, match=r"^attitude_untrustworthy: .* no fit converges"), converging():
+    with pytest.raises(Fault, match=r"^attitude_untrustworthy: .* no fit converges"), convergence_required():
         np.linalg.cholesky(-np.eye(3))

@@ -164,7 +164,7 @@ def _rate(run: RunData, sensors: Sequence[str], settings: RunSettings, false_ala
 
 def rate_of_each(kinds: int, *, of_all: float = FALSE_ALARMS) -> float:
     """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
-    return coverage.rate_of_each(of_all, len(CHECKS) * kinds)
+    return coverage.false_alarm_of_each(of_all, len(CHECKS) * kinds)
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:

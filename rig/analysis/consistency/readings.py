@@ -101,9 +101,9 @@ def judge_readings(
     if digits.has_bits:
         stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
         found = {"stuck_bit": (float(stuck), 0.0), **found}
-    telling = steps_of_noise >= LEAST_TO_SKEW
-    if any(window.sweep < 0 for window in windows) and telling.any():
-        found["skewed_noise"] = _skewness(at_rest, telling, sure)
+    assess_identifiability = steps_of_noise >= LEAST_TO_SKEW
+    if any(window.sweep < 0 for window in windows) and assess_identifiability.any():
+        found["skewed_noise"] = _skewness(at_rest, assess_identifiability, sure)
     runs = [_longest_run(each[:, noisy]) for each in counts]
     found["stuck_axis"] = float(max(frozen, *runs)), LONGEST_RUN
     if noisy.all():
@@ -147,8 +147,8 @@ def _spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, 
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
     offs = [(window.residual_counts - np.median(window.residual_counts, axis=0))[SETTLING:] for window in windows]
     noises = [np.maximum(1.4826 * np.median(np.abs(off), axis=0), half) for off in offs]
-    telling = [noise for off, noise in zip(offs, noises, strict=True) if len(off) >= FEWEST_OF_NOISE]
-    least = np.min(telling or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
+    assess_identifiability = [noise for off, noise in zip(offs, noises, strict=True) if len(off) >= FEWEST_OF_NOISE]
+    least = np.min(assess_identifiability or [half], axis=0)  # a short rest, as of an interrupted run, tells too little
     for window, off, own in zip(windows, offs, noises, strict=True):
         noise = np.maximum(own, least)
         deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)

@@ -10,7 +10,14 @@ from rig.config.models import RigConfig
 from rig.config.sensors.sensor_catalogue import PARTS
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.design.attitude_design import Expected, Order, Telling, expected, g_efficiency, telling
+from rig.estimation.design.attitude_design import (
+    ExpectedStds,
+    Identifiability,
+    Order,
+    assess_identifiability,
+    expected_stds,
+    g_efficiency,
+)
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.motion.geometry import flange_attitude
 from rig.motion.state import Joints
@@ -21,21 +28,21 @@ MAX_CONDITION = 100.0  # the worst of a thousand random tens has 19; beyond, noi
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """What `count` attitudes tell of a model of that `order`, and what is expected of each sensor by its name.
+    """What `count` attitudes tell of a model of that `order`, and what is expected_stds of each sensor by its name.
 
     `first` and `second` say how well they tell the two models; the efficiency is that of the one asked for.
     """
 
     count: int
     order: Order
-    first: Telling
-    second: Telling
+    first: Identifiability
+    second: Identifiability
     g_efficiency: float
     attitude_std_rad: float
-    sensors: Mapping[str, Expected]
+    sensors: Mapping[str, ExpectedStds]
 
     @property
-    def told(self) -> Telling:
+    def told(self) -> Identifiability:
         """What the attitudes tell of the model asked for."""
         return self.first if self.order == 1 else self.second
 
@@ -51,12 +58,12 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
         return None
     seconds = _time_in_each(plan.dwells)
     attitudes, up = _attitudes(list(seconds)), np.array(config.site.up)
-    first, second = telling(attitudes, up, 1), telling(attitudes, up, 2)
+    first, second = assess_identifiability(attitudes, up, 1), assess_identifiability(attitudes, up, 2)
     _refuse_undetermined(first if order == 1 else second, len(attitudes))
     attitude_std_rad = radians(config.uncertainty.axis_deg)
     reference, dwells_s = config.site.gravity_m_s2 * up, np.array(list(seconds.values()))
     sensors = {
-        name: expected(
+        name: expected_stds(
             attitudes,
             reference,
             PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 / np.sqrt(dwells_s),
@@ -75,7 +82,7 @@ def refuse_untelling(config: RigConfig, plan: Plan) -> None:
     order = config.procedure.accelerometer_order
     if order != 0:
         attitudes = _attitudes(list(_time_in_each(plan.dwells)))
-        _refuse_undetermined(telling(attitudes, np.array(config.site.up), order), len(attitudes))
+        _refuse_undetermined(assess_identifiability(attitudes, np.array(config.site.up), order), len(attitudes))
 
 
 def _time_in_each(dwells: Sequence[Dwell]) -> dict[Joints, float]:
@@ -91,7 +98,7 @@ def _attitudes(poses_rad: Sequence[Joints]) -> Array:
     return attitudes
 
 
-def _refuse_undetermined(told: Telling, count: int) -> None:
+def _refuse_undetermined(told: Identifiability, count: int) -> None:
     remedy = "Add attitudes to procedure.attitudes in which wrist 1 and wrist 3 are turned, or take eighteen"
     if told.undetermined:
         raise Refused(

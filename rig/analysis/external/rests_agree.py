@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.external.known_increments import KnownIncrements
 from rig.estimation.reference.reference_model import BIAS
-from rig.estimation.statistics.coverage import rate_of_each
+from rig.estimation.statistics.coverage import false_alarm_of_each
 from rig.observation.external.fixes import Turning
 from rig.observation.external.means_at_rest import means_at_rest
 
@@ -52,7 +52,7 @@ def _times_of(freedom: float) -> float:
     """How many standard deviations the worst of three axes is off in `FALSE_ALARM` of sound recordings: Student's t."""
     from scipy.special import ndtri, stdtrit
 
-    tail = rate_of_each(FALSE_ALARM, 2 * len(RATE.axes))
+    tail = false_alarm_of_each(FALSE_ALARM, 2 * len(RATE.axes))
     return -float(ndtri(tail) if np.isinf(freedom) else stdtrit(freedom, tail))
 
 

@@ -24,7 +24,7 @@ from rig.estimation.reference.imu import ImuSolution, solve_imu
 from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.estimation.statistics.expected_sizes import OWN_SHARES
-from rig.estimation.triads import Alignment, alignment
+from rig.estimation.triads import Alignment, align_triads
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.acceleration import DwellReading
 from rig.observation.reference.swept_acceleration import SweptAcceleration
@@ -262,7 +262,7 @@ def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) 
     if vector is None:
         return None
     to_flange = np.kron(np.eye(3), mounting.T)  # of the rows of F
-    return alignment(
+    return align_triads(
         vector.matrix,
         solution.matrix @ mounting,
         vector.matrix_covariance[F, F],

@@ -18,13 +18,13 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget, Contributor
 from rig.estimation.temperature.over_temperature import (
-    Line,
     OverTemperature,
-    Repeated,
-    over_temperature,
-    places_of,
+    RepeatedMeans,
+    TemperatureLine,
+    combine_with_reference,
+    fit_over_temperature,
+    group_by_input,
     powers_at,
-    settled,
 )
 from rig.observation.average import Average
 from rig.observation.external.csv_import import ExternalData
@@ -54,7 +54,7 @@ class AtReference:
 def taken_to_reference(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> AtReference:
     """Every sensor to calibrate, its rates and what its accelerometer read in dwells.
 
-    Raises Fault as `over_temperature` does, and `temperature_not_recorded`.
+    Raises Fault as `fit_over_temperature` does, and `temperature_not_recorded`.
     """
     surroundings = surroundings_of(recordings, settings)
     moved, found = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
@@ -74,18 +74,18 @@ def files_to_reference(data: ExternalData, reference_c: float) -> tuple[External
     averages = [*(each.average for each in data.sweeps), *data.rests]
     turned = [each.speed_rad_s * each.axis_flange for each in data.sweeps]
     felt = np.array([*turned, *np.zeros((len(data.rests), 3))])
-    seen = Repeated(
+    seen = RepeatedMeans(
         means=np.array([each.mean_rad_s for each in averages]),
         variances=np.array([each.variance_rad2_s2 for each in averages]),
-        felt=felt,
-        places=places_of(felt, np.zeros((len(felt), 0))),
+        inputs=felt,
+        poses=group_by_input(felt, np.zeros((len(felt), 0))),
         windows_s=np.array([(each.start_s, each.end_s) for each in averages]),
         temperature_c=np.array([each.temperature_c for each in averages]),
     )
     if np.isnan(seen.temperature_c).any():
         raise NOT_RECORDED
-    found = over_temperature(seen, reference_c, ASSUMED_GRADIENT_K)
-    means = found.at_reference(seen.means, seen.temperature_c)
+    found = fit_over_temperature(seen, reference_c, ASSUMED_GRADIENT_K)
+    means = found.correct_to_reference(seen.means, seen.temperature_c)
     moved = [_average(each, mean, reference_c) for each, mean in zip(averages, means, strict=True)]
     sweeps = tuple(replace(each, average=average) for each, average in zip(data.sweeps, moved, strict=False))
     return ExternalData(sweeps, tuple(moved[len(sweeps) :]), at_reference=True), found
@@ -95,7 +95,7 @@ def with_rate_polynomials(result: SensorResult, polynomials: OverTemperature) ->
     """A gyroscope's calibration with what the polynomials add to its uncertainty, and these with all of its budget."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
-        return result, settled(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
+        return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
     budget, whole = _together(RATE, polynomials, parameters, result.uncertainty)
     return replace(result, uncertainty=budget), whole
 
@@ -115,14 +115,18 @@ def _together(
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(
-        Line(each.name, each.kind, each.distribution, each.source, each.freedom, sign @ each.covariance @ sign)
+        TemperatureLine(
+            each.name, each.kind, each.distribution, each.source, each.freedom, sign @ each.covariance @ sign
+        )
         for each in budget.contributors
     )
     at = powers_at(0.0)
-    moved = sign @ at @ settled(polynomials, values, ()).covariance @ at.T @ sign
+    moved = sign @ at @ combine_with_reference(polynomials, values, ()).covariance @ at.T @ sign
     source = "what the repeats tell of the way to the reference temperature"
     added = Contributor(CONTRIBUTOR, "A", "normal", None, "", source, float(polynomials.process.freedom), moved)
-    return replace(budget, contributors=(*budget.contributors, added)), settled(polynomials, values, lines)
+    return replace(budget, contributors=(*budget.contributors, added)), combine_with_reference(
+        polynomials, values, lines
+    )
 
 
 def _rates(
@@ -133,17 +137,17 @@ def _rates(
     averages = [turn.average for part in parts for turn in part.revolutions]
     averages += [rest for part in parts for rest in part.rests]
     temperature_c = np.array([each.temperature_c for each in averages])
-    seen = Repeated(
+    seen = RepeatedMeans(
         means=known.means_rad_s,
         variances=known.variances_rad2_s2,
-        felt=known.turns_rad_s,
-        places=places_of(known.turns_rad_s, known.gravity_m_s2),
+        inputs=known.turns_rad_s,
+        poses=group_by_input(known.turns_rad_s, known.gravity_m_s2),
         windows_s=known.windows_s,
         temperature_c=temperature_c,
         instability=0.0 if known.sensor is None else known.sensor.instability_rad_s,
     )
-    found = over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
-    moved = iter(found.at_reference(seen.means, temperature_c))
+    found = fit_over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
+    moved = iter(found.correct_to_reference(seen.means, temperature_c))
     turns = [[_turn(turn, next(moved), reference_c) for turn in part.revolutions] for part in parts]
     rests = [[_average(rest, next(moved), reference_c) for rest in part.rests] for part in parts]
     return _replaced(recordings, name, [
@@ -160,16 +164,16 @@ def _accelerations(
     attitudes = np.array([dwell.attitude for dwell in dwells])
     felt = -(attitudes @ surroundings.site.down_m_s2)
     temperature_c = np.array([dwell.temperature_c for dwell in dwells])
-    seen = Repeated(
+    seen = RepeatedMeans(
         means=np.array([dwell.reading.mean for dwell in dwells]),
         variances=np.array([dwell.reading.variance for dwell in dwells]),
-        felt=felt,
-        places=places_of(felt, attitudes.reshape(len(dwells), 9)),
+        inputs=felt,
+        poses=group_by_input(felt, attitudes.reshape(len(dwells), 9)),
         windows_s=np.array([(each.window.start_s + since, each.window.end_s + since) for each, since in placed]),
         temperature_c=temperature_c,
     )
-    found = over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
-    moved = iter(found.at_reference(seen.means, temperature_c))
+    found = fit_over_temperature(seen, reference_c, surroundings.uncertainty.thermometer_gradient_k)
+    moved = iter(found.correct_to_reference(seen.means, temperature_c))
     stood = [tuple(_dwell(dwell, next(moved), reference_c) for dwell in part.dwells) for part in parts]
     turns = [tuple(_waved(turn, turn.average.temperature_c, found) for turn in part.revolutions) for part in parts]
     return _replaced(recordings, name, [
@@ -198,7 +202,7 @@ def _waved(turn: Observation, warmed_c: float, polynomials: OverTemperature) -> 
         return turn
     wave = turn.acceleration.harmonic
     warm = np.array([warmed_c])
-    mean, share = polynomials.at_reference(wave.harmonic_m_s2[:1], warm), polynomials.changes(warm)[0]
+    mean, share = polynomials.correct_to_reference(wave.harmonic_m_s2[:1], warm), polynomials.changes(warm)[0]
     harmonic = np.vstack([mean, share * wave.harmonic_m_s2[1:]])
     return replace(turn, acceleration=replace(turn.acceleration, harmonic=replace(wave, harmonic_m_s2=harmonic)))
 

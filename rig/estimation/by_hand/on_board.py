@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array, across
+from rig.estimation.arrays import Array, perpendicular_unit_vectors
 
 MATRIX, GRAVITY, BIAS, FACES = slice(0, 9), slice(9, 18), slice(18, 21), slice(21, 33)
 PRIOR_STD = np.repeat([0.2, 1.75e-3, 1.0, 3.5e-3], [9, 9, 3, 12])
@@ -139,7 +139,7 @@ def _move_equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
     design = np.hstack([by_matrix, by_gravity.reshape(3, 9), np.zeros((3, 15))])
     half = np.linalg.norm(up - reached) / 2
     stretched = np.arcsin(half) / (half * np.sqrt(1 - half**2)) if half > 1e-9 else 1.0
-    for axis in across(middle):
+    for axis in perpendicular_unit_vectors(middle):
         row, lever = axis @ design, np.cross(axis, middle)
         row[FACES.start + 2 * move.before.face + np.arange(2)] -= lever @ up_axes
         row[FACES.start + 2 * move.after.face + np.arange(2)] += lever @ turned @ after_axes

@@ -1,1 +1,1 @@
-"""How much a design tells before anything is measured: bounds and optimality."""
+"""Bounds and optimality of a design, before anything is measured."""

@@ -1,4 +1,4 @@
-"""How much a set of attitudes tells of an accelerometer at rest in them, before anything is measured.
+"""The information of a set of attitudes on an accelerometer at rest in them, before anything is measured.
 
 The model is that of `rig.estimation.reference.reference_model` with v̄ = 0 and ‖v_ref‖ known, TRIAX, Eqs. (10), (11),
 about an ideal sensor: F = 1, b = 0, φ = 0. Of an attitude error δ the readings' covariance is V = σ² 1 + δ² E Eᵀ
@@ -24,12 +24,12 @@ from rig.estimation.reference.reference_model import (
     weighted_jacobian,
     whitening,
 )
-from rig.estimation.refusals import conditioning
+from rig.estimation.refusals import condition_of
 
 Order = Literal[1, 2]
 PARAMETER_COUNT = {1: 14, 2: 17}
-FOUND = 1e-6  # of a unit vector: less of it in the undetermined directions is rounding
-PARTS = (  # what each number of θ belongs to
+ROUNDING = 1e-6  # of a unit vector: a smaller component in the undetermined directions is rounding
+PARTS = (  # the parameter of each element of θ
     *("scale of x", "angle x y", "angle x z", "angle x y", "scale of y"),
     *("angle y z", "angle x z", "angle y z", "scale of z"),
     *("the vertical",) * 3,
@@ -40,10 +40,10 @@ ORIENTATIONS = 4000
 
 
 @dataclass(frozen=True, slots=True)
-class Telling:
-    """What the attitudes alone decide: `rank` of the `needed` numbers, condition number, which parts are undetermined.
+class Identifiability:
+    """The identifiability by the attitudes: `rank` of the `needed` numbers, and the `undetermined` parameters.
 
-    `condition` is infinite below full rank. It is that of the equations in g.
+    `condition` is the condition number of the equations in g, infinite below full rank.
     """
 
     rank: int
@@ -53,8 +53,8 @@ class Telling:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
-    """Standard deviations by Cramér–Rao, the root-mean-square of three: scale (parts), angle between axes, bias, φ."""
+class ExpectedStds:
+    """Standard deviations by Cramér–Rao, RMS of three axes: relative scale, angle between axes, bias, φ."""
 
     scale_std: float
     non_orthogonality_std_rad: float
@@ -62,32 +62,31 @@ class Expected:
     second_order_std_s2_m: float | None
 
 
-def telling(attitudes: Array, up: Array, order: Order = 1) -> Telling:
-    """Rank and condition of the attitudes, and what they leave undetermined."""
+def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Identifiability:
+    """Return rank and condition of the attitudes, and the parameters that they leave undetermined."""
     rows = _equations(attitudes, up, order)
     needed = PARAMETER_COUNT[order]
-    found = conditioning(rows, needed)
-    if found.rank == needed:
-        return Telling(needed, needed, found.condition, ())
+    conditioned = condition_of(rows, needed)
+    if conditioned.rank == needed:
+        return Identifiability(needed, needed, conditioned.condition, ())
     _, _, directions = np.linalg.svd(rows)
-    loose = free_directions(_ideal(up, order), norm_known=True) @ directions[found.rank :].T
-    undetermined = np.linalg.norm(loose, axis=1) > FOUND
+    loose = free_directions(_ideal(up, order), norm_known=True) @ directions[conditioned.rank :].T
+    undetermined = np.linalg.norm(loose, axis=1) > ROUNDING
     parts = dict.fromkeys(part for part, is_loose in zip(PARTS, undetermined, strict=False) if is_loose)
-    return Telling(found.rank, needed, float("inf"), tuple(parts))
+    return Identifiability(conditioned.rank, needed, float("inf"), tuple(parts))
 
 
 def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
-    """The model's parameters over the worst variance of what it predicts in any orientation: 1 is the best there is.
+    """Return the number of parameters over the worst prediction variance in any orientation: 1 at best, 0 if singular.
 
-    Of exact attitudes and equal noise. The variance is the trace over the three axes, times N, in units of one
-    reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz). 0 where the
-    attitudes leave something undetermined.
+    For exact attitudes and equal noise. The variance is the trace over the three axes, times N, in units of one
+    reading's; its mean over the design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
     """
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation
 
     rows = _equations(attitudes, up, order)
-    if telling(attitudes, up, order).undetermined:
+    if assess_identifiability(attitudes, up, order).undetermined:
         return 0.0
     covariance = np.linalg.inv(rows.T @ rows)
     orientations = Rotation.from_quat(_spiral(ORIENTATIONS))
@@ -99,20 +98,20 @@ def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     values = variances(orientations.as_matrix())
     start = orientations[int(np.argmax(values))]
 
-    def lost(turn: Array) -> float:
+    def negative_variance(turn: Array) -> float:
         return -float(variances((start * Rotation.from_rotvec(turn)).as_matrix()[None])[0])
 
-    climbed = minimize(lost, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    climbed = minimize(negative_variance, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
     return PARAMETER_COUNT[order] / max(float(values.max()), -float(climbed.fun))
 
 
-def expected(
+def expected_stds(
     attitudes: Array, reference_m_s2: Array, noise_m_s2: Array, attitude_std_rad: float, order: Order = 1
-) -> Expected:
-    """What a weighted fit can reach of mean readings with white noise of `noise_m_s2` (N,) in attitudes known to δ.
+) -> ExpectedStds:
+    """Return the Cramér–Rao bound of mean readings with white noise `noise_m_s2` (N,) and attitude errors δ.
 
-    `reference_m_s2` (3,): what an accelerometer feels at rest, in table coordinates. The attitudes must tell
-    everything, see `telling`.
+    `reference_m_s2` (3,): the specific force at rest, in table coordinates. The attitudes must determine all
+    parameters, see `assess_identifiability`.
     """
     theta, count = _ideal(reference_m_s2, order), len(attitudes)
     v_bar = np.zeros((count, 3))
@@ -123,7 +122,7 @@ def expected(
     for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
         between[row, [3 * i + j, 3 * j + i]] = 1.0
     variance = np.diag(bound)
-    return Expected(
+    return ExpectedStds(
         scale_std=_rms(variance[[0, 4, 8]]),
         non_orthogonality_std_rad=_rms(np.diag(between @ bound @ between.T)),
         bias_std_m_s2=_rms(variance[BIAS]),
@@ -136,7 +135,7 @@ def _rms(variances: Array) -> float:
 
 
 def _ideal(reference: Array, order: Order) -> Array:
-    """θ of an ideal sensor."""
+    """Return θ of an ideal sensor."""
     theta = np.zeros(18 if order == 2 else 15)
     theta[[0, 4, 8]] = 1.0
     theta[REFERENCE] = reference
@@ -144,16 +143,16 @@ def _ideal(reference: Array, order: Order) -> Array:
 
 
 def _equations(attitudes: Array, up: Array, order: Order) -> Array:
-    """(3 N, 14 or 17) what readings in g say of each free number, all alike."""
+    """Return the design (3 N, 14 or 17) of readings in g by the free parameters, with equal weights."""
     theta, v_bar = _ideal(up, order), np.zeros((len(attitudes), 3))
     return weighted_jacobian(theta, attitudes, v_bar, whitening(np.ones((len(attitudes), 3))), norm_known=True)
 
 
 def _spiral(count: int) -> Array:
-    """(count, 4) quaternions spread evenly over all rotations (Alexa, Super-Fibonacci spirals, CVPR 2022)."""
-    place = np.arange(count) + 0.5
-    inner, outer = np.sqrt(place / count), np.sqrt(1 - place / count)
-    first, second = 2 * np.pi * place / np.sqrt(2), 2 * np.pi * place / 1.533751168755204288118041
+    """Return quaternions (count, 4) spread evenly over all rotations (Alexa, Super-Fibonacci spirals, CVPR 2022)."""
+    step = np.arange(count) + 0.5
+    inner, outer = np.sqrt(step / count), np.sqrt(1 - step / count)
+    first, second = 2 * np.pi * step / np.sqrt(2), 2 * np.pi * step / 1.533751168755204288118041
     return np.stack(
         [inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)], axis=1
     )

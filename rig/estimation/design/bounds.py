@@ -1,7 +1,7 @@
 """Cramér–Rao bounds: the smallest covariance any unbiased estimator of a model can have with a given design.
 
-The noise is Gaussian with known variances, so the Fisher information is Σ Jᵀ V⁻¹ J; what the model does not ask for but
-has to leave open (directions of turning, mounting) is in it as a nuisance. `efficiency` compares an estimator with it.
+The noise is Gaussian with known variances, so the Fisher information is Σ Jᵀ V⁻¹ J. Unknown directions of rotation and
+mounting are nuisance parameters in it. `efficiency` compares an estimator with the bound.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(6, 6) bound for kx ky kz bx by bz of g = K (m + b) when only ‖g‖ is known of each sweep: SIX, Eqs. (1)–(4).
+    """Return the bound (6, 6) for kx ky kz bx by bz of g = K (m + b) if only ‖g‖ of each sweep is known: SIX (1)–(4).
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
-    two unknown numbers of each sweep's direction use up two of its three readings; what is left tells ‖g‖², with the
-    variance Σ 4 k⁴ (m + b)² v. The bias does not matter. Raises LinAlgError for a design that leaves something open.
+    two unknowns of each sweep's direction use up two of its three readings; the third determines ‖g‖², with the
+    variance Σ 4 k⁴ (m + b)² v. The bias has no effect. Raise LinAlgError for a singular design.
     """
     k, rates, variances = (np.asarray(a, dtype=np.float64) for a in (scale, rates_rad_s, variances_rad2_s2))
     theta = np.concatenate([k, np.zeros(3)])
@@ -28,18 +28,18 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(12, 12) bound for the rows of F, then c, of the vector model m = F ω + c; rates (N, 3) may be zero (rests)."""
+    """Return the bound (12, 12) for the rows of F, then c, of m = F ω + c; rates (N, 3) may be zero."""
     rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
     design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
     bound = np.zeros((12, 12))
     for axis in range(3):
-        own = np.array([3 * axis, 3 * axis + 1, 3 * axis + 2, 9 + axis])
-        bound[np.ix_(own, own)] = _inverse(design / np.sqrt(variances[:, axis])[:, None])
+        columns = np.array([3 * axis, 3 * axis + 1, 3 * axis + 2, 9 + axis])
+        bound[np.ix_(columns, columns)] = _inverse(design / np.sqrt(variances[:, axis])[:, None])
     return bound
 
 
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(6, 6) bound for kx ky kz bx by bz when the rate is known as a vector; `matrix` (3, 3) is the true F."""
+    """Return the bound (6, 6) for kx ky kz bx by bz if the rate is known as a vector; `matrix` (3, 3) is the true F."""
     f = np.asarray(matrix, dtype=np.float64)
     jacobian = parameter_jacobian(f, scale_of(f))
     return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T
@@ -55,9 +55,9 @@ def triaxial_bound(
     known: ArrayLike | None = None,
     second_order: ArrayLike | None = None,
 ) -> Array:
-    """Bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX, Eqs. (3), (10).
+    """Return the bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX (3), (10).
 
-    Shapes as in `solve_triaxial`, true values. Without `known` the size of `reference` is given to the estimator.
+    Shapes as in `solve_triaxial`, true values. `known` (N, 3) is v̄; without it the norm of `reference` is given.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
     if second_order is not None:
@@ -69,12 +69,12 @@ def triaxial_bound(
 
 
 def efficiency(errors: ArrayLike, bound: Array) -> Array:
-    """(p,) mean squared error of R runs (R, p) over the bound's diagonal: 1 for an efficient estimator."""
+    """Return the mean squared error (p,) of R runs (R, p) over the bound's diagonal: 1 for an efficient estimator."""
     return np.asarray(np.mean(np.asarray(errors) ** 2, axis=0) / np.diag(bound), dtype=np.float64)
 
 
 def _inverse(weighted: Array) -> Array:
-    """(JᵀJ)⁻¹, with columns brought to unit length first."""
+    """Return (JᵀJ)⁻¹, computed with columns of unit length."""
     size = np.linalg.norm(weighted, axis=0)
     scaled = weighted / size
     inverse: Array = np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(size, size), dtype=np.float64)

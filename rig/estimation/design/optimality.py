@@ -1,6 +1,6 @@
-"""How good a set of sweep directions is: G-optimality, SIX section II-B, and c-optimality of what is wanted.
+"""Optimality of a set of sweep directions: G-optimality, SIX section II-B, and c-optimality.
 
-The variance of what the fitted model predicts at a point x, N f(x)ᵀ (XᵀX)⁻¹ f(x) in units of one observation's
+The variance of the fitted model's prediction at a point x, N f(x)ᵀ (XᵀX)⁻¹ f(x) in units of one observation's
 variance, is never below p, the number of parameters, at its worst point: the mean over the design's own points is
 exactly p. A design whose worst point on the sphere has p is G-optimal, and then also D-optimal (Kiefer and Wolfowitz).
 
@@ -23,9 +23,9 @@ Model = Literal["squared", "vector"]
 PARAMETER_COUNT: Mapping[Model, int] = {"squared": 6, "vector": 4}
 
 
-def prediction_variance(directions: ArrayLike, at: ArrayLike, model: Model = "squared") -> Array:
-    """(M,) N f(x)ᵀ (XᵀX)⁻¹ f(x) at points `at` (M, 3) for a design `directions` (N, 3); infinite if it is singular."""
-    x, f = _features(directions, model), _features(at, model)
+def prediction_variance(directions: ArrayLike, points: ArrayLike, model: Model = "squared") -> Array:
+    """Return N f(x)ᵀ (XᵀX)⁻¹ f(x) (M,) at `points` (M, 3) for a design `directions` (N, 3); inf if it is singular."""
+    x, f = _features(directions, model), _features(points, model)
     if np.linalg.matrix_rank(x) < x.shape[1]:
         return np.full(len(f), np.inf)
     information = x.T @ x / len(x)
@@ -33,9 +33,9 @@ def prediction_variance(directions: ArrayLike, at: ArrayLike, model: Model = "sq
 
 
 def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared") -> float:
-    """The largest `prediction_variance` over the unit sphere; the G-criterion. At least `PARAMETER_COUNT[model]`.
+    """Return the largest `prediction_variance` on the unit sphere: the G-criterion, at least `PARAMETER_COUNT[model]`.
 
-    The variance is a smooth quartic, so the best of a fine grid and a climb from there find its maximum.
+    The variance is a smooth quartic: a local search from the best point of a fine grid finds its maximum.
     """
     from scipy.optimize import minimize
 
@@ -45,24 +45,24 @@ def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared")
     if not np.isfinite(values[best]):
         return float("inf")
 
-    def lost(point: Array) -> float:
+    def negative_variance(point: Array) -> float:
         return -float(prediction_variance(directions, (point / np.linalg.norm(point))[None], model)[0])
 
-    climbed = minimize(lost, grid[best], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
+    climbed = minimize(negative_variance, grid[best], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
     return max(float(values[best]), -float(climbed.fun))
 
 
 def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
-    """p / worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
+    """Return p over the worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
     return PARAMETER_COUNT[model] / maximum_prediction_variance(directions, model)
 
 
 def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale") -> float:
-    """How good sweeps are for the scale factors, or for the biases: 1 where none of as many is better, 0 if singular.
+    """Return the c-efficiency of sweeps for the scale factors, or the biases: 1 at best, 0 for a singular design.
 
-    c-optimality (Elfving): the variance of a combination cᵀβ of the vector model's parameters, N cᵀ(XᵀX)⁻¹c, here of
-    the axis that it is worst of. The squares of a direction's parts add up to 1, so that the least of the worst slope
-    is 3; that of an offset is 1.
+    c-optimality (Elfving): the variance N cᵀ(XᵀX)⁻¹c of a combination cᵀβ of the vector model's parameters, here for
+    the worst axis. The squares of a direction's components add up to 1, so the smallest worst variance of a slope is 3,
+    of an offset 1.
     """
     features = _features(directions, "vector")
     if np.linalg.matrix_rank(features) < PARAMETER_COUNT["vector"]:
@@ -71,8 +71,8 @@ def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale"
     return float(3 / variances[:3].max() if what == "scale" else 1 / variances[3])
 
 
-def named_designs() -> dict[str, Array]:
-    """Sets of sweep directions (N, 3) to compare with the six of SIX, section II-B."""
+def list_designs() -> dict[str, Array]:
+    """Return sets of sweep directions (N, 3) to compare with the six of SIX, section II-B."""
     axes = np.eye(3)
     six = np.concatenate([axes, -axes])
     corners = np.array(list(product((1.0, -1.0), repeat=3))) / np.sqrt(3)
@@ -102,9 +102,9 @@ def _features(points: ArrayLike, model: Model) -> Array:
 
 
 def _sphere(count: int) -> Array:
-    """(count, 3) points spread evenly over the unit sphere, on a spiral."""
-    place = np.arange(count) + 0.5
-    z = 1 - 2 * place / count
-    turn = np.pi * (1 + np.sqrt(5)) * place
+    """Return points (count, 3) spread evenly over the unit sphere, on a spiral."""
+    step = np.arange(count) + 0.5
+    z = 1 - 2 * step / count
+    turn = np.pi * (1 + np.sqrt(5)) * step
     radius = np.sqrt(1 - z**2)
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)

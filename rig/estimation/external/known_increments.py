@@ -143,7 +143,7 @@ def _settle(recorded: Recorded, state: State) -> _Settled:
             sizes = model.likeliest(*_expected(model, recorded.fixes), start=sizes)
         solved = model.solve(sizes)
         if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
-            raise refusals.untrustworthy(refusals.NO_FIT)
+            raise refusals.untrustworthy_attitudes(refusals.NO_FIT)
         state = state.moved(solved.theta)
         settled = _Settled(state, model, sizes, solved, iteration)
         std = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
@@ -191,14 +191,14 @@ def _conditioning(mixed: Mixed) -> refusals.Conditioning:
     """Conditioning of the design with F and b brought to one size."""
     told = mixed.design[:, :, : BIAS.stop].reshape(-1, BIAS.stop)
     sizes = [np.linalg.norm(told[:, each]) for each in (MATRIX, BIAS)]
-    return refusals.conditioning(told / np.repeat(sizes, [9, 3]), BIAS.stop)
+    return refusals.condition_of(told / np.repeat(sizes, [9, 3]), BIAS.stop)
 
 
 def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
     """Raises Fault `attitude_untrustworthy`, `clocks_apart`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`."""
     off = float(np.sqrt(np.mean(settled.solved.residuals**2)))
     if off > UNTRUSTWORTHY_RAD:
-        raise refusals.untrustworthy(f"the increments of attitudes and gyroscope differ by {off:.2g} rad")
+        raise refusals.untrustworthy_attitudes(f"the increments of attitudes and gyroscope differ by {off:.2g} rad")
     odd = np.concatenate([np.flatnonzero(given.joined & ~left.joined), np.flatnonzero(left.joined)[_odd(settled)]])
     if abs(settled.state.clock_s) > MOST_CLOCK * CLOCK_STD_S:
         std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
@@ -210,7 +210,7 @@ def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
         )
     if len(odd) > _may_be_odd(given):
         where_s = float(given.at_s[np.searchsorted(given.fix, odd.min())])
-        raise refusals.untrustworthy(
+        raise refusals.untrustworthy_attitudes(
             f"{len(odd)} of {given.joined.sum()} increments contradict all others, the first after {where_s:.2f} s"
         )
     worst = float(np.sqrt(np.diag(settled.solved.covariance)[MATRIX].max()))

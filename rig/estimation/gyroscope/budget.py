@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.estimation.arrays import Array, across
+from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.gyroscope.mount_squares import of_mount_squares
 from rig.estimation.gyroscope.vector_fit import Explained, Seen
@@ -278,6 +278,6 @@ def _tilted(seen: Seen, angle_rad: float) -> Array:
     for joint in sorted(set(seen.joints) - {None}, key=str):
         swept = np.array([each == joint for each in seen.joints])
         axis = seen.turns_rad_s[swept][0] / np.linalg.norm(seen.turns_rad_s[swept][0])
-        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in across(axis)])
+        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in perpendicular_unit_vectors(axis)])
         patterns.extend(np.where(swept[:, None], tilts, 0.0))
     return np.array(patterns)

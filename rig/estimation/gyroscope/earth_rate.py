@@ -26,7 +26,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.arrays import Array, across
+from rig.estimation.arrays import Array, perpendicular_unit_vectors
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.gyroscope.common_errors import CommonErrors
 from rig.estimation.gyroscope.nonlinearity import curvature
@@ -100,19 +100,19 @@ class EarthRate:
     @property
     def heading_rad(self) -> float | None:
         """Where the base's x axis points, from north over east; None where it points up or down."""
-        across = self._level()
-        if across is None:
+        perpendicular_unit_vectors = self._level()
+        if perpendicular_unit_vectors is None:
             return None
-        ahead, left = across
+        ahead, left = perpendicular_unit_vectors
         return float(np.arctan2(self.rate_rad_s @ left, self.rate_rad_s @ ahead))
 
     @property
     def heading_std_rad(self) -> float | None:
         """Standard deviation of the heading; None where the base's x axis points up or down."""
-        across = self._level()
-        if across is None:
+        perpendicular_unit_vectors = self._level()
+        if perpendicular_unit_vectors is None:
             return None
-        ahead, left = across
+        ahead, left = perpendicular_unit_vectors
         along, aside = float(self.rate_rad_s @ ahead), float(self.rate_rad_s @ left)
         return self._std((along * left - aside * ahead) / (along**2 + aside**2))
 
@@ -135,7 +135,7 @@ def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthR
     directions = np.eye(3)
     if known.g_sensitivity and known.latitude_rad is not None:
         held = EARTH_RATE_RAD_S * np.sin(known.latitude_rad) * known.up
-        directions = across(known.up)
+        directions = perpendicular_unit_vectors(known.up)
     gravity = seen.gravity_m_s2 if known.g_sensitivity else None
     _check_told(seen, directions, gravity)
     pull = None if gravity is None else seen.pull_m_s2
@@ -209,7 +209,7 @@ def _leaning(turns_rad_s: Array) -> Array:
     patterns: list[Array] = []
     for place in np.flatnonzero(turns_rad_s.any(axis=1)):
         turn = turns_rad_s[place]
-        for way in across(turn / np.linalg.norm(turn)):
+        for way in perpendicular_unit_vectors(turn / np.linalg.norm(turn)):
             patterns.append(np.zeros_like(turns_rad_s))
             patterns[-1][place] = np.cross(way, turn)
     return np.array(patterns).reshape(-1, *turns_rad_s.shape)
@@ -238,7 +238,7 @@ def _told(seen: Seen, directions: Array, gravity: Array | None) -> tuple[refusal
     own = np.kron(design_matrix(sweeps, pull), np.eye(3))
     design = np.column_stack([own, (seen.attitudes @ directions.T).reshape(len(own), -1)])
     needed = design.shape[1]
-    return refusals.conditioning(design, needed), needed
+    return refusals.condition_of(design, needed), needed
 
 
 def check_earth_seen(

@@ -251,7 +251,7 @@ def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
     """Conditioning of the design, rates and offsets of one size. Raises Fault `rank_deficient`, `ill_conditioned`."""
     design = np.vstack([each.design for each in equations])
     sizes = [np.linalg.norm(design[:, each]) for each in (slice(0, 9), slice(9, 12))]
-    told = refusals.conditioning(design / np.repeat(sizes, [9, 3]), 12)
+    told = refusals.condition_of(design / np.repeat(sizes, [9, 3]), 12)
     refusals.check_conditioning(told, 12, MAX_CONDITION, "axis or bias", REMEDY)
     return told
 

@@ -104,13 +104,13 @@ def solve_levenberg_marquardt(
         rank=told.rank,
         condition=told.condition,
         iterations=int(found.nfev),
-        warnings=refusals.inconsistency(residuals, variance, len(means) - 6),
+        warnings=refusals.warn_of_residuals(residuals, variance, len(means) - 6),
     )
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
     """Conditioning of Eq. (7)'s design for readings less their mean, in their length; squares double the noise."""
-    return refusals.conditioning(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
+    return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 
 def squared_rate(theta: Array, means: Array) -> Array:

@@ -30,9 +30,9 @@ from rig.estimation.refusals import (
     check_signal,
     check_unit,
     check_variances,
-    conditioning,
-    inconsistency,
+    condition_of,
     require_shape,
+    warn_of_residuals,
 )
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
@@ -124,7 +124,7 @@ def solve_vector_model(
     check_duplicates(means[moving])
     scaled = design / _unit(design)
     told = _check_told(scaled)
-    found = conditioning(scaled[:, :4], 4) if columns > 4 else told
+    found = condition_of(scaled[:, :4], 4) if columns > 4 else told
 
     speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
@@ -161,7 +161,7 @@ def solve_vector_model(
         rank=told.rank,
         condition=found.condition,
         iterations=2 if speed_std.any() else 1,
-        warnings=inconsistency(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
+        warnings=warn_of_residuals(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
     )
 
 
@@ -187,7 +187,7 @@ def check_told(rates: Array, gravity: Array | None) -> None:
 
 def _check_told(scaled: Array) -> Conditioning:
     columns = scaled.shape[1]
-    told = conditioning(scaled, columns)
+    told = condition_of(scaled, columns)
     check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
     return told
 

@@ -114,10 +114,10 @@ def solve_imu(
     held = held_still(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
-    with refusals.converging():
+    with refusals.convergence_required():
         start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
         columns = jacobian(start, movement) @ free_ways(start, held)
-        told = refusals.conditioning(columns / sizes_of(columns), needed)
+        told = refusals.condition_of(columns / sizes_of(columns), needed)
         what = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, None)
@@ -149,7 +149,7 @@ def solve_imu(
         iterations=fit.iterations,
         own=movement.own,
         own_share=movement.own_share,
-        warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
+        warnings=refusals.warn_of_residuals(white, np.ones_like(white), freedom),
     )
 
 

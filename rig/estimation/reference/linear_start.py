@@ -41,7 +41,7 @@ def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Arra
     sizes = np.repeat([_rms(x[:, block]) for block in (F, REFERENCE, BIAS, LEVER)], [9, 3, 3, 3])[: x.shape[1]]
     noise = np.sqrt(np.diag(movement.noise()).max() / np.mean(readings**2)) * (np.sqrt(len(readings)) + np.sqrt(3))
     needed = x.shape[1] - 1
-    told = refusals.conditioning(x / sizes, needed, float(noise))
+    told = refusals.condition_of(x / sizes, needed, float(noise))
     refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, bias, reference and lever arm", REMEDY)
     theta = to_theta(null_vector(x, sizes, norm, up))
     refusals.check_side(theta[REFERENCE], up)

@@ -16,8 +16,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference.attitude_error import effects, whitening_with
 from rig.estimation.reference.reference_model import most_likely, predicted, whitened
 from rig.estimation.reference.triaxial import TriaxialSolution
-from rig.estimation.refusals import converging
-from rig.estimation.statistics.coverage import rate_of_each
+from rig.estimation.refusals import convergence_required
+from rig.estimation.statistics.coverage import false_alarm_of_each
 
 MODEL = "m_m = F Rᵀ m + b"
 FREE = 14  # F and b, and the field's direction: its size is given
@@ -64,7 +64,7 @@ def uniformity(
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings_t, attitudes, variances_t2))
     v_bar = np.zeros_like(m)
     start = solution.theta
-    with converging():
+    with convergence_required():
         white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
         theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
     left = whitened(white, m - predicted(theta, r, v_bar))
@@ -99,5 +99,5 @@ def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: 
     stds = np.sqrt(v[1:] + v[0] + 2 * (repeatability_rad * np.linalg.norm(m[0])) ** 2)
     squares = np.sum((changes / stds) ** 2, axis=1)
     worst = int(np.argmax(squares))
-    limit = float(chdtri(3, rate_of_each(FALSE_ALARM, len(changes))))
+    limit = float(chdtri(3, false_alarm_of_each(FALSE_ALARM, len(changes))))
     return FieldDrift(changes[worst], stds[worst], float(squares[worst]), limit)

@@ -122,7 +122,7 @@ def solve_triaxial(
     needed = parameters - norm_known
     _check(m, r, v, known, parameters)
 
-    with refusals.converging():
+    with refusals.convergence_required():
         start, solutions = published_estimate(m, r, known, second_order=second_order)
         squares = sensed(start, r, v_bar) ** 2 if second_order else None
         told = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
@@ -160,7 +160,7 @@ def solve_triaxial(
         rank=told.rank,
         condition=told.condition,
         iterations=iterations,
-        warnings=refusals.inconsistency(whitened(white, residuals), np.ones_like(v), 3 * len(m) - needed)
+        warnings=refusals.warn_of_residuals(whitened(white, residuals), np.ones_like(v), 3 * len(m) - needed)
         + _errors_in_x(m, v, method),
         attitude_error=attitude_error,
     )
@@ -214,7 +214,7 @@ def _check_size(m: Array, norm: float) -> None:
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
     """Conditioning of the scaled X. Its readings are noisy, so directions that only noise tells do not count."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
-    return refusals.conditioning(scaled, needed, float(noise))
+    return refusals.condition_of(scaled, needed, float(noise))
 
 
 def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
@@ -245,4 +245,4 @@ def check_trustworthy(off_rad: float, furthest: Callable[[], tuple[int, float, f
                 f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
             )
     if off_rad > UNTRUSTWORTHY_RAD:
-        raise refusals.untrustworthy(said)
+        raise refusals.untrustworthy_attitudes(said)

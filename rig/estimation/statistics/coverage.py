@@ -46,7 +46,7 @@ def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
     return found
 
 
-def rate_of_each(of_all: float, tests: int) -> float:
+def false_alarm_of_each(of_all: float, tests: int) -> float:
     """Return the rate of false alarms of each of so many `tests`, so that one of them at least is rarer than `of_all`.
 
     Bonferroni's inequality: it holds however the tests depend on each other.
@@ -59,7 +59,7 @@ def joint_factors(values: int, freedom: ArrayLike) -> Array:
 
     `freedom` are degrees of freedom of any shape; for one value it is `coverage_factors`.
     """
-    whole, tail = _whole(freedom), rate_of_each(1 - PROBABILITY, values) / 2
+    whole, tail = _whole(freedom), false_alarm_of_each(1 - PROBABILITY, values) / 2
     factors = np.full(np.shape(freedom), -NormalDist().inv_cdf(tail))
     if np.isfinite(whole).any():
         from scipy.special import stdtrit

@@ -1,11 +1,11 @@
-"""A bias repeat by repeat, from the same attitudes each time, and at which repeat it moved: TRIAX, Figs. 4 and 6.
+"""The bias of every repeat of the same attitudes, and the repeats at which it stepped: TRIAX, Figs. 4 and 6.
 
-Scale, axes and reference are held: what they are wrong by, and what the arm's attitudes are wrong by, is the same in
-every repeat of an attitude and leaves the differences between repeats alone.
+Scale, axes and reference are fixed: their errors, and those of the arm's attitudes, are the same in every repeat of an
+attitude and cancel in the differences between repeats.
 
-The bias is said to have moved before a repeat where the mean of the repeats from there on differs from that of those
-before, axis by axis, by more than noise makes it in all places and axes together twice in a hundred steady runs
-(Bonferroni's inequality); then either side is looked at again for itself (binary segmentation: Scott and Knott 1974).
+The bias stepped before a repeat if the mean from this repeat on differs from the mean before it by more than noise
+makes it, in all repeats and axes together, in 2 % of steady runs (Bonferroni's inequality). Both sides are then tested
+again (binary segmentation: Scott and Knott 1974).
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_count, check_finite, check_variances, require_shape
-from rig.estimation.statistics.coverage import rate_of_each
+from rig.estimation.statistics.coverage import false_alarm_of_each
 
 FALSE_ALARM = 0.02  # of a run whose bias is steady
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
-    """A move of the bias before repeat `repeat`, counted from 0, by `change` (3,), known to `std` (3,)."""
+class BiasStep:
+    """A step of the bias before repeat `repeat`, counted from 0, by `change` (3,) of uncertainty `std` (3,)."""
 
     repeat: int
     change: Array
@@ -30,51 +30,51 @@ class Move:
 
     @property
     def axis(self) -> int:
-        """Index of the axis along which the move stands out most."""
+        """The index of the axis with the most significant step."""
         return int(np.argmax(np.abs(self.change) / self.std))
 
 
 @dataclass(frozen=True, slots=True)
 class BiasByRepeat:
-    """`bias` (R, 3), what differs between repeats known to `std` (R, 3); when it `moved`.
+    """The bias of every repeat.
 
-    `freedom` (3,) of these: those of the excess where there is one, else infinite.
-
-    `excess` (3,) is the standard deviation of a mean in an attitude over what its variance says, where it is larger: an
-    arm that comes back differently, a bias that moves within a repeat. `std` has it in it.
+    - `bias` (R, 3), with the standard deviation `std` (R, 3) of its differences; its steps are `moves`.
+    - `excess` (3,): the scatter of means in an attitude over their standard deviation, 1 at least (Birge ratio). The
+      arm does not repeat its attitudes exactly, or the bias drifts within a repeat. `std` includes it.
+    - `freedom` (3,): degrees of freedom of the excess if there is one, else infinite.
     """
 
     bias: Array
     std: Array
     excess: Array
-    moves: tuple[Move, ...]
+    moves: tuple[BiasStep, ...]
     freedom: Array
 
     @property
     def largest_change(self) -> Array:
-        """(3,) largest change of the bias between any two repeats."""
+        """The largest change (3,) of the bias between any two repeats."""
         change: Array = np.ptp(self.bias, axis=0)
         return change
 
     @property
     def largest_change_std(self) -> Array:
-        """(3,) standard deviations of the largest change: what the two repeats it lies between are known to."""
+        """The standard deviation (3,) of the largest change, by those of the two repeats."""
         return largest_change_std(self.bias, self.std)
 
 
 def largest_change_std(bias: Array, std: Array) -> Array:
-    """(3,) standard deviations of the largest change of biases (R, 3): what the two it lies between are known to."""
+    """Return the standard deviation (3,) of the largest change of biases (R, 3), by those of the two repeats."""
     ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
-    found: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
-    return found
+    change_std: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
+    return change_std
 
 
 def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Array | None = None) -> BiasByRepeat:
-    """The bias from mean readings (R, N, 3) of N attitudes in R ≥ 2 repeats, the variances of these means, and what the
-    model without a bias makes of each.
+    """Return the bias of R ≥ 2 repeats of N attitudes.
 
-    `bias` (3,) is that of the first repeat where a fit has found it; the others' then stand relative to it.
-    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
+    `readings` (R, N, 3) are mean readings, `variances` those of the means, `modelled` the model's readings without a
+    bias. `bias` (3,) is that of the first repeat if a fit has estimated it; the others are then relative to it.
+    Raise Fault  `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]
     require_shape("readings", readings, (repeats, attitudes, 3))
@@ -83,56 +83,56 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
     check_count(repeats, 2, 3)
     check_finite(readings=readings, variances=variances, modelled=modelled)
     check_variances(variances)
-    off = readings - modelled
-    found = off.mean(axis=1)
-    excess = _excess(off, variances)
+    errors = readings - modelled
+    biases = errors.mean(axis=1)
+    excess = _excess(errors, variances)
     std = np.sqrt(variances.mean(axis=1) / attitudes) * excess
-    moves = tuple(sorted(_moves(found, std, 0, len(found), len(found) - 1), key=lambda move: move.repeat))
+    moves = tuple(sorted(_find_steps(biases, std, 0, len(biases), len(biases) - 1), key=lambda move: move.repeat))
     return BiasByRepeat(
-        found if bias is None else bias + found - found[0],
+        biases if bias is None else bias + biases - biases[0],
         std,
         excess,
         moves,
-        np.where(excess > 1.0, _left_over(off), np.inf),
+        np.where(excess > 1.0, _residual_dof(errors), np.inf),
     )
 
 
-def _left_over(off: Array) -> int:
-    """Degrees of freedom of what is left of (R, N, 3) when each attitude has an error and each repeat a bias."""
-    repeats, attitudes = off.shape[:2]
+def _residual_dof(errors: Array) -> int:
+    """Return the degrees of freedom of residuals (R, N, 3) after an error per attitude and a bias per repeat."""
+    repeats, attitudes = errors.shape[:2]
     return int((repeats - 1) * (attitudes - 1))
 
 
-def _excess(off: Array, variances: Array) -> Array:
-    """(3,) factors by what is left when each attitude has an error of its own and each repeat a bias; 1 at least."""
-    left = off - off.mean(axis=0) - off.mean(axis=1, keepdims=True) + off.mean(axis=(0, 1))
-    freedom = _left_over(off)
+def _excess(errors: Array, variances: Array) -> Array:
+    """Return the Birge ratio (3,), 1 at least, of residuals after an error per attitude and a bias per repeat."""
+    residuals = errors - errors.mean(axis=0) - errors.mean(axis=1, keepdims=True) + errors.mean(axis=(0, 1))
+    freedom = _residual_dof(errors)
     if freedom == 0:
         return np.ones(3)
-    scatter = np.sum(left**2, axis=(0, 1)) / freedom
+    scatter = np.sum(residuals**2, axis=(0, 1)) / freedom
     excess: Array = np.sqrt(np.maximum(scatter / variances.mean(axis=(0, 1)), 1.0))
     return excess
 
 
-def _moves(bias: Array, std: Array, start: int, end: int, places: int) -> Iterator[Move]:
-    """Moves of the bias from `start` to `end`, in a run that has so many `places` where it could have moved."""
+def _find_steps(bias: Array, std: Array, start: int, end: int, candidates: int) -> Iterator[BiasStep]:
+    """Yield the steps of the bias from `start` to `end`, in a run with `candidates` possible steps."""
     from scipy.special import ndtri
 
-    sure = -float(ndtri(rate_of_each(FALSE_ALARM, 2 * 3 * places)))
+    sure = -float(ndtri(false_alarm_of_each(FALSE_ALARM, 2 * 3 * candidates)))
     best, largest = None, sure
-    for place in range(start + 1, end):
-        before, after = _mean(bias[start:place], std[start:place]), _mean(bias[place:end], std[place:end])
-        move = Move(place, after[0] - before[0], np.hypot(before[1], after[1]))
+    for first in range(start + 1, end):
+        before, after = _mean(bias[start:first], std[start:first]), _mean(bias[first:end], std[first:end])
+        move = BiasStep(first, after[0] - before[0], np.hypot(before[1], after[1]))
         stands_out = float(np.max(np.abs(move.change) / move.std))
         if stands_out > largest:
             best, largest = move, stands_out
     if best is not None:
-        yield from _moves(bias, std, start, best.repeat, places)
+        yield from _find_steps(bias, std, start, best.repeat, candidates)
         yield best
-        yield from _moves(bias, std, best.repeat, end, places)
+        yield from _find_steps(bias, std, best.repeat, end, candidates)
 
 
 def _mean(bias: Array, std: Array) -> tuple[Array, Array]:
-    """Weighted, (3,), and its standard deviation (3,)."""
+    """Return the weighted mean (3,) and its standard deviation (3,)."""
     weights = std**-2
     return np.sum(weights * bias, axis=0) / weights.sum(axis=0), weights.sum(axis=0) ** -0.5

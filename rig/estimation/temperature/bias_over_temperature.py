@@ -1,8 +1,8 @@
-"""How a bias depends on temperature, from a run in which the sensor warmed and cooled by itself.
+"""The slope of a bias over temperature, from a run in which the sensor warmed and cooled by itself.
 
     b = b₀ + slope (T − T₀) + rate (t − t₀)
 
-A sensor that only warms up tells temperature and time apart as little as one that only ages: then nothing is said.
+A sensor that only warms up does not separate temperature from time: then there is no result.
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,16 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_count
 
 MIN_RANGE_C = 3.0
-MAX_CORRELATION = 0.9  # of temperature and time: beyond, the slope's σ is more than doubled by not knowing which it was
+MAX_CORRELATION = 0.9  # of temperature and time: beyond, their confusion more than doubles the slope's σ
 FEWEST = 4  # repeats, for three parameters
 
 
 @dataclass(frozen=True, slots=True)
 class BiasOverTemperature:
-    """`slope` (3,) per °C, its standard deviation (3,), and the range of temperatures it was seen in, and holds in.
+    """`slope` (3,) per °C, its standard deviation (3,), and the range of temperatures in which it holds.
 
-    `freedom` (3,) of the deviations: those of the residuals where these made them, else infinite.
-
-    `correlation` is that of temperature and time, which are found together.
+    `freedom` (3,): degrees of freedom of the deviations, finite if they come from residuals. `correlation` is that of
+    temperature and time, which are estimated together.
     """
 
     slope: Array
@@ -35,9 +34,9 @@ class BiasOverTemperature:
 
 
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
-    """The slope of the bias of R repeats (R, 3), known to `std` (R, 3), their mean temperatures (R,) and times (R,).
+    """Fit the slope of biases (R, 3) of uncertainty `std` (R, 3) at mean temperatures (R,) and times (R,).
 
-    Deviations are as large as the residuals say, where these are larger. Raises Fault `too_few_observations`,
+    Larger residuals increase the deviations (Birge ratio). Raise Fault  `too_few_observations`,
     `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.
     """
     check_count(len(bias), FEWEST, 3)
@@ -63,21 +62,21 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
             "Let the sensor cool down and warm up again during the run, for example switched off between "
             "two parts of it (`rig resume`)",
         )
-    columns = np.column_stack([np.ones(len(bias)), _scaled(temperature_c), _scaled(time_s)])
-    slope, known, freedom = np.empty(3), np.empty(3), np.full(3, np.inf)
-    left_over = len(bias) - columns.shape[1]
+    columns = np.column_stack([np.ones(len(bias)), _standardise(temperature_c), _standardise(time_s)])
+    slope, slope_std, freedom = np.empty(3), np.empty(3), np.full(3, np.inf)
+    residual_dof = len(bias) - columns.shape[1]
     for axis in range(3):
-        white = 1 / std[:, axis]
-        design = columns * white[:, None]
-        found, *_ = np.linalg.lstsq(design, bias[:, axis] * white, rcond=None)
-        left = bias[:, axis] * white - design @ found
-        excess = max(1.0, float(np.sqrt(np.sum(left**2) / left_over)))
-        freedom[axis] = left_over if excess > 1.0 else np.inf
-        slope[axis] = found[1] / float(np.std(temperature_c))
-        known[axis] = excess * float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) / np.std(temperature_c))
-    return BiasOverTemperature(slope, known, (low, high), correlation, freedom)
+        weights = 1 / std[:, axis]
+        design = columns * weights[:, None]
+        coefficients, *_ = np.linalg.lstsq(design, bias[:, axis] * weights, rcond=None)
+        residuals = bias[:, axis] * weights - design @ coefficients
+        excess = max(1.0, float(np.sqrt(np.sum(residuals**2) / residual_dof)))
+        freedom[axis] = residual_dof if excess > 1.0 else np.inf
+        slope[axis] = coefficients[1] / float(np.std(temperature_c))
+        slope_std[axis] = excess * float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) / np.std(temperature_c))
+    return BiasOverTemperature(slope, slope_std, (low, high), correlation, freedom)
 
 
-def _scaled(values: Array) -> Array:
+def _standardise(values: Array) -> Array:
     scaled: Array = (values - values.mean()) / values.std()
     return scaled

@@ -40,7 +40,7 @@ def temperature_entry(
 
 
 def _row(quantity: Quantity, polynomials: OverTemperature, temperature_c: float) -> AtTemperatureEntry:
-    held = polynomials.at(temperature_c)
+    held = polynomials.evaluate(temperature_c)
     return entry(
         AtTemperatureEntry,
         temperature_c=temperature_c,

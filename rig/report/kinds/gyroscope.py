@@ -13,7 +13,7 @@ from rig.data.entries.external import AttitudesEntry
 from rig.data.entries.result_types import ErrorEntry, Role
 from rig.data.quantity import RATE
 from rig.data.result_file import BoardEntry, EstimateEntry, GyroscopeEntry, ResultDocument, TimeBaseEntry, VectorEntry
-from rig.estimation.arrays import in_units_of
+from rig.estimation.arrays import divide_or_infinity
 from rig.estimation.gyroscope.six_observation import PARAMETERS
 from rig.report.c_code.c_functions import gyroscope_lines
 from rig.report.entries.by_hand import by_hand_lines
@@ -156,7 +156,7 @@ def _differs(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iter
     """Which of two estimators to believe, where they differ by more than U."""
     expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*each.scale, *each.bias_rad_s) for each in (sensor, other))
-    off = in_units_of(np.abs(np.subtract(others, values)), expanded)
+    off = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)
     worst = int(np.argmax(off))
     if off[worst] > 1 and sensor.estimator == "vector":
         yield (

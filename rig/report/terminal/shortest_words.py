@@ -14,7 +14,7 @@ from rig.analysis.design.shortest import SIZES, Budgets, Planned, Reached, Short
 from rig.config.models import ProcedureSection
 from rig.config.procedures.attitude_sets import SETS
 from rig.config.procedures.procedure_sections import AttitudesSection
-from rig.estimation.design.optimality import c_efficiency, g_efficiency, named_designs
+from rig.estimation.design.optimality import c_efficiency, g_efficiency, list_designs
 from rig.station.plain_text import plain
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def _floor(shortest: Shortest) -> str:
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
     """The design's efficiencies beside those of the six directions of SIX."""
-    return {name: dict(_of_design(each)) for name, each in (("plan", directions), ("six", named_designs()["six"]))}
+    return {name: dict(_of_design(each)) for name, each in (("plan", directions), ("six", list_designs()["six"]))}
 
 
 def _of_design(directions: "Array") -> Iterator[tuple[str, float]]:

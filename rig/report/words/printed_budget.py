@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.data.entries.budget import IN_U, BudgetEntry, ContributorEntry
 from rig.data.quantity import Unit
-from rig.estimation.arrays import SMALLEST_SIZE, in_units_of
+from rig.estimation.arrays import SMALLEST_SIZE, divide_or_infinity
 from rig.report.words.rounding import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # of both variances: lines below are summed up in one
@@ -66,7 +66,7 @@ def printed_budget(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> P
         small_ones = [line for line in lines if line not in kept]
         std = np.sqrt(np.sum(np.square([line.std for line in small_ones]), axis=0)).tolist()
         names = f"below 0.1 %: {', '.join(line.name for line in small_ones)}"
-        share = in_units_of(std, budget.std) ** 2
+        share = divide_or_infinity(std, budget.std) ** 2
         printed.append(Line(names, "", "", "", "", _parts(std, share.tolist(), places, sizes)))
     first, second = (_column(budget, place, size) for place, size in zip(places, sizes, strict=True))
     return PrintedBudget((first, second), tuple(printed))

@@ -8,7 +8,7 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import OverTemperature, over_temperature
+from rig.estimation.temperature.over_temperature import OverTemperature, fit_over_temperature
 from support.motions.warmed_sweeps import (
     FROM_C,
     REFERENCE_C,
@@ -34,7 +34,7 @@ def upright(seed: int, **planted: float) -> tuple[Drawn, np.random.Generator]:
 
 def errors(sensor: Drawn, found: OverTemperature) -> tuple[Array, Array]:
     """(5, 6) errors at five temperatures, over u and over U."""
-    held = [found.at(each) for each in FIVE_C]
+    held = [found.evaluate(each) for each in FIVE_C]
     off = np.array([each.values - sensor.at(warm) for each, warm in zip(held, FIVE_C, strict=True)])
     return off / [each.std for each in held], off / [each.expanded for each in held]
 
@@ -77,7 +77,7 @@ def test_what_is_left_of_the_bias_is_thirty_times_less_than_before() -> None:
         sensor, rng = upright(seed, gradient_k=0.0)
         found = calibrated(sensor, session(), rng)
         for warm in np.linspace(*found.range_c, 9):
-            held = found.at(float(warm))
+            held = found.evaluate(float(warm))
             before.append(sensor.at(warm)[3:] - sensor.at(REFERENCE_C)[3:])
             after.append(held.values[3:] - sensor.at(warm)[3:])
             u.append(held.std[3:])
@@ -91,9 +91,9 @@ def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
     sensor, rng = upright(1)
     of = session()
     means = readings(sensor, of, rng)
-    straight = over_temperature(repeated(means, of, sensor.noise), REFERENCE_C, 0.1)
+    straight = fit_over_temperature(repeated(means, of, sensor.noise), REFERENCE_C, 0.1)
     leaning = np.random.default_rng(2).normal(0, 1e-2, NONE.shape)[of.places]
-    leant = over_temperature(repeated(means + leaning, of, sensor.noise), REFERENCE_C, 0.1)
+    leant = fit_over_temperature(repeated(means + leaning, of, sensor.noise), REFERENCE_C, 0.1)
 
     assert np.allclose(leant.bias[1:], straight.bias[1:], rtol=1e-3, atol=1e-9)
     assert np.allclose(leant.scale[1] / leant.scale[0], straight.scale[1] / straight.scale[0], rtol=0.05, atol=1e-8)
@@ -103,13 +103,13 @@ def test_what_leans_in_every_repeat_tells_nothing_of_temperature() -> None:
 def test_u_grows_towards_both_ends_and_there_is_none_beyond() -> None:
     sensor, rng = upright(0, gradient_k=0.0)
     of = session()
-    found = over_temperature(repeated(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C, 0.0)
-    low, middle, high = (found.at(each).std for each in (FROM_C + 0.1, 40.0, found.range_c[1]))
+    found = fit_over_temperature(repeated(readings(sensor, of, rng), of, sensor.noise), REFERENCE_C, 0.0)
+    low, middle, high = (found.evaluate(each).std for each in (FROM_C + 0.1, 40.0, found.range_c[1]))
 
     assert (low > middle).all() and (high > middle).all()
     for outside in (FROM_C - 1, TO_C + 1):
         with pytest.raises(Fault) as refused:
-            found.at(outside)
+            found.evaluate(outside)
         assert refused.value.name == "temperature_outside"
 
 
@@ -119,7 +119,7 @@ def test_the_order_is_that_of_the_sensor() -> None:
     sensor = drawn(rng)
     straight = replace(sensor, scale=sensor.scale * [[1], [0], [0]], bias=sensor.bias * [[1], [1], [0]], walk=0.0)
     of = session()
-    found = over_temperature(repeated(readings(straight, of, rng), of, sensor.noise), REFERENCE_C, 0.1)
+    found = fit_over_temperature(repeated(readings(straight, of, rng), of, sensor.noise), REFERENCE_C, 0.1)
 
     assert found.orders[0] <= 1 and 1 <= found.orders[1] <= 2
     assert np.abs(found.bias[1] - straight.bias[1]).max() < 2e-5
@@ -134,7 +134,7 @@ def test_a_hysteresis_is_found_and_covered() -> None:
 
     assert (np.abs(loop[3:] - sensor.hysteresis) < 4 * std[3:] + 1e-4).all()
     for way in (-1, 1):  # whoever warms, whoever cools
-        held = found.at(40.0)
+        held = found.evaluate(40.0)
         assert (np.abs(held.values[3:] - sensor.at(40.0)[3:] - way * sensor.hysteresis) < 1.3 * held.expanded[3:]).all()
 
 
@@ -157,7 +157,7 @@ def test_the_lag_of_the_thermometer_is_found() -> None:
     ("changed", "name"),
     [
         ({"temperature_c": np.linspace(24, 27, 168)}, "temperature_range_too_small"),
-        ({"places": np.arange(168)}, "too_few_observations"),
+        ({"poses": np.arange(168)}, "too_few_observations"),
         ({"temperature_c": np.linspace(30, 60, 168)}, "temperature_outside"),
         ({"temperature_c": np.full(168, np.nan)}, "not_finite"),
     ],
@@ -166,6 +166,8 @@ def test_what_tells_no_polynomial_is_refused_by_name(changed: dict[str, Any], na
     sensor, rng = upright(0)
     of = session()
     with pytest.raises(Fault) as refused:
-        over_temperature(replace(repeated(readings(sensor, of, rng), of, sensor.noise), **changed), REFERENCE_C, 0.1)
+        fit_over_temperature(
+            replace(repeated(readings(sensor, of, rng), of, sensor.noise), **changed), REFERENCE_C, 0.1
+        )
 
     assert refused.value.name == name

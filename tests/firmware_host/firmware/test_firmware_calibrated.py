@@ -363,7 +363,7 @@ def test_what_the_board_leaves_of_a_bias_over_temperature_is_thirty_times_less_t
         left = rates(frames)[-9:]
         before.append(reads - sensor.at(REFERENCE_C)[3:])
         after.append(left / found.scale[0])
-        u.append([found.at(float(each)).std[3:] for each in warm])
+        u.append([found.evaluate(float(each)).std[3:] for each in warm])
     rms_before, rms_after, rms_u = (float(np.sqrt(np.mean(np.square(each)))) for each in (before, after, u))
     print(f"before {rms_before:.2e}, after {rms_after:.2e} rad/s: 1/{rms_before / rms_after:.0f}, u {rms_u:.2e}")
 

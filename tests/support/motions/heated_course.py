@@ -12,7 +12,7 @@ from firmware_host.emulator.parts.drift import Drift
 from rig.config.world.thermal import SimulatedThermalSection
 from rig.data.recording.thermal_events import SetMeasured
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import Repeated
+from rig.estimation.temperature.over_temperature import RepeatedMeans
 from rig.plans.motions.temperature_course import Course, Ramp
 from rig.world.board.heat import HeatedBody
 
@@ -73,7 +73,7 @@ def warmed() -> Warmed:
     return Warmed(time_s, thermometer_c, element_c, branch, tuple(starts))
 
 
-def seen(of: Warmed, seed: int) -> Repeated:
+def seen(of: Warmed, seed: int) -> RepeatedMeans:
     """What the estimator is given of one sensor, drawn in its noise, its drift and how the axes of the arm lean."""
     rng = np.random.default_rng([31, seed])
     windows = np.array([
@@ -95,4 +95,4 @@ def seen(of: Warmed, seed: int) -> Repeated:
     variances = np.repeat(NOISE_RAD_S**2 / (RATE_HZ * np.diff(windows, axis=1)), 3, axis=1)
     means = felt * mean(inverse) - mean(bias) + rng.normal(0, 3e-4, (12, 3))[places]
     means += rng.normal(0, 1, means.shape) * np.sqrt(variances)
-    return Repeated(means, variances, felt, places, windows, mean(of.thermometer_c), INSTABILITY_RAD_S)
+    return RepeatedMeans(means, variances, felt, places, windows, mean(of.thermometer_c), INSTABILITY_RAD_S)

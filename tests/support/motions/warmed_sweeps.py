@@ -10,7 +10,12 @@ from rig.analysis.external.elsewhere import budget_of, solve_swept
 from rig.analysis.temperature.over_temperature import files_to_reference
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import Line, OverTemperature, Repeated, settled
+from rig.estimation.temperature.over_temperature import (
+    OverTemperature,
+    RepeatedMeans,
+    TemperatureLine,
+    combine_with_reference,
+)
 from rig.observation.average import Average
 from rig.observation.external.csv_import import ExternalData
 from rig.observation.observe import Observation, nearest_axis
@@ -114,9 +119,9 @@ def readings(sensor: Drawn, of: Session, rng: np.random.Generator) -> Array:
     return found
 
 
-def repeated(means: Array, of: Session, noise: float) -> Repeated:
+def repeated(means: Array, of: Session, noise: float) -> RepeatedMeans:
     """What the estimator takes."""
-    return Repeated(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
+    return RepeatedMeans(means, np.full(means.shape, noise**2), of.felt, of.places, of.windows_s, of.temperature_c)
 
 
 def write_files(
@@ -162,7 +167,7 @@ def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemp
     solution = solve_swept(moved, "vector")
     sign = np.diag(RATE.parameter_signs)
     lines = tuple(
-        Line(
+        TemperatureLine(
             each.name,
             each.kind,
             each.distribution,
@@ -172,4 +177,4 @@ def calibrated(sensor: Drawn, of: Session, rng: np.random.Generator) -> OverTemp
         )
         for each in budget_of(solution, moved).contributors
     )
-    return settled(found, np.r_[solution.scale, -solution.bias_rad_s], lines)
+    return combine_with_reference(found, np.r_[solution.scale, -solution.bias_rad_s], lines)
