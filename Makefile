@@ -17,7 +17,7 @@ BIN := $(VENV)/bin
 LONG := benchmarks/wire/damaged_frames.py $(addprefix benchmarks/laboratory/, faults.py long_life.py hidden_worlds.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo all-extras system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
+.PHONY: demo all-extras system check fast test whole kernels proof lint firmware bench lock sbom figures docs drawings clean
 .DELETE_ON_ERROR:
 
 # Every test starts processes, thousands in all: what Python compiled for one it keeps for the next, also where a container
@@ -30,14 +30,15 @@ demo: $(VENV)/demo.installed
 
 all-extras: $(VENV)/all.installed
 
-# Tests run four at a time on two processors, as half of their time is waiting for a laboratory: every simulated one has
-# a loopback address of its own. As many threads for linear algebra would only be in each other's way.
-PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 4 --dist $(DIST)
+# Fast tests compute, so two run at a time on two processors; of all tests three, as some wait for a laboratory: every
+# simulated one has a loopback address of its own. As many threads for linear algebra would only be in each other's way.
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n $(AT_A_TIME) --dist $(DIST)
+AT_A_TIME := 2
 DIST := worksteal
 
 # Linear algebra rounds by its kernel, which is chosen by the processor: what is reckoned is tested by another's too, that
-# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011. Nothing waits there.
-NUMERIC := -n 2 --dist worksteal -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
+# of every processor without AVX-512, and in `make proof` by that of one without AVX, of before 2011.
+NUMERIC := -n 0 -m "kernels or not (slow or proof)" tests/estimation $(wildcard tests/*/test_recordings*.py) tests/notebook \
   tests/history/test_store.py
 
 system:
@@ -47,10 +48,11 @@ system:
 check: system $(VENV)/dev.installed
 	$(MAKE) --jobs=2 lint fast
 
+# All of it once, and what is linted and solved by another kernel meanwhile.
 test: system $(VENV)/dev.installed
-	$(MAKE) --jobs=2 lint whole
+	$(MAKE) --jobs=2 kernels whole
 
-# What a test file is rewritten to for its assertions is kept. The first time it is made here, not by each of the four.
+# What a test file is rewritten to for its assertions is kept. The first time it is made here, not by each of them.
 build/collected.txt: | $(VENV)/dev.installed
 	mkdir -p build && $(BIN)/pytest --collect-only --quiet > $@
 
@@ -58,13 +60,17 @@ fast: build/collected.txt $(VENV)/dev.installed
 	$(PYTEST) -m "not slow"
 
 # A file's tests stay together: a whole run that several of them look at is made once. It takes a tenth less.
+whole: AT_A_TIME := 3
 whole: DIST := loadfile --no-loadscope-reorder
 whole: build/collected.txt $(VENV)/dev.installed
 	rm -rf build/coverage
 	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
-	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
+kernels: lint build/collected.txt
+	OPENBLAS_CORETYPE=Haswell $(PYTEST) $(NUMERIC)
+
+proof: AT_A_TIME := 4
 proof: system $(VENV)/dev.installed
 	$(PYTEST) -m "proof or thorough or one_in" --proof -rP
 	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(NUMERIC)

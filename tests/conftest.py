@@ -1,6 +1,7 @@
 """What every test has: simulated laboratories, and a Hypothesis without a stopwatch."""
 
 import atexit
+import gc
 import os
 import signal
 import tempfile
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 __all__ = ["world"]
+
+# What is made until the tests are collected stays: to look it through for garbage takes a second of each worker.
+gc.disable()
 
 settings.register_profile("rig", deadline=None)  # a shared machine stalls now and then, which is no failure
 settings.load_profile("rig")
@@ -66,6 +70,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = chosen
 
 
+def pytest_collection_finish() -> None:
+    """Garbage is looked for again, among what tests make."""
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.fixture
 def thorough(request: pytest.FixtureRequest) -> bool:
     """Whether a test marked `proof` goes through all its seeds (`make proof`) or through a few (`make test`)."""
@@ -85,9 +95,9 @@ def read_by_system() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def driver() -> Iterator["Chrome"]:
-    """A real browser."""
+    """A real browser: one for all pages that this process looks at, as it takes long to start."""
     from support.page.browser import browser  # with Selenium, which few tests need
 
     with browser(dark=True) as found:
@@ -97,10 +107,12 @@ def driver() -> Iterator["Chrome"]:
 @pytest.fixture
 def nothing_severe_and_nothing_from_elsewhere(driver: "Chrome") -> Iterator[None]:
     """What is asked of every page, whatever it shows."""
-    from support.page.browser import TABLET, asked_hosts, severe
+    from support.page.browser import TABLET, asked_hosts, set_theme, severe
 
     driver.get("about:blank")  # a page of before may still ask for a server that is gone
     severe(driver)
+    asked_hosts(driver)
+    set_theme(driver, dark=True)
     driver.set_window_size(*TABLET)
     yield
     assert severe(driver) == [] and asked_hosts(driver) <= {"127.0.0.1"}

@@ -60,6 +60,7 @@ def test_a_module_that_stands_on_no_layer_is_refused(copy: Path) -> None:
     assert "rig.memory" in found.stdout and "rig.world_view" in found.stdout
 
 
+@pytest.mark.slow
 def test_nothing_but_the_world_imports_the_world(copy: Path) -> None:
     rooms = ["rig/data/memory.py", "rig/analysis/peeking.py", "rig/commands/look.py"]
     for room in rooms:
@@ -70,6 +71,7 @@ def test_nothing_but_the_world_imports_the_world(copy: Path) -> None:
         assert f"{module(room)} -> rig.world.laboratory" in found.stdout
 
 
+@pytest.mark.slow
 def test_nothing_but_the_world_imports_the_emulator(copy: Path) -> None:
     rooms = ["rig/notebook/peek.py", "rig/board/peek.py", "firmware_host/peek.py", "procedures/peek.py"]
     for room in rooms:

@@ -56,6 +56,7 @@ def test_the_door_has_all_that_the_stock_scripts_need_and_says_so() -> None:
     assert all(hasattr(rig.procedure, name) for name in rig.procedure.__all__)
 
 
+@pytest.mark.slow
 def test_an_analysis_of_one_s_own_adds_a_check_to_the_verdict() -> None:
     def judged(limit: float) -> Outcome:
         outcome = calibrate([read_run(RECORDINGS / "six_observation" / "run.h5")])

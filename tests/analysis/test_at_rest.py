@@ -26,6 +26,7 @@ def rates(run: RunData) -> AtRest:
     return at_rest([run])["gyro"].quantities.results[RATE]
 
 
+@pytest.mark.slow
 def test_random_walk_is_found_in_the_rests_between_sweeps(run: RunData) -> None:
     found = rates(run)
     assert found.stretches == 6 and found.total_s == pytest.approx(6 * 19.6, abs=0.1)
@@ -46,6 +47,7 @@ def test_a_missing_reading_parts_a_rest_in_two(run: RunData) -> None:
     assert whole.stretches < found.stretches <= whole.stretches + 3
 
 
+@pytest.mark.slow
 def test_a_rest_in_which_the_arm_moved_is_left_out(run: RunData) -> None:
     arm = run.states.copy()
     arm["q_rad"][(arm["time_s"] > run.states["time_s"][-1] - 15.0), 5] += 0.01

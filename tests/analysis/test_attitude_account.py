@@ -31,6 +31,7 @@ def test_repeats_average_the_noise_and_not_the_arms_error() -> None:
     assert real[0].non_orthogonality_std_rad == pytest.approx(real[1].non_orthogonality_std_rad, rel=0.01)
 
 
+@pytest.mark.slow
 def test_each_part_has_its_own_noise_and_a_longer_dwell_less_of_it() -> None:
     found = account("uncertainty.axis_deg=0").sensors
     longer = account("uncertainty.axis_deg=0", "procedure.dwell_s=12").sensors
@@ -40,6 +41,7 @@ def test_each_part_has_its_own_noise_and_a_longer_dwell_less_of_it() -> None:
         assert longer[name].bias_std_m_s2 == pytest.approx(found[name].bias_std_m_s2 / 2)
 
 
+@pytest.mark.slow
 def test_under_a_ceiling_the_attitudes_tell_as_much() -> None:
     floor, ceiling = account(), account("site.base_up=[0,0,-1]")
     assert ceiling.first.condition == pytest.approx(floor.first.condition)

@@ -68,6 +68,7 @@ def named(checks: Sequence[Check]) -> dict[str, Check]:
     return {check.name.removeprefix(begins): check for check in checks if check.name.startswith(begins)}
 
 
+@pytest.mark.slow
 def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     seen = observed(FAST, 1 - 40 * PPM)
     check = check_clock(seen, KNOWN)
@@ -76,6 +77,7 @@ def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
     assert 0.5 * PPM < check.std < 1 * PPM
 
 
+@pytest.mark.slow
 def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     seen = observed(with_crystal(40, crystal_ppm=5), 0.2)
     check = check_clock(seen, KNOWN)
@@ -84,6 +86,7 @@ def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
     assert check.std == pytest.approx(10.7 * PPM, rel=0.02)  # 20 ppm / √3, and that it is within 50 ppm anyway
 
 
+@pytest.mark.slow
 def test_without_another_clock_nothing_is_corrected() -> None:
     check = check_clock(observed(Setup(speed_deg_s=120), 0.2), KNOWN)
     assert check.comparisons == () and check.error == 0.0
@@ -128,6 +131,7 @@ def test_a_computers_clock_that_contradicts_both_fails_with_both(computer: float
     assert failed == {"controller_and_computer", "computer_and_crystal"}
 
 
+@pytest.mark.slow
 def test_two_others_that_agree_name_the_controller() -> None:
     checks = of_clocks(with_crystal(300), 1 - 300 * PPM)
     assert checks["computer_and_crystal"].passed
@@ -141,6 +145,7 @@ def test_a_laboratory_that_is_simulated_at_a_pace_of_its_own_is_held_against_no_
     assert set(checks) == {"controller_and_crystal"} and checks["controller_and_crystal"].passed
 
 
+@pytest.mark.slow
 def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it_is() -> None:
     """Without a board, as of an instrument with a port of its own, nothing else tells."""
     checks = of_clocks(FAST, 1 / 1.02, REAL)

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import h5py
+import pytest
 
 from rig.analysis.analyses import calibrate
 from rig.data.recording.run_file import RunData, read_run
@@ -12,6 +13,7 @@ from support.paths import RECORDINGS
 RECORDING = RECORDINGS / "six_observation" / "run.h5"
 
 
+@pytest.mark.slow
 def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> None:
     changed = Path(shutil.copy(RECORDING, tmp_path))
     with h5py.File(changed, "r+") as file:
@@ -19,6 +21,7 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
     assert calibrate([read_run(changed)]).checks == calibrate([read_run(RECORDING)]).checks
 
 
+@pytest.mark.slow
 def test_another_limit_gives_another_verdict() -> None:
     run: RunData = read_run(RECORDING)
     assert calibrate([run]).passed

@@ -38,6 +38,7 @@ def warming(run: RunData) -> RunData:
     return replace(run, samples={"gyro": samples})
 
 
+@pytest.mark.slow
 def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_conditions_the_temperatures_of_their_own_readings() -> None:
     run = warming(synthetic_run(Setup()))
     recordings = observe_recordings([run])

@@ -47,6 +47,7 @@ def ask(answers: "SimpleQueue[str]") -> Iterator[Asking]:
         yield asked
 
 
+@pytest.mark.slow
 def test_an_answer_needs_the_token_the_page_and_the_question(ask: Asking, answers: "SimpleQueue[str]") -> None:
     right = {"number": 1, "text": " G-001 "}
     assert ask("POST", "/say", right, Authorization="") == 403

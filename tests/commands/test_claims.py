@@ -45,6 +45,7 @@ def arm_held_elsewhere(host: str) -> Iterator[subprocess.Popen[str]]:
         yield process
 
 
+@pytest.mark.slow
 def test_a_claim_is_refused_to_others_and_ends_with_its_process() -> None:
     host = fresh_host()
     with arm_held_elsewhere(host) as other:
@@ -71,6 +72,7 @@ def test_an_arm_and_a_port_are_known_by_every_name_they_have(tmp_path: Path) -> 
             claimed_sensor("kvh", str(device)).__enter__()
 
 
+@pytest.mark.slow
 def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
     host = fresh_host()
     here, text = load(DEMO, [f"arm.host={host}", f"board.port=socket://{host}:7321"]).config, DEMO.read_text("utf-8")
@@ -85,6 +87,7 @@ def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
         assert again == [], "what has ended takes no address"
 
 
+@pytest.mark.slow
 def test_hardware_is_where_its_configuration_says() -> None:
     host = fresh_host()
     config = load(DEMO, [f"arm.host={host}"]).config

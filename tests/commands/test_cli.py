@@ -37,6 +37,7 @@ def test_a_reader_that_is_not_there_is_no_error(command: str) -> None:
     assert done.returncode == 0 and done.stderr == "", done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["", "--help", "solve --help"])
 def test_help_without_a_reader_or_a_known_degree_sign_is_no_traceback(command: str) -> None:
     ascii_only = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
@@ -47,6 +48,7 @@ def test_help_without_a_reader_or_a_known_degree_sign_is_no_traceback(command: s
     assert "Traceback" not in shell(f"{rig} > /dev/full").stderr
 
 
+@pytest.mark.slow
 def test_the_help_of_every_command_is_shown_on_a_terminal_of_plain_ascii() -> None:
     code = (
         "from rig.cli import _COMMANDS, main\n"
@@ -155,6 +157,7 @@ print(*sys.modules, file=sys.stderr)
 """
 
 
+@pytest.mark.slow
 def test_help_comes_at_once_whatever_the_command() -> None:
     listed = re.findall(r"^ {4}(\w+)", shell(f"{sys.executable} -m rig --help").stdout, re.MULTILINE)
     asked = subprocess.run([sys.executable, "-c", ASKED, *listed], capture_output=True, text=True, check=True)

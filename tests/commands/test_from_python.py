@@ -38,6 +38,7 @@ def test_an_error_in_the_file_or_in_a_change_is_refused_by_name() -> None:
         rig.plan(DEMO, {"procedure.speed_deg_s": object()})
 
 
+@pytest.mark.slow
 def test_a_small_number_is_a_number() -> None:
     rests = [step for step in rig.plan(DEMO, {"procedure.rest_s": 1e-5}).steps if isinstance(step, Rest)]
     assert any(step.duration_s == 1e-5 for step in rests)

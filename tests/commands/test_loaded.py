@@ -80,6 +80,7 @@ def test_the_steps_of_a_plan_are_told_before_what_takes_longer_to_find() -> None
     assert first == [] and set(last) <= {"scipy"}  # for how small a disturbance its checks can notice
 
 
+@pytest.mark.slow
 def test_the_process_that_the_arms_client_lives_in_waits_for_no_library_of_configurations() -> None:
     libraries = ("pydantic", "yaml", "scipy")
     command = f"import rig.turners.ur.child.process, sys; print([n for n in {libraries} if n in sys.modules])"

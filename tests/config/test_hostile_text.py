@@ -70,11 +70,13 @@ def test_an_alias_to_itself_is_refused() -> None:
     assert "*a stands inside what it stands for" in refusal(DEMO_TEXT, "arm=&a [*a]")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["[" * 3000, "a: " + "[" * 3000 + "]" * 3000, "{a: " * 3000, "- " * 3000, "? " * 3000])
 def test_deep_nesting_is_refused(text: str) -> None:
     assert f"more than {DEPTH_MAX} sections or lists within one another" in refusal(text)
 
 
+@pytest.mark.slow
 def test_deep_nesting_is_refused_in_an_override() -> None:
     assert "more than 16 sections" in refusal(DEMO_TEXT, f"arm.host={'[' * 3000}")
     assert "more than 16 sections" in refusal(DEMO_TEXT, f"{'a.' * 3000}b=1")
@@ -224,6 +226,7 @@ def test_a_world_answers_on_this_machine_alone() -> None:
         assert "board.port" in refusal(DEMO_TEXT, f"board.port=socket://{host}:7321")
 
 
+@pytest.mark.slow
 def test_thousands_of_errors_are_counted_and_the_first_are_told() -> None:
     message = refusal("\n".join(f"k{n}: 1" for n in range(2000)))
     assert "2003 errors" in message and message.endswith("more")

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
-import pytest
 from pydantic import BaseModel
 
 from rig.config.models import ArmSection, RigConfig
@@ -29,9 +28,6 @@ def keys() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
                     yield section["title"], key, value
 
 
-KEYS = list(keys())
-
-
 @cache
 def made() -> str:
     return reference()
@@ -42,11 +38,12 @@ def test_the_committed_page_is_what_the_models_generate() -> None:
     assert page == reference(), "again: python -m rig.config.reference_page > docs/configuration.md"
 
 
-@pytest.mark.parametrize(("section", "key", "schema"), KEYS, ids=[f"{section}.{key}" for section, key, _ in KEYS])
-def test_every_key_says_what_it_means_and_its_unit(section: str, key: str, schema: Mapping[str, Any]) -> None:
-    assert f"| `{key}` | {schema['description'].replace('|', chr(92) + '|')} | " in made()
-    assert not re.search("'type': '(number|integer)'", str(schema)) or unit_of(key, schema), "a number has a unit"
-    assert "pattern" not in schema or "allowed" in schema, "nobody should have to read a pattern"
+def test_every_key_says_what_it_means_and_its_unit() -> None:
+    for section, key, schema in keys():
+        name = f"{section}.{key}"
+        assert f"| `{key}` | {schema['description'].replace('|', chr(92) + '|')} | " in made(), name
+        assert not re.search("'type': '(number|integer)'", str(schema)) or unit_of(key, schema), f"{name} has no unit"
+        assert "pattern" not in schema or "allowed" in schema, f"{name}: nobody should have to read a pattern"
 
 
 def test_every_section_of_the_world_stands_in_its_own_part() -> None:

@@ -127,6 +127,7 @@ def test_a_channel_that_cannot_be_is_refused(change: dict[str, object], complain
         read_run(path)
 
 
+@pytest.mark.slow
 def test_numbers_cut_toward_zero_are_twice_as_coarse_about_zero_alone() -> None:
     """And a mean of them is as uncertain as it errs, whatever an autopilot's offset has been added since."""
     milli, offset, rng = 1e-3, 0.03, np.random.default_rng(29)

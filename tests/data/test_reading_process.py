@@ -48,6 +48,7 @@ def test_a_file_that_takes_too_much_is_given_up(tmp_path: Path, takes: str, limi
         read_apart(f"support.external.greedy:{takes}", tmp_path, {}, limits)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("read_by_system")
 def test_what_breaks_down_or_prints_harms_nobody(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(UnreadableFile, match="reading it ended the process"):

@@ -165,6 +165,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
         assert file.attrs["schema"] == "rig.run/1"
 
 
+@pytest.mark.slow
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:
     with recorder(tmp_path / "run.h5") as recording:
         recording.add_samples("gyro", some_samples(0, 10))

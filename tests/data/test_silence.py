@@ -37,6 +37,7 @@ def ticks_of(silence: Silence, number: int) -> int:
     return silence.ticks
 
 
+@pytest.mark.slow
 def test_a_frozen_process_is_silent_in_every_tick() -> None:
     with process("import time; time.sleep(3600)") as frozen:
         frozen.send_signal(signal.SIGSTOP)
@@ -60,6 +61,7 @@ def test_what_a_process_has_said_and_nobody_has_come_to_is_not_its_silence_for_e
     assert silence.lasts_over(0.9 * 5 / CROWDED), "nobody may be watching any more"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells how many want a processor")
 def test_a_crowd_is_noticed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The mean of the last minute would tell of it in half a minute."""
@@ -71,6 +73,7 @@ def test_a_crowd_is_noticed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         wait_for(lambda: crowding() > 2.0, "the crowd")
 
 
+@pytest.mark.slow
 def test_where_nothing_is_known_of_a_process_every_tick_counts() -> None:
     with process("pass") as ended:
         ended.wait()

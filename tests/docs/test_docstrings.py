@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 REPOSITORY = Path(__file__).parents[2]
 SHAPE = re.compile(r"\([^)]*\)[,:]? ?")  # "(3,) biases" begins with the biases
 POINTS_ELSEWHERE = (
@@ -17,6 +19,7 @@ POINTS_ELSEWHERE = (
 WITHOUT_SUBJECT = re.compile(rf"({'|'.join(map(re.escape, POINTS_ELSEWHERE))})(\W|$)|$", re.IGNORECASE)
 
 
+@pytest.mark.slow
 def test_every_docstring_begins_with_what_it_is_about() -> None:
     modules = [*(REPOSITORY / "rig").rglob("*.py"), *(REPOSITORY / "firmware_host").rglob("*.py")]
     assert [found for module in sorted(modules) for found in _without_subject(module)] == []

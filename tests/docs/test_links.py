@@ -1,9 +1,9 @@
 """Every page's links lead somewhere, the paths it names exist, the commands it shows are commands."""
 
-import functools
 import re
 import shlex
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -43,6 +43,7 @@ def prose(page: Path) -> str:
     return INLINE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
 
 
+@cache
 def anchors(page: Path) -> set[str]:
     """The names under which a page's headings can be linked, as GitHub makes them."""
     text = FENCE.sub("", page.read_text(encoding="utf-8"))
@@ -70,63 +71,74 @@ def commands(page: Path) -> Iterator[tuple[str, list[str], bool]]:
         yield written, [NUMBERS.get(word, word) for word in words], inline
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_every_link_and_anchor_leads_somewhere(page: Path) -> None:
-    for link in LINK.findall(prose(page)):
-        if link.startswith(("https://", "http://")):
-            continue
-        path, _, anchor = link.partition("#")
-        target = (page.parent / path).resolve() if path else page
-        assert target.exists(), f"{link} leads nowhere"
-        assert not anchor or anchor in anchors(target), f"{link}: no such heading; there are {sorted(anchors(target))}"
+def test_every_link_and_anchor_leads_somewhere() -> None:
+    lost = []
+    for page in PAGES:
+        for link in LINK.findall(prose(page)):
+            if link.startswith(("https://", "http://")):
+                continue
+            path, _, anchor = link.partition("#")
+            target = (page.parent / path).resolve() if path else page
+            if not target.exists():
+                lost.append(f"{page_name(page)}: {link} leads nowhere")
+            elif anchor and anchor not in anchors(target):
+                lost.append(f"{page_name(page)}: {link}: no such heading; there are {sorted(anchors(target))}")
+    assert not lost
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_every_path_a_page_names_exists(page: Path) -> None:
-    for written, _ in code(page):
-        for path in NAMED_PATH.findall(written):
-            pattern = re.sub(r"<\w+>", "*", path.rstrip("/"))
-            assert any(ROOT.glob(pattern)), f"{path} in {written!r} is not there"
+def test_every_path_a_page_names_exists() -> None:
+    named = {
+        (re.sub(r"<\w+>", "*", path.rstrip("/")), f"{page_name(page)}: {path} in {written!r} is not there")
+        for page in PAGES
+        for written, _ in code(page)
+        for path in NAMED_PATH.findall(written)
+    }
+    assert not [said for pattern, said in sorted(named) if not any(ROOT.glob(pattern))]
 
 
-@functools.cache
 def words_of_the_source() -> set[str]:
     files = [file for pattern in SOURCES for file in ROOT.glob(pattern)]
     return {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_every_error_a_page_names_is_in_the_catalogue(page: Path) -> None:
+def test_every_error_a_page_names_is_in_the_catalogue() -> None:
     """An error stands in parentheses, alone or among others: "refuses an arm that was moved (`arm_moved`)"."""
-    text = " ".join(FENCE.sub("", page.read_text(encoding="utf-8")).split())
-    named = {name for alone in NAMES_ALONE.findall(text) for name in re.findall(r"\w+", alone)}
-    assert named - NO_ERRORS <= {entry.name for entry in catalogue()}
+    known = {entry.name for entry in catalogue()} | NO_ERRORS
+    for page in PAGES:
+        text = " ".join(FENCE.sub("", page.read_text(encoding="utf-8")).split())
+        named = {name for alone in NAMES_ALONE.findall(text) for name in re.findall(r"\w+", alone)}
+        assert named <= known, page_name(page)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_every_name_on_a_page_stands_in_the_source(page: Path) -> None:
+def test_every_name_on_a_page_stands_in_the_source() -> None:
     """Errors wherever they stand, checks, columns, keys: what was renamed there must not live on here."""
-    errors = {entry.name for entry in catalogue()}
-    named = {written for written, inline in code(page) if inline and SNAKE_CASE.fullmatch(written)}
-    assert named <= words_of_the_source() | errors | OF_OTHERS
+    known = words_of_the_source() | {entry.name for entry in catalogue()} | OF_OTHERS
+    for page in PAGES:
+        named = {written for written, inline in code(page) if inline and SNAKE_CASE.fullmatch(written)}
+        assert named <= known, page_name(page)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_no_line_but_a_tables_is_too_wide(page: Path) -> None:
-    lines = enumerate(FENCE.sub("", page.read_text(encoding="utf-8")).splitlines(), start=1)
-    assert not [number for number, line in lines if len(line) > WIDTH and not line.startswith("|")]
+def test_no_line_but_a_tables_is_too_wide() -> None:
+    for page in PAGES:
+        lines = enumerate(FENCE.sub("", page.read_text(encoding="utf-8")).splitlines(), start=1)
+        wide = [number for number, line in lines if len(line) > WIDTH and not line.startswith("|")]
+        assert not wide, page_name(page)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_name)
-def test_every_command_a_page_shows_is_one(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_command_a_page_shows_is_one(capsys: pytest.CaptureFixture[str]) -> None:
     """Nothing is run: each command line gets an argument that no command has, which must be all it is refused for."""
-    for written, arguments, inline in commands(page):
+    shown = {
+        (tuple(arguments), inline): f"{page_name(page)}: {written!r}"
+        for page in PAGES
+        for written, arguments, inline in commands(page)
+    }
+    for (arguments, inline), where in shown.items():
         with pytest.raises(SystemExit):
             main([*arguments, LEFT_OUT])
         complaint = capsys.readouterr().err.splitlines()[-1]
         only_named = inline and all(re.fullmatch("[a-z]+", word) for word in arguments)
         missing = only_named and "the following arguments are required" in complaint
-        assert missing or complaint.endswith(f"unrecognized arguments: {LEFT_OUT}"), f"{written!r}: {complaint}"
+        assert missing or complaint.endswith(f"unrecognized arguments: {LEFT_OUT}"), f"{where}: {complaint}"
 
 
 def test_the_readme_shows_every_command(capsys: pytest.CaptureFixture[str]) -> None:

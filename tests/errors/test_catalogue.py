@@ -31,6 +31,7 @@ def test_an_error_s_name_is_written_out_where_it_is_made() -> None:
     assert not hidden, f"write the names out, or nobody finds them: {', '.join(hidden)}"
 
 
+@pytest.mark.slow
 def test_every_error_that_is_raised_is_in_the_table() -> None:
     known = {entry.name for entry in catalogue()}
     lines = [

@@ -58,6 +58,7 @@ def test_faces_are_best_on_an_exact_table_and_lose_the_angles_on_a_real_arm(
     assert 1e6 * found.bias_std_m_s2 / G == pytest.approx(bias_ug, abs=0.06)
 
 
+@pytest.mark.slow
 def test_condition_and_efficiency_are_those_of_the_best_designs() -> None:
     faces, eighteen = flange_to_base(FACES), flange_to_base(EIGHTEEN)
     assert assess_identifiability(faces, UP).condition == pytest.approx(np.sqrt(3))
@@ -74,6 +75,7 @@ def test_second_order_terms_triple_the_uncertainty_of_the_bias() -> None:
     assert reached(EIGHTEEN, 0.0, 2).second_order_std_s2_m == pytest.approx(2.9e-6, rel=0.02)
 
 
+@pytest.mark.slow
 def test_no_other_eighteen_of_the_grid_are_noticeably_better() -> None:
     """D-optimal for 1 mrad: the determinant's 14th root, what a search finds over that of the eighteen."""
     grid = tuple((float(first), -90.0, float(third)) for first, third in product(range(-180, 180, 45), repeat=2))

@@ -132,6 +132,7 @@ def test_no_design_is_better_than_the_number_of_parameters(model: Model) -> None
         assert np.mean(prediction_variance(directions, directions, model)) == pytest.approx(PARAMETER_COUNT[model])
 
 
+@pytest.mark.slow
 def test_other_designs_compare_as_they_should() -> None:
     worst = {name: maximum_prediction_variance(design) for name, design in list_designs().items()}
     assert min(worst, key=lambda name: worst[name]) == "six"

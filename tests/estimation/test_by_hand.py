@@ -153,6 +153,7 @@ SMALLER: dict[str, tuple[Callable[[int], Made], set[str]]] = {
 }
 
 
+@pytest.mark.slow
 def test_twelve_flips_tell_scale_axes_and_bias() -> None:
     recorded = handle(TWELVE, 1)
     found = solved(recorded)
@@ -270,6 +271,7 @@ def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int)
     assert f"ended at {session.rests[after + 1].start_s:.1f} s" in refusal.value.problem.what
 
 
+@pytest.mark.slow
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:
     assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_not_told"
 

@@ -150,6 +150,7 @@ def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, s
     assert not status.streaming and status.rx_errors == 0
 
 
+@pytest.mark.slow
 def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_zero(
     wire: tuple[BoardOnAWire, str],
 ) -> None:
@@ -254,6 +255,7 @@ def test_a_stored_calibration_is_there_after_a_reset_until_it_is_erased(wire: tu
         board.erase_calibration(0)
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibrated_stream(
     wire: tuple[BoardOnAWire, str],
@@ -290,6 +292,7 @@ def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibr
         assert batches[0].samples.dtype == SAMPLE_DTYPE and batches[0].mode == "raw"
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOnAWire, str]) -> None:
     batches: list[SampleBatch] = []
@@ -382,6 +385,7 @@ def test_a_port_that_is_not_there() -> None:
         assert "Errno" not in failure.value.what
 
 
+@pytest.mark.slow
 def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].hold.set()
     with pytest.raises(BoardError) as failure:
@@ -508,6 +512,7 @@ def test_bytes_that_come_twice_cost_the_frames_they_damage_and_no_others(wire: t
     assert sequences[-1] + 1 - len(sequences) == sum(len(frame.items) for frame in lost if frame is not None)
 
 
+@pytest.mark.slow
 def test_a_board_that_restarts_is_reported_where_every_frame_comes_twice(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].on_send, _ = doubling(1.0, seed=3)
     with closing(streaming(wire)) as board:
@@ -579,6 +584,7 @@ def test_a_closed_socket_is_noticed_as_such() -> None:
                 board.status()
 
 
+@pytest.mark.slow
 def test_a_board_that_restarts_while_streaming_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].reset.set()
@@ -617,6 +623,7 @@ def test_what_came_before_the_port_closed_is_read() -> None:
         port.close()
 
 
+@pytest.mark.slow
 def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].board.gyro.values[0x10] = 0  # powered down behind the board's back: no more data-ready
@@ -624,6 +631,7 @@ def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) 
     assert error.name == "sensor_silent" and "LSM9DS1" in error.what
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, str]) -> None:
     def broken(batch: SampleBatch) -> None:
@@ -643,6 +651,7 @@ def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, s
         wait_for(failed, "the failure")
 
 
+@pytest.mark.slow
 def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:
     """Every program's first request has the same number, and a cable's buffer keeps what nobody has read."""
     identity = {"firmware": "1", "unique_id": bytes(12), "reset_cause": 1, "protocol": protocol.PROTOCOL_VERSION}

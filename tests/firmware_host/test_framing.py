@@ -107,6 +107,7 @@ def test_every_message_comes_back_as_it_was_sent(sent: Sent) -> None:
     assert frame.items.tobytes() == (b"" if items is None else items.tobytes())
 
 
+@pytest.mark.slow
 @given(messages())
 def test_host_firmware_and_packages_read_and_write_the_same_frame(sent: Sent) -> None:
     wire = wire_of(sent)
@@ -116,6 +117,7 @@ def test_host_firmware_and_packages_read_and_write_the_same_frame(sent: Sent) ->
     assert encode_in_c(*read) == wire
 
 
+@pytest.mark.slow
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=protocol.PAYLOAD_MAX))
 @example(1, 0, bytes(protocol.PAYLOAD_MAX))
 @example(255, 255, b"\xff" * protocol.PAYLOAD_MAX)
@@ -127,6 +129,7 @@ def test_any_payload_is_framed_alike(kind: int, sequence: int, payload: bytes) -
     assert decode_in_c(wire[:-1]) == by_packages(wire[:-1]) == (kind, sequence, payload)
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=254) | st.lists(st.integers(1, 9), max_size=254).map(bytes))
 def test_every_way_to_unstuff_gives_the_same(block: bytes) -> None:
     assert stuffing.unstuff_in_python(block) == stuffing.unstuff_by_package(block)
@@ -228,6 +231,7 @@ def test_a_count_that_starts_afresh_is_no_loss_when_it_was_announced() -> None:
     assert reader.lost == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mean_run", [30, 300, 3000])
 def test_runs_of_bytes_that_come_twice_leave_every_frame_once_and_the_counts_exact(mean_run: int) -> None:
     """A twentieth of the bytes comes twice, in runs of less than a frame or of many."""

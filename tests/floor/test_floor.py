@@ -157,6 +157,7 @@ HARM = {  # rows of the table: a rig's name, when it was heard, what it said
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", HARM)
 def test_no_row_hides_a_rig_or_makes_the_page_heavy(tmp_path: Path, harm: str) -> None:
     with open_history(str(tmp_path / "history.sqlite")) as history:
@@ -188,6 +189,7 @@ def test_the_database_alone_tells_ages(tmp_path: Path) -> None:
         assert list(history.broken()) == []
 
 
+@pytest.mark.slow
 def test_the_floor_is_guarded_as_the_operators_page_and_has_nothing_that_acts(tmp_path: Path) -> None:
     token = "a-token-of-two-and-twenty"
     feed = Sections()

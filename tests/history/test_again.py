@@ -159,6 +159,7 @@ def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(histo
     assert [each.run_id for each in to_solve(stated, solved)] == [2, 3]
 
 
+@pytest.mark.slow
 def test_the_report_says_all_in_csv_and_what_is_to_be_looked_at_on_the_page(history: History) -> None:
     run, hostile = finished(0), finished(1, serial_number="=<b>G-2</b>")
     for each in (run, hostile):

@@ -51,6 +51,7 @@ def test_an_undamaged_part_has_changed_in_one_of_twenty_comparisons_at_most(sens
     assert correlation or share > 0.015, "and the limit is no wider than it must be"
 
 
+@pytest.mark.slow
 def test_all_values_of_a_run_are_one_comparison() -> None:
     random, freedom = np.random.default_rng(2), np.full(12, np.inf)
     sensors = [[(drawn(random, freedom, 0.0), drawn(random, freedom, 0.0)) for _ in range(4)] for _ in range(400)]
@@ -58,6 +59,7 @@ def test_all_values_of_a_run_are_one_comparison() -> None:
     assert share <= ALARMS + 3 * np.sqrt(ALARMS / 400)
 
 
+@pytest.mark.slow
 def test_a_change_of_2_u_in_one_value_of_nineteen_is_told() -> None:
     """2 U of the change: noise hides it in a sixth of the comparisons, and in none if it is what both results say."""
     random, freedom = np.random.default_rng(3), np.full(19, np.inf)

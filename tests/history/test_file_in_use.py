@@ -160,6 +160,7 @@ EXCHANGES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exchange", "name"), EXCHANGES)
 def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered_in_it(
     exchange: Callable[[Path], None], name: str, file: Path, monkeypatch: pytest.MonkeyPatch
@@ -181,6 +182,7 @@ def test_a_history_that_is_not_the_one_of_before_is_named_and_nothing_is_entered
     assert isinstance(event, Remembered)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exchange", "name"), EXCHANGES[:2])
 def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
     exchange: Callable[[Path], None], name: str, file: Path
@@ -194,6 +196,7 @@ def test_nobody_works_on_in_a_file_that_is_not_the_history_any_more(
                 work()
 
 
+@pytest.mark.slow
 def test_the_floor_says_that_its_history_is_gone_and_begins_none(file: Path) -> None:
     with open_history(str(file)) as history:
         history.enter(finished(0))
@@ -220,6 +223,7 @@ def test_a_database_that_was_emptied_meanwhile_is_not_begun_anew() -> None:
             assert history.calibrations() == []
 
 
+@pytest.mark.slow
 def test_what_is_not_there_when_it_is_read_back_is_not_told_as_entered(file: Path) -> None:
     with open_history(str(file)) as history:
         history.enter(finished(0))

@@ -47,6 +47,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         yield url
 
 
+@pytest.mark.slow
 def test_no_row_is_changed_taken_away_or_replaced(place: str) -> None:
     with open_history(place) as history:
         fill(history)
@@ -97,6 +98,7 @@ def pipe(folder: Path) -> None:
     os.mkfifo(folder / "config.yaml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("state", "name", "attack"),
     [
@@ -152,6 +154,7 @@ def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], name
         assert named in "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.state in WRONG)
 
 
+@pytest.mark.slow
 def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_end(place: str) -> None:
     with open_history(place) as history:
         assert history.head() == Head(0, "")
@@ -190,6 +193,7 @@ def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) ->
     )
 
 
+@pytest.mark.slow
 def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> None:
     file = str(tmp_path / "history.sqlite")
     with open_history(file) as history:
@@ -254,6 +258,7 @@ def test_a_trigger_of_a_server_that_does_not_say_no_any_more_is_named(place: str
         assert ("changed", "trigger not_changed of journal") in named and len(named) == len(TABLES) + 1
 
 
+@pytest.mark.slow
 def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_written_anew(place: str) -> None:
     with open_history(place) as history:
         for day in range(4):
@@ -274,6 +279,7 @@ def test_a_run_that_was_taken_away_leaves_its_numbers_though_the_journal_was_wri
         assert wrong(history) == [("missing", f"{table} 2 to 3") for table in GAPS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["run-2.h5", "run-17.h5", "verify-2.h5", "certificate.pdf", "script.py"])
 def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_path: Path) -> None:
     folder = run_folder(tmp_path / "run")
@@ -286,6 +292,7 @@ def test_a_file_of_a_run_that_no_run_was_entered_with_is_named(name: str, tmp_pa
         assert main(["history", "verify", "--history", str(tmp_path / "history.sqlite")]) == 1
 
 
+@pytest.mark.slow
 def test_a_run_that_was_gone_on_with_is_entered_with_its_new_recording(tmp_path: Path) -> None:
     folder = run_folder(tmp_path / "run")
     with open_history(str(tmp_path / "history.sqlite")) as history:

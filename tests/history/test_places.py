@@ -93,6 +93,7 @@ def asks_for_a_password(how: bytes) -> Iterator[tuple[int, bytearray]]:
         server.shutdown(socket.SHUT_RDWR)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [CLEAR_TEXT, MD5])
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])  # the second leads here as well, and is not known to
 def test_a_password_is_said_to_no_server_that_asks_for_it(

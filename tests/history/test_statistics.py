@@ -107,6 +107,7 @@ def runs_to_alarm(found: Chart, begin: int) -> Array:
     return counted
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize("equal", [True, False], ids=["equal uncertainties", "differing uncertainties"])
 def test_false_alarms_are_300_runs_apart(thorough: bool, equal: bool) -> None:
@@ -120,6 +121,7 @@ def test_false_alarms_are_300_runs_apart(thorough: bool, equal: bool) -> None:
     assert apart >= (300 if thorough else 240)  # of 170 alarms an eighth, 2σ, is chance
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.parametrize(("change", "most"), [("drift", 15), ("shift", 10)])
 def test_a_drift_of_a_tenth_and_a_shift_of_one_sigma_are_found(thorough: bool, change: str, most: float) -> None:

@@ -263,6 +263,7 @@ def test_what_has_changed_is_named(history: History) -> None:
     assert [each.name for each in changes_between([before], [now])[now.subject] if each.has_changed] == ["k", "kx"]
 
 
+@pytest.mark.slow
 def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -> None:
     for i in range(10):
         history.enter(finished(30 * i, (1.01 + 1e-5 * 30 * i, 0.99, 1.0)))
@@ -309,6 +310,7 @@ def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(hist
     assert abs(sign * effect.value - 4e-5) < 3 * effect.std < 4e-5
 
 
+@pytest.mark.slow
 def test_a_history_that_may_only_be_read_is_read_and_nothing_is_laid_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -325,6 +327,7 @@ def test_a_history_that_may_only_be_read_is_read_and_nothing_is_laid_beside_it(
     assert [*tmp_path.iterdir()] == [file] and file.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_history_that_is_only_read_while_another_writes_it_is_as_that_one_left_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,6 +50,7 @@ def trends_of(pasts: Sequence[Past]) -> tuple[FittingTable, dict[str, Trend]]:
     return trends_table(subject, list(found.values())), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [60, 80])
 def test_names_and_headings_are_whole_in_a_narrow_terminal(history: History, width: int) -> None:
     pasts = a_year(history)
@@ -69,6 +70,7 @@ def test_names_and_headings_are_whole_in_a_narrow_terminal(history: History, wid
         assert all(name in printed(table, width) for name in (ANGLE, "nonorth_zx rad", "nonorth_xy rad"))
 
 
+@pytest.mark.slow
 def test_a_wider_terminal_shows_more_columns(history: History) -> None:
     table = trends_of(a_year(history))[0]
     narrow, usual, wide = (headings(printed(table, width)) for width in (60, 80, 140))
@@ -86,6 +88,7 @@ def test_what_fits_nowhere_is_folded_and_not_cut() -> None:
     assert name in re.sub(r"[^a-z-]", "", "".join(row[:22] for row in text.splitlines()[3:]))
 
 
+@pytest.mark.slow
 def test_a_picture_shows_what_has_changed_beyond_its_u(history: History) -> None:
     for day in range(4):
         history.enter(finished(day, (SCALE[0] + day * 40 * float(STD[0]), *SCALE[1:])))
@@ -94,6 +97,7 @@ def test_a_picture_shows_what_has_changed_beyond_its_u(history: History) -> None
     assert pictures["kx"] == "▁▃▆█" and len(set(pictures["ky"])) == 1
 
 
+@pytest.mark.slow
 def test_a_terminal_without_blocks_gets_letters(history: History, tmp_path: Path) -> None:
     table = trends_of(a_year(history))[0]
     with TextIOWrapper((tmp_path / "out").open("wb"), encoding="ascii", errors="replace") as out:
@@ -102,6 +106,7 @@ def test_a_terminal_without_blocks_gets_letters(history: History, tmp_path: Path
     assert re.search(r"__+\.+-+'+", kx)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("step_days", "stated"), [(0.5, False), (2.0, False), (2.6, True)])
 def test_no_drift_a_year_is_stated_of_a_few_days(history: History, step_days: float, *, stated: bool) -> None:
     table, found = trends_of(a_year(history, runs=5, step_days=step_days))
@@ -114,6 +119,7 @@ def test_the_mean_scale_factor_is_explained_where_it_is_printed(history: History
     assert any(line.startswith("k: the mean of the scale factors") for line in trend_lines(found))
 
 
+@pytest.mark.slow
 def test_readings_from_files_are_of_no_rig_that_is_called_none(history: History) -> None:
     for day in range(6):
         run = finished(day, check_standard=True)
@@ -127,6 +133,7 @@ def test_readings_from_files_are_of_no_rig_that_is_called_none(history: History)
     assert rig_states(pasts) == []
 
 
+@pytest.mark.slow
 def test_one_alarm_is_one(history: History) -> None:
     for day in range(40):
         history.enter(finished(day * 10, (SCALE[0] + (3e-4 if day == 20 else day % 3 * 1e-5), *SCALE[1:])))

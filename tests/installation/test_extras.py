@@ -38,6 +38,7 @@ def printed(folder: Path, said: dict[str, Any] | None) -> list[str]:
     return shlex.split(done.stdout)
 
 
+@pytest.mark.slow
 def test_a_folder_of_sources_stays_the_folder_it_runs_from(tmp_path: Path) -> None:
     sources = tmp_path / "my rig"
     sources.mkdir()
@@ -45,6 +46,7 @@ def test_a_folder_of_sources_stays_the_folder_it_runs_from(tmp_path: Path) -> No
     assert command == [sys.executable, "-m", "pip", "install", "-e", f"{sources}[study]"]
 
 
+@pytest.mark.slow
 def test_a_wheel_is_installed_once_more_with_the_extra(tmp_path: Path) -> None:
     wheel = tmp_path / "calibration_rig-9-py3-none-any.whl"
     wheel.touch()
@@ -52,6 +54,7 @@ def test_a_wheel_is_installed_once_more_with_the_extra(tmp_path: Path) -> None:
     assert command == [sys.executable, "-m", "pip", "install", f"{wheel}[study]"]
 
 
+@pytest.mark.slow
 def test_what_came_from_an_index_comes_from_there_again(tmp_path: Path) -> None:
     assert printed(tmp_path, None)[3:] == ["install", "calibration-rig[study]"]
 

@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from support.dependencies import licence, needed
 
 # Whose terms are kept by naming them: MIT, BSD, Apache and their like, as packages spell them.
@@ -29,6 +31,7 @@ LOOKED_AT = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_every_dependency_has_a_licence_that_somebody_has_looked_at() -> None:
     packages = needed(["dev"])
     assert len(packages) > 50, "the program is not installed with its extras"

@@ -133,6 +133,7 @@ def test_a_newer_python_gets_an_older_one_beside_it_from_a_mirror(checkout: Path
     assert (checkout / "venv" / "bin" / "python").exists()
 
 
+@pytest.mark.slow
 def test_where_neither_a_python_nor_a_compiler_is_to_be_had_one_command_is_named(checkout: Path) -> None:
     newer_python(checkout)
     (checkout / "bin" / "uv").symlink_to(Path(sysconfig.get_path("scripts")) / "uv")

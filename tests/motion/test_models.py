@@ -108,6 +108,7 @@ def test_a_ur3e_can_stand_in_attitudes_with_wrist_2_away_from_its_arm() -> None:
     assert problems(section, plan_static_attitudes(section, away)) == []
 
 
+@pytest.mark.slow
 def test_a_ur3es_home_is_where_it_must_be() -> None:
     """With wrist 2 at -90° the sweep of wrist 1 comes near the upper arm, however the elbow is bent."""
     for elbow_deg in (30, 60, 90, 120):

@@ -27,6 +27,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return where
 
 
+@pytest.mark.slow
 def test_all_calibrations_of_a_serial_number_are_one_table(place: str) -> None:
     found = rig.calibrations("G-1")
     frame = found.to_frame()

@@ -53,6 +53,7 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
     assert np.linalg.norm(rate_rad_s[middle], axis=1).mean() == pytest.approx(np.radians(120) / 1.144, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_result_is_that_of_the_run(result: rig.Result) -> None:
     then, document = read_result(RECORDINGS / "verified"), result.to_dict()
     now = ResultDocument.model_validate(document)
@@ -65,6 +66,7 @@ def test_the_result_is_that_of_the_run(result: rig.Result) -> None:
     assert set(document) == set(json.loads(then.text()))
 
 
+@pytest.mark.slow
 def test_another_estimator_and_another_threshold(run: rig.Run) -> None:
     assert "newton" in repr(rig.solve(run, estimator="newton", max_lost_fraction=0.01)["gyro"])
     assert rig.solve(run, scale_std=1e-9).verdict == "fail"
@@ -72,6 +74,7 @@ def test_another_estimator_and_another_threshold(run: rig.Run) -> None:
         rig.solve(run, max_lost=0.01)
 
 
+@pytest.mark.slow
 def test_two_sensors_beside_each_other(run: rig.Run) -> None:
     beside = rig.compare(run, "gyro", "reference")
     assert beside.before is not None and beside.after is not None
@@ -84,6 +87,7 @@ def test_two_sensors_beside_each_other(run: rig.Run) -> None:
     assert other_way.after.movement.rms_rad_s.max() < 0.006
 
 
+@pytest.mark.slow
 def test_the_verification_stands_as_a_run_of_its_own(run: rig.Run) -> None:
     assert run.verification is not None
     assert run.verification["gyro"].sensor.mode == "calibrated"
@@ -91,6 +95,7 @@ def test_the_verification_stands_as_a_run_of_its_own(run: rig.Run) -> None:
     assert run.verification.verification is None
 
 
+@pytest.mark.slow
 def test_what_is_not_there_is_refused_by_name(run: rig.Run, result: rig.Result) -> None:
     for ask in (lambda: run["accelerometer"], lambda: result["accelerometer"], lambda: rig.compare(run, "gyro", "x")):
         with pytest.raises(Refused, match=r"no_such_sensor: .*gyro, reference"):

@@ -42,6 +42,7 @@ def test_a_magnetometer_is_read_on_the_arms_clock(magnetic: rig.Run) -> None:
     assert list(field.to_frame().columns) == ["x_t", "y_t", "z_t"]
 
 
+@pytest.mark.slow
 def test_a_sweep_is_a_table_with_units_in_its_names(imu: rig.Readings) -> None:
     whole, sweep = imu.to_frame(), imu.to_frame(sweep=3)
     assert whole.index.name == "time_s" and len(whole) == len(imu.samples)

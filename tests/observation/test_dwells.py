@@ -21,6 +21,7 @@ def dwelt(seed: int) -> tuple[Mean, Array]:
     return mean_of_standing(readings, time_s, Window(0.0, LASTING_S), Steps(1e-5))[0], true
 
 
+@pytest.mark.slow
 def test_a_shaken_dwell_s_noise_is_that_of_all_its_readings() -> None:
     """Were it that of few low frequencies, one dwell would weigh three times as much as another like it."""
     found = [dwelt(seed) for seed in range(60)]

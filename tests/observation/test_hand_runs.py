@@ -78,6 +78,7 @@ def test_a_face_has_the_name_of_the_axis_that_it_turns_to() -> None:
     assert all(turned_face(turned_face(face, quarter), quarter.T) == face for face in FACES)
 
 
+@pytest.mark.slow
 def test_an_accelerometer_that_reads_nothing_is_refused_by_name() -> None:
     run = read_run(RECORDINGS / "by_hand" / "run.h5")
     channels = run.sensors["gyro"].channels

@@ -139,6 +139,7 @@ def test_a_single_sweep_tells_the_clock_whatever_the_bias(bias_rad_s: float) -> 
         assert abs(clock_errors(setup, clock)[0]) < 4 * clock.offset_std_s < 1e-3
 
 
+@pytest.mark.slow
 def test_the_demo_s_clock_is_known_to_half_a_millisecond() -> None:
     clock = look(USUAL).time_base
     assert clock.offset_std_s < 0.5e-3
@@ -213,6 +214,7 @@ def test_of_a_vibration_hardly_anything_is_left_in_a_mean() -> None:
         assert np.mean([widening(draw) * np.var(draw) / len(draw) for draw in draws]) > 3 * stated
 
 
+@pytest.mark.slow
 def test_rests_show_the_reading_at_zero_rate() -> None:
     rests = look(USUAL).rests
     assert len(rests) == 6
@@ -548,6 +550,7 @@ def test_the_sequence_number_may_wrap() -> None:
     assert [o.lost for o in look(with_samples(USUAL, near_the_end)).revolutions] == [0] * 6
 
 
+@pytest.mark.slow
 def test_one_calibration_recovers_the_truth() -> None:
     result = solve_runs([USUAL])["gyro"]
     found = np.concatenate([result.solution.scale, result.solution.bias_rad_s])
@@ -601,6 +604,7 @@ def test_a_resumed_run_is_solved_from_all_its_recordings() -> None:
     np.testing.assert_allclose(parts.solution.scale, whole.scale, atol=2e-5)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_alone_says_what_is_missing() -> None:
     interrupted = part(USUAL, range(4))
     begun = [recorded for recorded in USUAL.events if isinstance(recorded.event, SweepStarted)][4]
@@ -618,6 +622,7 @@ def test_solving_refuses_what_it_cannot_mean() -> None:
         solve_runs([USUAL, other])
 
 
+@pytest.mark.slow
 def test_a_bias_too_large_for_algorithm_1_is_reported_beside_the_result() -> None:
     result = solve_runs([synthetic_run(Setup(bias_rad_s=(0.5, -0.5, 0.5), noise_rad_s=0.01))])["gyro"]
     np.testing.assert_allclose(result.solution.bias_rad_s, [0.5, -0.5, 0.5], atol=0.005)

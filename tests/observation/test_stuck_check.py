@@ -49,6 +49,7 @@ def test_when_the_last_sweep_is_sound_the_rest_after_it_still_tells() -> None:
         observe_run(stuck_in_sweep(5), SETTINGS)
 
 
+@pytest.mark.slow
 def test_one_that_sticks_at_rest_is_told_from_a_wrong_unit_by_the_turn_the_other_way() -> None:
     window = next(each.window for each in swept(USUAL) if each.sweep.index == 5)
     samples, late = USUAL.samples["gyro"].copy(), readings_of(Setup()).between(window.start_s - 0.5, 1e9)

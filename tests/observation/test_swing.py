@@ -46,6 +46,7 @@ def rests_rad_s(run: RunData) -> Array:
     return np.array([rest.mean_rad_s for rest in observe_recordings([run])[0].sensors["gyro"].rests])
 
 
+@pytest.mark.slow
 def test_the_mean_of_a_rest_is_that_of_an_arm_that_does_not_swing() -> None:
     """Half a hertz of 1 mrad/s would turn a rest of three seconds by as much as thirty times what noise does."""
     still = Setup(noise_rad_s=3e-4, vibration=0.0, state_rate_hz=500.0, sample_rate_hz=200.0)

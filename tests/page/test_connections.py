@@ -69,6 +69,7 @@ def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path
         assert alive(operator)
 
 
+@pytest.mark.slow
 def test_browsers_without_the_token_leave_places_for_those_with_it(tmp_path: Path) -> None:
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
@@ -80,6 +81,7 @@ def test_browsers_without_the_token_leave_places_for_those_with_it(tmp_path: Pat
         assert status(url, "GET", "/events", Authorization=f"Bearer {urlsplit(url).fragment}") == 200
 
 
+@pytest.mark.slow
 def test_a_header_without_end_is_not_kept(tmp_path: Path) -> None:
     with page(tmp_path) as url, half_a_request(url) as endless:
         with suppress(ConnectionError):
@@ -109,6 +111,7 @@ def test_headers_that_do_not_come_end_the_connection() -> None:
     assert asyncio.run(waiting()) == b""
 
 
+@pytest.mark.slow
 def test_a_question_is_given_back_when_the_page_is_gone(tmp_path: Path) -> None:
     control = Control(may_answer=True)
     with serving(Feed(Shown(About("", ""))), control, tmp_path, Address(port=0)):
@@ -116,6 +119,7 @@ def test_a_question_is_given_back_when_the_page_is_gone(tmp_path: Path) -> None:
     assert control.ask((), "start") is None
 
 
+@pytest.mark.slow
 def test_a_page_that_fails_says_so_and_what_it_showed_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -130,6 +130,7 @@ def test_who_is_behind_gets_everything_once_and_a_mailbox_holds_one_frame() -> N
     asyncio.run(slow())
 
 
+@pytest.mark.slow
 def test_the_last_news_reach_who_reads_and_nobody_else_is_waited_for_long() -> None:
     async def ending() -> None:
         feed = fed()

@@ -153,6 +153,7 @@ def a_sea(folder: Path) -> None:
         file.truncate(1 << 30)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planted", [a_link, a_pipe, a_sea])
 def test_what_is_planted_as_a_certificate_is_not_shown(tmp_path: Path, planted: Callable[[Path], None]) -> None:
     planted(tmp_path)
@@ -189,6 +190,7 @@ def test_an_address_that_will_not_do_is_refused(tmp_path: Path, address: Address
         pass
 
 
+@pytest.mark.slow
 def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
     control = Control(may_answer=False)
     threading.Thread(target=control.ask, args=((), "start"), daemon=True).start()
@@ -196,6 +198,7 @@ def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
         assert asking("POST", "/answer", '{"number": 1, "agreed": true}')[0] == 409
 
 
+@pytest.mark.slow
 def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path) -> None:
     control = Control(may_answer=True)
     answers: list[bool | None] = []
@@ -217,6 +220,7 @@ def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path
     assert (wrong, answers_right[-1], again, answers) == (409, 202, 409, [True])
 
 
+@pytest.mark.slow
 def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
     control = Control(may_answer=False)
     with server(tmp_path, control) as asking:
@@ -285,6 +289,7 @@ def a_link_instead(log: Path) -> None:
     log.symlink_to(log.parent / "private")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("planted", "words"), [(no_text, "; stopped \ufffd"), (a_pipe_instead, ""), (a_link_instead, "")]
 )

@@ -97,6 +97,7 @@ def test_a_steady_drift_is_weighed_by_the_arc_s_own_attitudes() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_dry_run_says_over_what_angle_sweeps_are_averaged() -> None:
     done = rig_here("plan", CONFIGS / "demo.yaml", "--set", "procedure.arc_deg=180", "--set", KNOWN)
     assert done.returncode == 0, done.stderr

@@ -95,6 +95,7 @@ def test_a_run_by_anothers_script_goes_on_by_a_script_that_the_user_names_or_not
     assert not (tmp_path / "trace").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("laid", "command"),
     [
@@ -232,6 +233,7 @@ def test_attitudes_over_thousands_of_years_are_put_on_no_grid(tmp_path: Path) ->
     assert refused.returncode == 2 and "rig: impossible_times: the states or attitudes" in refused.stderr
 
 
+@pytest.mark.slow
 def test_a_line_of_ten_million_columns_is_refused(tmp_path: Path) -> None:
     samples, sweeps = tmp_path / "samples.csv", ROOT / "docs" / "examples" / "sweeps.csv"
     samples.write_text("time_s" + ",x_rad_s" * 1_000_000, encoding="utf-8")

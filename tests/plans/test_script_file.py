@@ -87,6 +87,7 @@ def test_only_a_regular_file_of_a_sensible_size_is_a_script(tmp_path: Path, kind
         load_script(path)
 
 
+@pytest.mark.slow
 def test_a_run_that_was_refused_before_its_first_recording_goes_on_by_its_own_script_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

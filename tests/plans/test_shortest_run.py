@@ -171,6 +171,7 @@ def test_what_is_predicted_is_reached(thorough: bool) -> None:
     assert not {each: found for each, found in ratios.items() if not low <= min(found) <= max(found) <= high}
 
 
+@pytest.mark.slow
 def test_a_run_that_is_ten_times_as_noisy_is_not_what_was_predicted() -> None:
     each = RUNS[0]
     noisy = synthetic_run(Setup(noise_rad_s=10 * noise_of(each)))
@@ -237,6 +238,7 @@ def test_what_no_run_reaches_is_told_from_what_takes_too_long() -> None:
     assert late.nearest is not None and late.nearest.candidate.duration_s <= 60
 
 
+@pytest.mark.slow
 def test_the_search_takes_the_least_of_a_grid_it_has_not_seen_whole() -> None:
     rng, section = np.random.default_rng(1), demo().procedure
     for _ in range(50):

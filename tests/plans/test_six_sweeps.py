@@ -88,6 +88,7 @@ def test_an_order_the_file_names_is_kept() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_steps_join_without_a_gap_and_end_at_home() -> None:
     made = plan(axes=6, speeds_deg_s=[60, 90])
     here = made.start_q_rad

@@ -176,6 +176,7 @@ def test_what_are_no_attitudes_is_refused(attitudes: object, said: str) -> None:
         plan(attitudes=attitudes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [

@@ -120,6 +120,7 @@ class Bench:
             self.course.measured(measured(self.live(self.set_s), warming=warming))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heater_w", [4.0, 10.0])
 @pytest.mark.parametrize(("capacity_j_k", "loss_w_k"), [(6.0, 0.1), (20.0, 0.1), (60.0, 0.12)])
 def test_a_heater_covers_the_range_both_ways_at_an_even_rate(

@@ -1,6 +1,7 @@
 """What has no budget has U by its degrees of freedom, the same at the terminal, on the page and in the digital one."""
 
 import io
+from collections.abc import Callable
 from xml.etree.ElementTree import fromstring
 
 import numpy as np
@@ -90,10 +91,12 @@ def test_u_of_a_drift_is_by_its_freedom_at_the_terminal_and_on_the_page() -> Non
     assert f"{printed.value} ± {printed.uncertainty}" in page
 
 
-@pytest.mark.parametrize("document", [everything(), scarce()], ids=["uncounted", "scarce"])
-def test_k_of_every_uncertainty_in_the_digital_certificate_is_the_page_s(document: ResultDocument) -> None:
+@pytest.mark.parametrize("document", [everything, scarce], ids=["uncounted", "scarce"])
+def test_k_of_every_uncertainty_in_the_digital_certificate_is_the_page_s(
+    document: Callable[[], ResultDocument],
+) -> None:
     """Of scale and bias the sentence of EA-4/02, of the rest k beside the values; each probability is Student's t's."""
-    made = certificate(document, GERMAN)
+    made = certificate(document(), GERMAN)
     page, xml = " ".join(read(made).text.split()), fromstring(digital_certificate(made))
     stated = 0
     for each in xml.iterfind(".//dcc:result", NAMES):

@@ -91,6 +91,7 @@ def test_a_history_follows_the_slopes_and_the_values_at_the_reference(
     assert all(each.expanded > 0 for each in slopes.values())
 
 
+@pytest.mark.slow
 def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -> None:
     xml = digital_certificate(certificate(result, Stated(SiteSection(country="DE"))))
     names = [each.text for each in ElementTree.fromstring(xml).iter("{https://ptb.de/dcc}content")]
@@ -99,6 +100,7 @@ def test_the_digital_certificate_has_every_temperature(result: ResultDocument) -
     assert rule_faults(xml) == []
 
 
+@pytest.mark.slow
 def test_the_digital_certificate_is_valid_by_ptbs_schema(result: ResultDocument) -> None:
     assert schema_faults(digital_certificate(certificate(result, Stated(SiteSection(country="DE"))))) == []
 
@@ -124,6 +126,7 @@ int main(void) {{
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked_c", [25.0, 41.5, 90.0])
 def test_the_header_corrects_by_temperature(
     result: ResultDocument, entry: OverTemperatureEntry, tmp_path: Path, asked_c: float
@@ -148,6 +151,7 @@ def ours(entry: OverTemperatureEntry, temperature_c: float) -> Array:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By calc_thermal_offsets_3D of TemperatureCompensation.cpp and Gyroscope::Correct."""
@@ -164,6 +168,7 @@ def test_px4_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEnt
     assert np.allclose(READING - thermal - offset, ours(entry, temperature_c), rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("temperature_c", [0.0, FROM_C + 0.5, REFERENCE_C, 35.0, 47.3, TO_C - 1, 80.0])
 def test_ardupilot_corrects_as_we_do(result: ResultDocument, entry: OverTemperatureEntry, temperature_c: float) -> None:
     """By TCal::correct_sensor of AP_InertialSensor_tempcal.cpp and _rotate_and_correct_gyro."""

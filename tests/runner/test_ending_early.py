@@ -91,6 +91,7 @@ def test_after_the_end_only_the_last_way_home_is_made() -> None:
         assert home and made[-len(home) :] == [*home]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", [{}, {"order": ["wrist_2", "wrist_1", "wrist_3"]}, {"axes": 6}])
 def test_no_motion_begins_where_the_arm_does_not_stand(keys: dict[str, object]) -> None:
     """Whatever the order of directions, which may change from repeat to repeat."""

@@ -65,6 +65,7 @@ def refused(port: str, **changes: object) -> SensorError:
     return caught.value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", ["A", "B", "C"])
 @pytest.mark.parametrize("rotation", ["delta", "rate"])
 def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> None:
@@ -114,6 +115,7 @@ def test_format_c_has_its_magnetometer_as_a_sensor_of_its_own() -> None:
     assert (np.abs(times_us - 16_000 * steps) <= 2).all(), "four messages each, across the wraps of their numbers"
 
 
+@pytest.mark.slow
 def test_what_somebody_left_is_corrected_and_stays_corrected() -> None:
     left = {"DR": "100", "OUTPUTFMT": "C", "ROTFMT": "RATE", "ROTUNITS": "DEG", "TEMPUNITS": "F", "FILTEN,G": "0"}
     with kvh_on_a_wire({**left, "FILTTYPE,A": "BUTTER"}) as wire:
@@ -124,12 +126,14 @@ def test_what_somebody_left_is_corrected_and_stays_corrected() -> None:
         assert wire.memory["ROTUNITS"] == "RAD"
 
 
+@pytest.mark.slow
 def test_an_instrument_that_waits_for_an_external_sync_is_brought_back() -> None:
     with kvh_on_a_wire({"MSYNC": "EXT"}) as wire, streaming(wire) as (source, collected):
         assert source.corrected["MSYNC"] == "EXT" and source.corrected["FILTTYPE,G"] == "AVE"
         collected.wait(source, 10)
 
 
+@pytest.mark.slow
 def test_an_instrument_somebody_left_in_configuration_mode_is_found() -> None:
     with kvh_on_a_wire() as wire:
         wire.order(lambda kvh: kvh.receive(b"=config,1\r"))
@@ -168,6 +172,7 @@ def test_another_specimen_is_refused() -> None:
     assert error.name == "kvh_other_serial_number" and SERIAL_NUMBER in error.what
 
 
+@pytest.mark.slow
 def test_a_built_in_test_that_fails_is_refused() -> None:
     with kvh_on_a_wire() as wire:
         wire.order(lambda kvh: setattr(kvh.faults, "test", 0x7D))
@@ -175,6 +180,7 @@ def test_a_built_in_test_that_fails_is_refused() -> None:
     assert error.name == "kvh_test_failed" and "7d 7f" in error.what
 
 
+@pytest.mark.slow
 def test_a_command_it_does_not_know_is_named() -> None:
     with kvh_on_a_wire() as wire:
         del wire.memory._settings["FILTEN,G"]
@@ -183,6 +189,7 @@ def test_a_command_it_does_not_know_is_named() -> None:
     assert caught.value.name == "kvh_command_refused" and "?FILTEN,G with INVALID" in caught.value.what
 
 
+@pytest.mark.slow
 def test_half_a_command_of_somebody_else_is_in_nobodys_way() -> None:
     with kvh_on_a_wire() as wire:
         wire.order(lambda kvh: kvh.receive(b"=config,1\r\n=OUTPUTF"))
@@ -190,12 +197,14 @@ def test_half_a_command_of_somebody_else_is_in_nobodys_way() -> None:
             collected.wait(source, 10)
 
 
+@pytest.mark.slow
 def test_a_wrong_baud_rate_is_named() -> None:
     with kvh_on_a_wire({"BAUD": "115200"}) as wire, pytest.raises(SensorError) as caught:
         Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.4))
     assert caught.value.name == "kvh_wrong_baud_rate"
 
 
+@pytest.mark.slow
 def test_a_dead_line_and_a_missing_port_are_named() -> None:
     with kvh_on_a_wire(dead=True) as wire, pytest.raises(SensorError) as caught:
         Kvh1775("kvh", wire.port, 921600, patience=Patience(first_s=0.3))
@@ -205,6 +214,7 @@ def test_a_dead_line_and_a_missing_port_are_named() -> None:
     assert caught.value.name == "no_port"
 
 
+@pytest.mark.slow
 def test_a_line_that_carries_one_way_only_is_named() -> None:
     with kvh_on_a_wire() as wire:
         wire.line.send_to_device = lambda data, host_baud: None  # type: ignore[method-assign]
@@ -213,6 +223,7 @@ def test_a_line_that_carries_one_way_only_is_named() -> None:
     assert caught.value.name == "kvh_does_not_hear"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", ["A", "B"])
 def test_lost_messages_are_counted(message: str) -> None:
     with (
@@ -230,6 +241,7 @@ def test_lost_messages_are_counted(message: str) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", ["A", "B"])
 def test_a_gap_nobody_can_count_ends_the_stream(message: str) -> None:
     with kvh_on_a_wire() as wire, streaming(wire, message=message) as (source, collected):
@@ -266,6 +278,7 @@ def test_bit_errors_cost_messages_and_nothing_else() -> None:
     assert np.abs(rate - TURNING[:3]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_readings_it_calls_invalid_are_no_samples_and_end_the_stream_when_they_stay() -> None:
     # With microseconds: a busy computer keeps the instrument waiting, and no sequence number tells such a silence.
     with kvh_on_a_wire(pace=4) as wire, streaming(wire, message="B") as (source, collected):
@@ -275,6 +288,7 @@ def test_readings_it_calls_invalid_are_no_samples_and_end_the_stream_when_they_s
     assert error.name == "kvh_axis_invalid" and "0x75" in error.what
 
 
+@pytest.mark.slow
 def test_an_accelerometer_that_is_not_read_may_be_invalid() -> None:
     with kvh_on_a_wire(pace=6) as wire:
         wire.order(lambda kvh: setattr(kvh.faults, "status", 0x07))
@@ -290,6 +304,7 @@ def restarted(wire: KvhOnAWire) -> None:
     wire.order(lambda kvh: wire.switch_on())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("happens", "name"),
     [

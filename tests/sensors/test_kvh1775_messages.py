@@ -80,6 +80,7 @@ def test_pieces_of_any_size(name: Format, piece: int) -> None:
 garbage = st.one_of(st.binary(max_size=40), st.integers(4, 35).map(lambda length: SAMPLE[:length]))
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(st.sampled_from(FORMATS), st.just("test"), garbage), max_size=20))
 @settings(deadline=None, max_examples=100)
 def test_whatever_stands_between_them_costs_no_whole_message(parts: list[Format | str | bytes]) -> None:

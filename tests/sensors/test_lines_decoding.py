@@ -129,6 +129,7 @@ def damaged(count: int, seed: int) -> tuple[bytes, np.ndarray, list[int]]:
     return b"".join(lines), readings, sizes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [6_000, pytest.param(1_000_000, marks=[pytest.mark.proof, pytest.mark.thorough])])
 def test_damaged_lines_pass_a_sum_no_oftener_than_one_in_256(count: int) -> None:
     """One wrong byte never passes; several do by chance, and most of what does is no number any more."""

@@ -68,6 +68,7 @@ def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
     assert (thermometer.values(samples)[0], thermometer.resolution) == (22.0, 5.0), "it has none: as it is stated"
 
 
+@pytest.mark.slow
 def test_columns_without_axes_are_sensors_of_their_own_on_the_same_clock() -> None:
     columns = (*SEVEN[:4], "air", "room", "-")
     scalars = {"air": {"unit": "hPa", "scale": 100}, "room": {"unit": "K", "scale": 1000}}
@@ -191,6 +192,7 @@ def test_coarse_seconds_are_made_even_and_the_stated_rate_is_right(rate_hz: floa
     assert (np.diff(samples["board_time_us"].astype(np.int64)) > 0).all()
 
 
+@pytest.mark.slow
 def test_a_look_says_what_comes() -> None:
     with pty_printing(chain([BOOT], stream())) as (port, _):
         told = [str(each) for each in look("imu", sensor_section(port))]

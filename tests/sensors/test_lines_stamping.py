@@ -62,6 +62,7 @@ def test_one_time_that_cannot_be_is_damage_three_are_a_restart() -> None:
         stamped(rows(printed), columns=FOUR)
 
 
+@pytest.mark.slow
 def test_coarse_times_are_made_even_and_never_meet() -> None:
     true_us = np.arange(20_000) * 1000 * (1 + 3e-5) + 300
     stamper, _, times_us = stamped(rows(true_us // 1000), 1000, columns=FOUR, time={"unit": "ms"})
@@ -77,6 +78,7 @@ def test_by_counting_the_clock_is_the_devices_rate() -> None:
     assert np.array_equal(times_us, numbers * 10_000) and numbers[-1] == 499
 
 
+@pytest.mark.slow
 def test_arrival_times_are_made_even() -> None:
     """Bytes come in heaps, 0 to 16 ms late, as from an adapter that collects."""
     rng = np.random.default_rng(4)

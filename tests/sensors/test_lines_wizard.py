@@ -228,6 +228,7 @@ HARM: dict[str, tuple[Callable[[int], str], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", HARM)
 def test_lines_that_no_device_prints_are_refused_at_once(harm: str) -> None:
     line, why = HARM[harm]

@@ -169,6 +169,7 @@ def test_what_cannot_be_undone_is_refused(firmware: Any, imu: str, left: dict[st
     assert caught.value.problem.name == name
 
 
+@pytest.mark.slow
 def test_px4_readings_that_no_estimator_touches_are_taken_beside_one() -> None:
     with autopilot_on_a_wire("px4", {"EKF2_EN": 1}) as wire:
         Listening({"imu": section(wire.port, "SCALED_IMU")}).__exit__()

@@ -87,6 +87,7 @@ def printed(file: Path) -> Iterator[ast.expr]:
             yield from node.args
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ["commands", "report", "runner", "board"])
 def test_what_is_printed_as_it_stands_is_written_in_the_source_or_json(room: str) -> None:
     """All else may hold something from outside, and goes through `say` or `plain`."""

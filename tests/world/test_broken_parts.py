@@ -37,6 +37,7 @@ def test_the_pace_can_change_while_the_world_runs() -> None:
             clock.pace(wrong)
 
 
+@pytest.mark.slow
 def test_a_safeguard_pauses_the_program_and_what_it_paused_goes_on_when_it_is_played() -> None:
     here = Laboratory(LOADED.config, read_world_section(LOADED))
     here.unplug()

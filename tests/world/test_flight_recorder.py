@@ -12,6 +12,7 @@ from support.laboratories.worlds import World, late_path
 from support.processes.waiting import wait_for
 
 
+@pytest.mark.slow
 def test_a_step_that_is_held_is_recorded_with_its_stack_and_whom_it_waited_for(tmp_path: Path) -> None:
     late = tmp_path / "late.txt"
     recorder = FlightRecorder(late, lambda: "client 127.0.0.1:5 of port 30004")

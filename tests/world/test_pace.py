@@ -122,6 +122,7 @@ def test_a_client_that_is_slow_again_and_again_is_waited_for_once_until_it_keeps
     assert client.wait_s > 0.0, "it took what it was sent at once"
 
 
+@pytest.mark.slow
 def test_a_client_that_does_what_it_can_is_waited_for_however_long() -> None:
     """Half as fast as the world would be, it has never taken all: it stays less than a second behind."""
     client, time_scale, capacity = Client(), 8, 4
@@ -140,6 +141,7 @@ def test_a_client_that_does_what_it_can_is_waited_for_however_long() -> None:
     assert most < 100 * 1.0 / PERIOD_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reads_per_s", [1, 5])
 @pytest.mark.parametrize("time_scale", [2, 8, 50])
 def test_a_client_that_reads_now_and_then_changes_the_pace_by_less_than_two_percent(

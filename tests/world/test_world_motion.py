@@ -187,6 +187,7 @@ def test_encoders_report_whole_steps() -> None:
         assert abs(motion.actual_q_rad[5] - motion.q_rad[5]) <= 0.5e-3 + 1e-12
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None)
 @given(st.tuples(*[angles] * 6), st.tuples(*[st.floats(-3, 3)] * 6))
 def test_the_worlds_kinematics_agree_with_the_rigs(q: Joints, qd: Joints) -> None:

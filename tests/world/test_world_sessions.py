@@ -75,6 +75,7 @@ def test_noise(new_session: Callable[[Robot], ClientSession], data: bytes) -> No
     play(new_session(LABORATORY.robot), data + b"\n")
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.lists(statements, max_size=6))
 def test_programs_that_cannot_be_right(lines: list[str]) -> None:
@@ -82,6 +83,7 @@ def test_programs_that_cannot_be_right(lines: list[str]) -> None:
     play(PrimarySession(LABORATORY.robot), text.encode())
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(
     st.lists(st.sampled_from(sorted(OUTPUTS)), max_size=8),
@@ -103,6 +105,7 @@ def test_any_recipe_at_any_rate(outputs: list[str], inputs: list[str], rate_hz: 
     play(RtdeSession(LABORATORY.robot), stream)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["RTDE", "dashboard", "primary"])
 def test_damaged_messages(name: str) -> None:
     """A hundred thousand of them: benchmarks/wire/damaged_frames.py."""

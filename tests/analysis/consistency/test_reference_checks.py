@@ -122,6 +122,7 @@ def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(
     assert all(chance_of(values, below) > 0.01 for values in found.values())
 
 
+@pytest.mark.slow
 def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:
     """Twist, zero and the waves of the angle, of each wrist, made in where the flange goes."""
     size, axes = 1e-4, 6

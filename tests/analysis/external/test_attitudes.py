@@ -236,6 +236,7 @@ WRONG: dict[str, tuple[str, Change | None, Change | None]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_is_refused_by_name(what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, samples, attitudes = WRONG[what]
@@ -279,6 +280,7 @@ def felt_in(turned: Sequence[Rotation], folder: Path) -> list[Path]:
     return [written(folder / "samples.csv", samples), written(folder / "attitudes.csv", rows)]
 
 
+@pytest.mark.slow
 def test_a_linear_sensor_has_no_second_order(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     files = felt_in([attitude(row) for row in read(EXAMPLES / STILL[1])], tmp_path)
     assert main(solve(files, *PLACE, "--second-order")) == 2
@@ -294,6 +296,7 @@ def test_attitudes_about_one_axis_do_not_tell_a_sensor(
     assert "rank_deficient" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_sensor_that_lies_otherwise_is_refused_unless_it_may(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_what_sweeps_contradict_each_other_by_is_in_the_uncertainty() -> None:
     assert [line.name for line in budget_of(sound, swept(1, 1.0)).contributors] == ["noise"]
 
 
+@pytest.mark.slow
 def test_where_few_rows_are_left_student_s_t_makes_the_uncertainty_as_large_as_it_is() -> None:
     """Four sweeps and a rest whose table is off by 0.3 %: one row is more than the solution takes."""
     noise_rad_s, speed_rad_s, row_s = 5e-4, np.pi / 2, 5.0

@@ -91,6 +91,7 @@ def test_real_turns_by_hand_tell_as_much_as_they_can(
     assert "ends of the turns" in said and "axes of the turns" in said
 
 
+@pytest.mark.slow
 def test_what_is_said_of_a_turn_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A servo comes back to its mark; the scale is then as well known as its noise lets it be."""
     session = turn(Hand(BOTH_WAYS, ends_rad=1e-4, leans_rad=1e-3), 2)
@@ -107,6 +108,7 @@ def test_what_is_said_of_a_turn_counts(tmp_path: Path, capsys: pytest.CaptureFix
     assert "bad_sweep" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_turn_that_was_another_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = turn(Hand(BOTH_WAYS), 3)
     session.rows[3, 5] -= 0.3  # said to be 17° less than it was
@@ -117,6 +119,7 @@ def test_a_turn_that_was_another_is_named(tmp_path: Path, capsys: pytest.Capture
     assert min(abs(float(named[1]) - session.rows[row, 0]) for row in (3, 9)) < 0.5, "it, or its way back"
 
 
+@pytest.mark.slow
 def test_a_sweep_at_constant_speed_stays_a_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A row cut out of a longer turn says nothing of where the body began and ended."""
     session = turn(Hand(BOTH_WAYS, pushes=1), 4)

@@ -47,6 +47,7 @@ def test_errors_are_as_large_as_is_stated(arc_deg: float, thorough: bool) -> Non
     assert low < min(rms) and max(rms) < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arc_deg", [90, 180])
 def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
     """Over an arc it does not average out: as of a whole turn, scale and bias would be off by a part in a hundred."""
@@ -58,6 +59,7 @@ def test_gravity_s_share_is_that_of_the_arc_s_attitudes(arc_deg: float) -> None:
     assert np.abs(off[3:]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_ripple_is_motion_and_no_noise() -> None:
     """What the readings add up to between the ends is held against what the encoders say of the same ends."""
     still, shaken = (
@@ -71,6 +73,7 @@ def test_a_ripple_is_motion_and_no_noise() -> None:
     assert ratio < 1.3  # 0.05 of the speed is fifty times the noise
 
 
+@pytest.mark.slow
 def test_the_encoders_are_in_the_budget_as_they_are_stated() -> None:
     """√2 of a standard deviation over the arc, the same one way and back, so nothing of the bias."""
     for arc_deg in (90.0, 180.0):

@@ -69,6 +69,7 @@ def test_what_one_axis_a_stage_does_not_tell_of_the_mounts_is_in_the_budget() ->
     assert np.abs(error / budget.std[:3]).max() < 4
 
 
+@pytest.mark.slow
 def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     run = synthetic_run(Setup())
     assert run.settings.mounts == ()
@@ -76,6 +77,7 @@ def test_an_item_that_is_not_mounted_anew_is_recorded_as_before() -> None:
     assert observe_as_mounted([run], run.settings)[1] == ()
 
 
+@pytest.mark.slow
 def test_the_mounts_are_recorded() -> None:
     runs, _ = drawn_stages(1, KIND, staged(Setup(), TWO), np.zeros((2, 3)))
     assert [run.settings.stage for run in runs] == [0, 1]

@@ -49,6 +49,7 @@ def std(result: SensorResult) -> Array:
     return result.uncertainty.std[3:]
 
 
+@pytest.mark.slow
 def test_the_bias_is_free_of_what_the_flanges_circling_makes_the_sensor_feel() -> None:
     assert np.abs(bias_off(FAST, solved(FAST))).max() < 1e-5
 
@@ -60,6 +61,7 @@ def test_at_the_end_of_an_extension_it_circles_farther_out() -> None:
     assert np.abs(bias_off(AT_THE_END_OF_300_MM, solved(AT_THE_END_OF_300_MM))).max() > 3e-5
 
 
+@pytest.mark.slow
 def test_where_attitudes_do_not_tell_the_sensitivity_the_circling_does_not_either_but_is_in_its_uncertainty() -> None:
     explained = solved(WITHOUT_RESTS).explained
     assert explained is not None and explained.solution.g_sensitivity is None

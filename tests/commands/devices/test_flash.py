@@ -84,6 +84,7 @@ def test_another_image_is_refused(change: Callable[[bytes], bytes], why: str) ->
     assert error.name == "bad_image" and why in error.what
 
 
+@pytest.mark.slow
 def test_the_drive_takes_the_image(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     probe = Probe(nucleo)
@@ -93,6 +94,7 @@ def test_the_drive_takes_the_image(tmp_path: Path) -> None:
     assert probe.taken == flashing.shipped_image()
 
 
+@pytest.mark.slow
 def test_an_earlier_failure_does_not_count(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     (nucleo / "FAIL.TXT").write_text("of yesterday")
@@ -100,6 +102,7 @@ def test_an_earlier_failure_does_not_count(tmp_path: Path) -> None:
     flashing.flash_by_drive(flashing.shipped_image(), nucleo)
 
 
+@pytest.mark.slow
 def test_what_the_board_says_of_its_failure_is_passed_on(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     Probe(nucleo, "The interface firmware FAILED to reset/halt the target MCU\r\n").start()
@@ -107,6 +110,7 @@ def test_what_the_board_says_of_its_failure_is_passed_on(tmp_path: Path) -> None
     assert error.name == "flash_failed" and "FAILED to reset/halt" in error.what and "\n" not in str(error)
 
 
+@pytest.mark.slow
 def test_a_board_that_does_not_take_the_image_is_not_taken_for_flashed(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
     error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo, timeout_s=0.2))
@@ -245,6 +249,7 @@ def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased
     assert chip.done == ["halted after a reset", "programmed", debug_bits_cleared, "reset"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kilobytes", "package"), [(128, flashing.UFQFPN32), (256, 0x0B)], ids=["L432KB", "L433CC"])
 def test_another_part_of_the_family_is_refused_before_it_is_touched(kilobytes: int, package: int) -> None:
     chip = Chip(kilobytes, package)

@@ -61,6 +61,7 @@ def test_an_amended_certificate_names_the_customer_and_what_it_replaces(run: Pat
     assert "Sons &amp; Co" in page and "replaces RIG-1" in page and "room 3" in page
 
 
+@pytest.mark.slow
 def test_a_magnetometer_that_was_turned_over_is_certified_so(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     document = everything()
     write_result(document, run)

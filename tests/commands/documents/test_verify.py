@@ -128,6 +128,7 @@ def test_with_revocation_lists_it_can_be_checked_long_after(
     assert "was not revoked at that time" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", [PDF, XML])
 def test_one_signed_by_a_stranger_of_the_same_name_is_refused(file: str, lab: Laboratory) -> None:
     shutil.copy(lab.stranger / file, lab.folder / file)
@@ -139,6 +140,7 @@ def test_one_signed_by_a_stranger_of_the_same_name_is_refused(file: str, lab: La
         assert status == NOBODY_TRUSTED and set(names_of(said)) == {name}, said
 
 
+@pytest.mark.slow
 def test_two_certificates_at_once_are_each_beside_their_own_result(lab: Laboratory) -> None:
     shutil.copytree(lab.folder, lab.folder / "other")
     (lab.folder / "other" / RESULT).write_bytes(b"{}")
@@ -149,6 +151,7 @@ def test_two_certificates_at_once_are_each_beside_their_own_result(lab: Laborato
     assert whole == beside == set() and other == {"signer_not_trusted"} and forged == {"not_as_signed"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statements", "name"),
     [
@@ -172,11 +175,13 @@ def test_an_alteration_of_the_history_is_refused_by_name(statements: list[str], 
     assert main(["history", "verify", "--history", str(lab.history)]) == 1
 
 
+@pytest.mark.slow
 def test_one_of_an_unsigned_run_is_known_by_the_history_alone(lab: Laboratory) -> None:
     status, said = lab.verified(PAGE, RESULT)
     assert status == 0 and names_of(said) == [], said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["p12", "pem", "open pem"])
 def test_keys_come_from_files_under_a_passphrase_of_the_environment(
     form: str, lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -267,6 +272,7 @@ def test_an_address_of_a_token_with_a_pin_in_it_is_refused_and_not_repeated(
     assert "7391" not in ended.stderr + ended.stdout
 
 
+@pytest.mark.slow
 def test_what_cannot_be_signed_is_refused_before_anything_is_written(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

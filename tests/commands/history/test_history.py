@@ -91,6 +91,7 @@ def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.Cap
     assert "5 ok, 0 changed, 0 missing" in told(capsys, "verify")
 
 
+@pytest.mark.slow
 def test_a_result_that_was_changed_in_the_database_is_named(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     forge(year, "UPDATE run SET result = replace(result, '\"pass\"', '\"fail\"') WHERE id = 3")
     assert "changed: run 3, calibration 3: " in told(capsys, "verify", status=1)
@@ -115,6 +116,7 @@ def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.C
     assert "need 5 calibrations; there are 2" in " ".join(told(capsys, "G-1", "--since", late).split())
 
 
+@pytest.mark.slow
 def test_a_calibration_is_shown_and_compared(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "lies on bench in /runs/0" in told(capsys, "show", "1")
     assert json.loads(told(capsys, "show", "1", "--json"))["schema"] == "rig.result/1"
@@ -145,6 +147,7 @@ def test_a_wrong_entry_is_voided_not_deleted(year: str, capsys: pytest.CaptureFi
     assert document["trends"][0]["parameters"]["kx"]["calibrations"] == 11
 
 
+@pytest.mark.slow
 def test_what_was_never_entered_is_refused_by_name(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in (["nobody"], ["show", "7"], ["plot", "nobody"], ["compare", "1", "2"]):
         assert main(["history", *arguments]) == 2
@@ -190,6 +193,7 @@ def test_a_series_is_drawn(year: str, capsys: pytest.CaptureFixture[str]) -> Non
     assert all(Path(each).stat().st_size > 10_000 for each in drawn)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     for broken in (str(tmp_path / "file" / "history.sqlite"), f"postgresql://rig@/x?host={tmp_path}", "what://ever"):

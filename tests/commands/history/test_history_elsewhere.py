@@ -82,6 +82,7 @@ def test_a_certificate_is_noted_in_the_history_that_the_command_names(tmp_path: 
         assert len(next(history.kept()).certificates) == 1
 
 
+@pytest.mark.slow
 def test_a_spreadsheet_is_given_no_formulas(tmp_path: Path) -> None:
     texts = ('=HYPERLINK("http://192.0.2.1/")', "+1", "-1", "@SUM(A1)", "\tx", "\rx")
     with open_history(str(tmp_path / "history.sqlite")) as history:

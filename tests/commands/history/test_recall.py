@@ -17,6 +17,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return str(tmp_path / "history.sqlite")
 
 
+@pytest.mark.slow
 def test_the_calibrations_of_the_configured_serial_numbers_are_known_the_newest_first(place: str) -> None:
     with open_history(place) as history:
         for day, serial_number in ((0, "G-1"), (1, "G-2"), (2, "G-1"), (3, "G-1")):

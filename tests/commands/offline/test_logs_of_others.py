@@ -79,6 +79,7 @@ def test_bad_stamps_lose_nothing(
     assert ("on arrival" in str(found.get("notes"))) == (stamps.burst > 1), "and what was made of the stamps is said"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stamps", [Stamps(rounded_s=1e-3, lost=0.04), Stamps(burst=5, lost=0.04)])
 def test_real_losses_are_refused(stamps: Stamps, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     samples, sweeps = write_rates(tmp_path, swept(104), stamps)
@@ -224,6 +225,7 @@ def test_turns_that_count_by_their_mean_speed_are_told(tmp_path: Path, capsys: p
     assert "1 of 6 turns count by their mean speed, since the body moves before or after them: rows 3" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("knocks", "stamps", "counted"),
     [
@@ -256,6 +258,7 @@ def test_a_dwell_in_which_the_body_moves_is_named(tmp_path: Path, capsys: pytest
     assert "rank_deficient" in said and "1 of 6 rows, not_at_rest" in said and "the first row 2, from 14.5 s" in said
 
 
+@pytest.mark.slow
 def test_six_faces_tell_nothing_of_a_gyroscope_whose_log_has_gaps(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

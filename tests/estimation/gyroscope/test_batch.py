@@ -34,6 +34,7 @@ def one_by_one(means: Array, speeds: Array, weight: float | None = 1.0) -> Accum
     return accumulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeats", [1, 3])
 def test_batches_give_the_numbers_of_single_runs(repeats: int) -> None:
     means, speeds, _, _ = runs(40, repeats=repeats)
@@ -79,6 +80,7 @@ def test_one_bad_run_does_not_stop_the_others() -> None:
     np.testing.assert_allclose(solution.scale[[0, 3]], scale[[0, 3]], atol=0.01)
 
 
+@pytest.mark.slow
 def test_a_batch_agrees_with_a_loop_of_scipy() -> None:
     means, speeds, _, _ = runs(150)
     batch = newton_batch(means, speeds)

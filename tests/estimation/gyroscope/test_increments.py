@@ -89,6 +89,7 @@ def test_blocks_of_a_long_recording_join(monkeypatch: pytest.MonkeyPatch) -> Non
     assert parts.sensitivities == pytest.approx(whole.sensitivities, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_noise_and_a_walking_bias_scatter_as_theory_says() -> None:
     """Angle random walk N: N² T; a bias that is right at the start and walks by K: K² T³/3."""
     rng = np.random.default_rng(5)

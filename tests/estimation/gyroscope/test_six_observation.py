@@ -116,6 +116,7 @@ def test_algorithm_1_says_that_it_diverges() -> None:
     np.testing.assert_allclose(accumulated.solve().bias_rad_s, bias, rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bias", [SPEED / SCALE / np.sqrt(3), SPEED / SCALE * [1, 0, 0], np.array([30.0, -20.0, 10.0])])
 def test_a_bias_as_large_as_the_turn_is_solved_with_its_uncertainty(bias: Array) -> None:
     """‖K b‖ = ω makes Eq. (7) singular, and a sweep against such a bias reads almost zero."""

@@ -106,6 +106,7 @@ def test_every_covariance_is_that_of_repeated_calibrations() -> None:
     assert np.all(np.abs(np.mean(runs, axis=0) - everything(truth)) < 4 * np.sqrt(variances / 3000))
 
 
+@pytest.mark.slow
 def test_speeds_known_badly_are_in_the_covariance() -> None:
     std = SPEED * np.array([3e-3, 1e-4, 1e-3, 2e-3, 1e-3, 1e-3, *np.zeros(6)])
     truth = solve_vector_model(readings(), RATES, VARIANCES, speed_std_rad_s=std)

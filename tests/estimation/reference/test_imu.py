@@ -229,6 +229,7 @@ def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_told(design: Desi
     assert 0.5e-3 < np.sqrt(np.mean(crooked.found_rad**2)) < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", DENSITY_UG)
 def test_without_the_lever_arm_the_bias_of_sweeps_alone_is_wrong(part: str) -> None:
     """Six sweeps: with r and p, without r, and without both, as if the sensor sat on every axis."""

@@ -47,6 +47,7 @@ def refused(**what: object) -> bool:
     return not seen(method="maximum_likelihood", **what).uniform.uniform  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_room_with_a_gradient_and_an_arm_of_iron_are_refused_in_every_seed() -> None:
     for seed in range(SEEDS):
         assert refused(seed=seed, site={"magnetic_gradient_ut_m": gradient(seed, GRADIENT_UT_M)})
@@ -66,6 +67,7 @@ def biases(*runs: Seen) -> tuple[np.ndarray, ...]:
 ALONG = [{**HOUSING, "moment_a_m2": [0.0, 0.0, 0.06]}]
 
 
+@pytest.mark.slow
 @pytest.mark.proof
 def test_turning_over_recovers_the_bias_that_one_mounting_has_wrong(thorough: bool) -> None:
     for seed in range(SEEDS if thorough else FEW):

@@ -34,6 +34,7 @@ def readings(r: Array, rates: Array | None = None, theta: Array = THETA) -> Arra
     return predicted(theta, r, np.zeros((len(r), 3)) if rates is None else rates)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_the_published_gyroscope_is_found_from_25_hz_samples(method: EqualWeights) -> None:
     r, rates = swinging(600)  # ten minutes
@@ -80,6 +81,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, s
     assert np.all(np.abs(found.mean(axis=0) - THETA) < 0.1 * std)
 
 
+@pytest.mark.slow
 def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() -> None:
     r, rates = swinging(40)
     rates = 0.02 * rates  # ten times the noise that TRIAX reports of single samples

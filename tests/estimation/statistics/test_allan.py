@@ -75,6 +75,7 @@ def test_random_walk_from_an_hour_is_within_three_of_its_standard_deviations() -
     assert 0.7 < np.sqrt(np.mean((found - 1) ** 2)) / stated.std < 1.3
 
 
+@pytest.mark.slow
 def test_the_bounds_hold_the_truth_as_often_as_they_say() -> None:
     """White noise of ten minutes, at every τ that it tells."""
     hits = []

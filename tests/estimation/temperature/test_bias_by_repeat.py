@@ -35,6 +35,7 @@ def test_every_bias_is_found_within_its_uncertainty() -> None:
     assert 0.9 < np.sqrt(np.mean(errors**2)) / stated < 1.05
 
 
+@pytest.mark.slow
 def test_a_jump_is_named_at_its_repeat() -> None:
     """Of five standard deviations of one repeat, on one axis: in 95 % and more, wherever it is."""
     named = [
@@ -44,6 +45,7 @@ def test_a_jump_is_named_at_its_repeat() -> None:
     assert np.mean(named) >= 0.95
 
 
+@pytest.mark.slow
 def test_a_steady_bias_is_hardly_ever_said_to_have_moved() -> None:
     moved = [bool(found(np.zeros((REPEATS, 3)), 1000 + seed).moves) for seed in range(450)]
     assert np.mean(moved) <= FALSE_ALARM

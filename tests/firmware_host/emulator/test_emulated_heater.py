@@ -106,6 +106,7 @@ def reset(times: int) -> None:
         start(session)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("happens", [killed, overheated, reset], ids=lambda happens: str(happens.__name__))
 def test_the_heater_goes_off_by_itself(happens: Callable[[int], None]) -> None:
     happens(2)

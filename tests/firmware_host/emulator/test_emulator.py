@@ -58,6 +58,7 @@ def test_nothing_happens_before_power_up() -> None:
     assert session.board.baud_rate == pytest.approx(BAUD_RATE, rel=0.003)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [14.9, 119.0, 238.0, 952.0])
 def test_samples_are_one_data_period_apart_on_the_board_clock(rate_hz: float) -> None:
     session = Session()
@@ -187,6 +188,7 @@ def test_an_unmodelled_register_fails_by_name(tmp_path: Path) -> None:
     assert "in function usart_init" in error.what
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "statement", "what"),
     [
@@ -302,6 +304,7 @@ def test_a_kicked_watchdog_does_not(tmp_path: Path) -> None:
 # --- exceptions
 
 
+@pytest.mark.slow
 def test_interrupts_preserve_floating_point_work(tmp_path: Path) -> None:
     source = """
         volatile float disturbed;
@@ -336,6 +339,7 @@ def test_interrupts_preserve_floating_point_work(tmp_path: Path) -> None:
     assert disturbed[:4] == undisturbed[:4]
 
 
+@pytest.mark.slow
 def test_the_higher_priority_preempts_and_the_equal_waits(tmp_path: Path) -> None:
     source = """
         void pendsv(void) { put('p'); REG(0xE000ED04) = 1u << 26; put('q'); }
@@ -377,6 +381,7 @@ def test_a_masked_interrupt_wakes_the_core_and_runs_once_unmasked(tmp_path: Path
     assert sent == b"wsm"
 
 
+@pytest.mark.slow
 def test_a_byte_that_arrives_is_an_interrupt(tmp_path: Path) -> None:
     board = tiny_firmware.board(
         """
@@ -489,6 +494,7 @@ def test_the_wrong_spi_mode_is_refused(tmp_path: Path) -> None:
     assert caught.value.name == "spi_setup"
 
 
+@pytest.mark.slow
 def test_a_part_is_deselected_only_when_the_last_bit_is_over(tmp_path: Path) -> None:
     board = board_with_gyro(_ASK_THE_GYRO.format(control=_MODE_3_AT_625_KHZ, after=_AWAIT_QUIET), tmp_path)
     board.advance(0.001)

@@ -93,6 +93,7 @@ def test_an_erased_page_is_all_ones_and_its_neighbours_stay(tmp_path: Path) -> N
     assert one.flash.torn == set()
 
 
+@pytest.mark.slow
 def test_the_core_stands_still_while_the_flash_works(tmp_path: Path) -> None:
     """Twenty milliseconds of a one-millisecond timer: its handler runs once, at the end."""
     board = chip(
@@ -121,6 +122,7 @@ def test_the_core_stands_still_while_the_flash_works(tmp_path: Path) -> None:
     assert program_us == pytest.approx(82, abs=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "status"),
     [

@@ -118,6 +118,7 @@ def test_too_much_saturates(part: DataSheet) -> None:
 vectors = st.tuples(*[st.floats(-3, 3)] * 3)
 
 
+@pytest.mark.slow
 @every_part
 @settings(max_examples=20)
 @given(vectors, st.tuples(*[st.floats(0.7, 1.3)] * 3), st.tuples(*[st.floats(-0.2, 0.2)] * 3))

@@ -65,6 +65,7 @@ def test_nothing_can_be_written_outside_of_an_operation(operation: str, tmp_path
     assert caught.value.name == "flash_locked"
 
 
+@pytest.mark.slow
 def test_a_torn_doubleword_is_told_each_time_and_hides_no_other(tmp_path: Path) -> None:
     body = """
         for (int i = 0; i < 2; i++) put(port_flash_read(0, 0, bytes, 8));
@@ -85,6 +86,7 @@ def test_a_torn_doubleword_is_told_also_where_the_chip_has_lost_the_flag_of_it(t
     assert run(body, tmp_path, torn=frozenset({FIRST_RECORD}), flags_lost=True)[0] == [0, 1, 1, 1]
 
 
+@pytest.mark.slow
 def test_torn_flash_that_something_else_reads_is_not_taken_for_the_stores(tmp_path: Path) -> None:
     read_before = "port_flash_read(1, 0, bytes, 8);"  # and is over
     read = f"(void)REG({0x0800_0000 + FIRST_RECORD:#x});"

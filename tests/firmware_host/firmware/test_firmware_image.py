@@ -126,6 +126,7 @@ def test_every_line_of_the_register_header_is_the_makers(name: str, value: str) 
     check_of(name)(name, value)
 
 
+@pytest.mark.slow
 def test_the_register_header_has_nothing_the_port_does_not_use() -> None:
     sources = "".join(path.read_text() for path in PORT.glob("*.c")) + HEADER
     sources = re.sub(r"GPIO##\w+##(\w+)", r"GPIOA\1 GPIOB\1", sources)  # by the table of parts

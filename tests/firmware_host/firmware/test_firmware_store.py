@@ -196,6 +196,7 @@ def test_two_cuts_in_a_row_leave_what_was_there_or_the_newest(flash: HostFlash) 
                 assert after_first is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", range(1, 4))
 def test_a_cut_in_an_erase_leaves_the_newest_record_or_none_but_no_older_one(flash: HostFlash, before: int) -> None:
     for lasts in range(2):
@@ -284,6 +285,7 @@ def test_a_write_forgets_the_old_record_once_the_new_one_is_whole_so_that_no_old
     assert flash.contents(1)[: len(slot(8, new))] == slot(8, new), "a new record stays beside the newest"
 
 
+@pytest.mark.slow
 @of_before
 def test_a_cut_while_the_first_record_of_today_is_written_leaves_the_old_one_or_the_new(
     flash: HostFlash, made: Made

@@ -156,6 +156,7 @@ def test_a_gap_in_the_samples_is_named(tmp_path: Path) -> None:
         read_with(tmp_path, lambda lines: [*lines[:100], *lines[120:]])
 
 
+@pytest.mark.slow
 def test_a_missing_direction_leaves_the_vector_model_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """With the rests, five sweeps about known axes are enough for it; the six-observation solvers refuse."""
     sweeps = edited(tmp_path, "sweeps.csv", lambda lines: [line for line in lines if ",0,-1,0," not in line])

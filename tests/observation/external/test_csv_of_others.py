@@ -30,6 +30,7 @@ def read(path: Path, mapped: Mapped | None = None) -> np.ndarray:
     return np.column_stack([samples.time_s, samples.readings[RATE]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "as_written",
     [
@@ -54,6 +55,7 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
     assert read(written(tmp_path, text.encode(encoding)), mapped) == pytest.approx(NUMBERS * factors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "says"),
     [
@@ -73,6 +75,7 @@ def test_what_cannot_be_read_says_what_is_the_matter(tmp_path: Path, content: by
         read(written(tmp_path, content))
 
 
+@pytest.mark.slow
 def test_a_packed_file_is_as_long_as_what_it_holds(tmp_path: Path) -> None:
     packed = gzip.compress((PLAIN + "3,0,0,0\n" * 200_000).encode(), mtime=0)
     assert len(packed) < 10_000

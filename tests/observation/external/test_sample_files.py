@@ -103,6 +103,7 @@ def test_a_session_solves_to_the_same_numbers_from_all_three(tmp_path: Path) -> 
     assert log == pytest.approx(csv, rel=1e-6, abs=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transform", [False, True])
 def test_attitudes_come_from_poses_in_the_same_bag(transform: bool, tmp_path: Path) -> None:
     table = dict(read_columns(EXAMPLES / "swinging_samples.csv", samples_header(), 256))
@@ -122,6 +123,7 @@ def test_attitudes_come_from_poses_in_the_same_bag(transform: bool, tmp_path: Pa
     assert samples.readings[RATE] == pytest.approx(read, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_what_is_not_in_a_file_is_said_with_what_is(tmp_path: Path) -> None:
     table = {TIME: np.arange(5) * 0.01, **{name: np.zeros(5) for name in RATE.columns}}
     write_bag(tmp_path / "bag", table)
@@ -168,6 +170,7 @@ def mcap(path: Path, *, not_measured: float = 0.0, without_rate: int = 0) -> Pat
     return path
 
 
+@pytest.mark.slow
 def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: Path) -> None:
     bag, damage = mcap(tmp_path / "bag"), np.random.default_rng(1)
     (file,) = bag.glob("*.mcap")
@@ -184,11 +187,13 @@ def test_a_damaged_bag_is_refused_by_name_whatever_its_parser_ends_in(tmp_path: 
     assert refused > 6
 
 
+@pytest.mark.slow
 def test_a_reading_that_was_not_measured_is_named_in_a_bag_too(tmp_path: Path) -> None:
     with pytest.raises(Refused, match=r"not_a_number: .*bag has 1 samples whose z_rad_s .*the first is sample 41"):
         read_samples(mcap(tmp_path / "bag", not_measured=float("nan")))
 
 
+@pytest.mark.slow
 def test_messages_of_a_bag_that_hold_no_rate_by_their_covariance_are_no_samples(tmp_path: Path) -> None:
     samples = read_samples(mcap(tmp_path / "some", without_rate=30))
     assert samples.readings[RATE][:, 0] == pytest.approx(0.1 * np.arange(30, 100)), "its driver was not ready before"

@@ -73,6 +73,7 @@ def seen(pdf: bytes, trust: list[bytes]) -> Looked:
     return looked_at("certificate.pdf", pdf, Trust(tuple(trust)))
 
 
+@pytest.mark.slow
 def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     looked = seen(made, signing.trust)
@@ -97,6 +98,7 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
         assert status.intact and status.trusted is clear
 
 
+@pytest.mark.slow
 def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
     made = signing.signed(revocation_list(signing.authority))
     own = signing.laboratory.chain[0].public_bytes(Encoding.DER)
@@ -105,6 +107,7 @@ def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) 
         assert [problem.name for problem in looked.problems] == problems and not looked.signatures[0].long_term
 
 
+@pytest.mark.slow
 def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
     made = bytearray(signing.signed(revocation_list(signing.authority)))
     reader = PdfFileReader(io.BytesIO(bytes(made)))
@@ -113,6 +116,7 @@ def test_a_byte_of_a_list_cannot_be_changed_unnoticed(signing: Signing) -> None:
     assert [each.name for each in seen(bytes(made), signing.trust).problems] == ["not_as_signed", "signer_not_trusted"]
 
 
+@pytest.mark.slow
 def test_what_no_list_clears_is_not_signed(signing: Signing) -> None:
     revoked = revocation_list(signing.authority, signing.laboratory)
     expired = revocation_list(signing.authority, days=(-9, -2))

@@ -173,6 +173,7 @@ def shown(capsys: pytest.CaptureFixture[str], *options: str) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFixture[str]) -> None:
     short, budget, checks = (shown(capsys, *each) for each in ([], ["--budget"], ["--checks"]))
     assert short.splitlines()[0].startswith("gyroscope gyro ") and len(short.splitlines()) <= 12

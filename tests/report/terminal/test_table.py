@@ -38,6 +38,7 @@ def test_the_checks_say_what_was_not_measured_and_what_was_not_set() -> None:
     assert any(" verification_rms " in row and "not set" in row and "FAILED" in row for row in rows)
 
 
+@pytest.mark.slow
 def test_a_serial_number_is_no_markup_and_no_command_to_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     assert SENSOR.board is not None
     board = SENSOR.board.model_copy(update={"not_observed": (HOSTILE,)})

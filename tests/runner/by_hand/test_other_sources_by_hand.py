@@ -160,6 +160,7 @@ def problems(source: str, *changes: dict[str, Any]) -> str:
     return "\n".join(caught.value.problems)
 
 
+@pytest.mark.slow
 def test_a_clock_that_nobody_vouches_for_is_refused() -> None:
     unsaid = document("autopilot")
     unsaid.pop("uncertainty")

@@ -5,7 +5,6 @@ import fcntl
 import functools
 import os
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from support.parts.adis16465 import Adis16465Registers
 from support.parts.lsm9ds1 import Lsm9ds1Registers
 from support.parts.lsm9ds1_magnetometer import Lsm9ds1MagnetometerRegisters
 from support.parts.mpu9250 import Mpu9250Registers
-from support.paths import FIRMWARE
+from support.paths import FIRMWARE, ROOT
 
 PERIOD_US = 4202  # 238 Hz
 SETTLING = 8  # conversions of the LSM9DS1 thrown away after a configure
@@ -31,11 +30,11 @@ _LINE = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint)
 
 @functools.cache
 def core() -> ctypes.CDLL:
-    """The core, built once a test run, with undefined behaviour ending the process.
+    """The core, built when its sources have changed, with undefined behaviour ending the process.
 
     With RIG_COVERAGE in the environment it is built there and notes which lines run: `make coverage` reads that.
     """
-    out = os.environ.get("RIG_COVERAGE") or tempfile.mkdtemp(prefix="rig_host_")
+    out = os.environ.get("RIG_COVERAGE") or ROOT / "build" / "host"
     Path(out).mkdir(parents=True, exist_ok=True)
     with Path(out, "building").open("w") as lock:  # tests that run side by side build it once
         fcntl.flock(lock, fcntl.LOCK_EX)

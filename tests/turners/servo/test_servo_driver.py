@@ -157,6 +157,7 @@ def test_a_state_that_nobody_takes_stops_the_shaft() -> None:
         assert abs(wire.rate_rad_s) < STANDS_RAD_S
 
 
+@pytest.mark.slow
 def test_one_program_at_a_time_has_the_port() -> None:
     with servo_on_a_wire(pty=True) as wire, Servo(wire.port, MODEL, clock=wire.clock):
         with pytest.raises(Refused) as refused, Servo(wire.port, MODEL, clock=wire.clock):

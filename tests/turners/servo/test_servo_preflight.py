@@ -85,6 +85,7 @@ def test_a_port_that_is_not_there_is_refused_by_name(tmp_path: Path) -> None:
     assert refused.value.name == "no_servo_port"
 
 
+@pytest.mark.slow
 def test_a_board_too_far_from_the_shaft_is_refused() -> None:
     with servo_on_a_wire() as wire, Servo(wire.port, MODEL, clock=wire.clock) as servo:
         report = servo.report()

@@ -147,6 +147,7 @@ def test_an_arm_that_cannot_be_told_is_not_moved(world: World, seen: ArmReport) 
     assert names(ARM, replace(closed, called=None, kinematics=seen.kinematics)) == []  # made as a UR10e is
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot_type", "model"), [(3, "UR3e"), (4, "UR16e"), (9, "UR15"), (12, "arm of type 12")])
 def test_the_maker_has_other_sizes_which_are_refused_by_type(seen: ArmReport, robot_type: int, model: str) -> None:
     assert seen.setup is not None
@@ -155,6 +156,7 @@ def test_the_maker_has_other_sizes_which_are_refused_by_type(seen: ArmReport, ro
     assert model_found(told) == model
 
 
+@pytest.mark.slow
 def test_lengths_decide_where_the_type_is_right(seen: ArmReport) -> None:
     assert seen.kinematics is not None
     shorter = replace(seen.kinematics, a_m=(0.0, -0.4784, -0.36, 0.0, 0.0, 0.0))
@@ -162,6 +164,7 @@ def test_lengths_decide_where_the_type_is_right(seen: ArmReport) -> None:
     assert names(BY_NOMINAL, replace(seen, kinematics=shorter)) == []  # what is reckoned with is the drawing's
 
 
+@pytest.mark.slow
 def test_a_factorys_calibration_is_still_a_ur10e_wherever_its_axes_meet(seen: ArmReport) -> None:
     """A UR10e whose axes are off by half a millimetre and a milliradian, in the parameters of its own axes.
 
@@ -216,6 +219,7 @@ def told_by(key: ModelName, told: ArmReport) -> ArmReport:
     return replace(told, version=world.polyscope, called=world.name, setup=setup, kinematics=drawing)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinematics", ["controller", "nominal"])
 def test_no_arm_is_taken_for_another(kinematics: str) -> None:
     """Of all pairs of a configured model and an arm that answers, with and without its primary interface's account."""
@@ -238,6 +242,7 @@ def test_the_refusal_names_both_arms() -> None:
     assert "arm.model" in problem.remedy
 
 
+@pytest.mark.slow
 def test_no_arm_is_still_no_arm() -> None:
     with pytest.raises(Refused, match="no arm answers"):
         look("127.0.3.249")

@@ -50,6 +50,7 @@ def said(body: bytes) -> bytes:
     return JSON % (len(body), body)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("answer", "remote"),
     [
@@ -116,6 +117,7 @@ def order_to(host: str, version: tuple[int, ...], timeout_s: float) -> Order:
 X_WITHOUT_API, X, SERIES_5 = (10, 10, 0, 0), (10, 12, 0, 0), (5, 14, 0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("states", [b"", state(False), b"Connected: Universal Robots Dashboard Server\n"])
 def test_a_primary_interface_that_does_not_tell_confirms_no_stop(states: bytes) -> None:
     with saying(PRIMARY_PORT, [states]) as (host, _):
@@ -152,6 +154,7 @@ def dashboard(answer: str, running: bytes = b"true") -> list[bytes]:
     return [b"Connected: Universal Robots Dashboard Server\n" + answer.encode() + b"\n" + RUNS % running]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("version", "port", "answers", "refusal"),
     [

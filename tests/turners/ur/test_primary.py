@@ -95,6 +95,7 @@ def test_all_are_found_among_other_packages_in_whatever_state_they_come_and_howe
         assert read_account(HOST, 5.0) == Account(CALIBRATED, TURNED, UR3E)
 
 
+@pytest.mark.slow
 def test_a_controller_that_does_not_tell_is_none() -> None:
     with saying(package(16, package(0, b"mode")), package(16, package(5, b"an older layout"))):
         assert read_account(HOST, 0.3) == Account()
@@ -108,6 +109,7 @@ def test_what_one_package_tells_holds_without_the_other() -> None:
         assert read_account(HOST, 0.3) == Account(tcp_offset=TURNED)
 
 
+@pytest.mark.slow
 def test_an_arm_that_no_number_describes_is_not_told() -> None:
     nowhere = replace(UR3E, limits=replace(UR3E.limits, speed_rad_s=(float("nan"),) * 6))
     with saying(package(16, configuration(nowhere) + configuration(UR3E)[:100])):

@@ -217,6 +217,7 @@ def test_a_state_that_no_arm_is_in_is_given_up_by_its_own_name(
     assert said in stream.problem.what, stream.problem.what
 
 
+@pytest.mark.slow
 def test_an_arm_in_an_impossible_state_from_the_first_is_refused_so(controllers: Controllers) -> None:
     bad = values(1)
     bad[5] = float("nan")
@@ -276,6 +277,7 @@ def test_states_at_any_rate_follow_each_other(rate_hz: float) -> None:
     assert [clock_step(a, b, 1 / rate_hz, 0.0) for a, b in pairwise(times_s)] == [None] * 99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("answers", "said"),
     [
@@ -296,6 +298,7 @@ def test_a_controller_that_sends_no_states_is_an_error_that_says_why(
         StateStream(controllers(**answers).host, 125.0, 0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "unknown"),
     [

@@ -61,6 +61,7 @@ def test_there_is_no_register_of_which_the_maker_s_table_knows_nothing(model: st
     assert spare == set()
 
 
+@pytest.mark.slow
 def test_a_negative_position_comes_as_two_s_complement_and_the_block_in_one_packet() -> None:
     with client(ServoTruth(settings=FAST | {"Homing Offset": -1000}, start_deg=1.0)) as (port, packets, _):
         position, *_ = packets.read4ByteTxRx(port, 1, 132)
@@ -111,6 +112,7 @@ def test_an_echo_is_skipped_by_the_client() -> None:
         assert packets.read2ByteTxRx(port, 1, 0) == (1020, 0, 0)
 
 
+@pytest.mark.slow
 def test_another_baud_rate_is_silence() -> None:
     with client(ServoTruth(settings=FAST | {"Baud Rate": 1}), patience_ms=200.0) as (port, packets, _):
         assert packets.ping(port, 1)[1] in (NO_REPLY, CORRUPT)

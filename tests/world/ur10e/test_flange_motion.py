@@ -45,6 +45,7 @@ def chain(q: Array) -> tuple[Array, Array]:
     return place[:3, :3], place[:3, 3]
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(angles, speeds, speeds, st.tuples(*[st.floats(-0.1, 0.1)] * 3))
 def test_rate_and_force_are_the_derivatives_of_the_path_among_the_stars(

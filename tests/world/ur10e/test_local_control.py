@@ -48,6 +48,7 @@ ORDERS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_dashboard_refuses_every_order_and_answers_questions(order: str) -> None:
     robot = playing()

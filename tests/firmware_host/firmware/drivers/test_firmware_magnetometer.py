@@ -185,6 +185,7 @@ def test_a_part_that_signals_but_no_longer_answers_is_named(board: HostBoard) ->
     assert [error_of([f]) for f in errors] == ["sensor_absent"]
 
 
+@pytest.mark.slow
 def test_the_image_reads_the_emulated_die_on_its_own_select_and_line() -> None:
     """80 Hz beside the gyroscope's 238, exactly counted, in the field that is there."""
     session = Session(parts=("lsm9ds1", "lsm9ds1_magnetometer"), boot_time_s=0.0)
