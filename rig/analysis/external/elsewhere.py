@@ -12,7 +12,7 @@ from rig.analysis.estimators import ESTIMATORS, Estimator, estimator_among
 from rig.analysis.external.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.external.increments import InIncrements
 from rig.analysis.external.left_out import notes_on_reading, notes_on_turns, omitted_in_attitudes
-from rig.analysis.external.sweeps_agree import check_agree, contradiction, counted, rows_left
+from rig.analysis.external.sweeps_agree import check_agree, counted, noise_freedom, sweep_errors
 from rig.analysis.gyroscope.calibration import (
     ALGORITHM_1,
     NEWTON,
@@ -36,7 +36,7 @@ from rig.estimation.gyroscope.estimate import Estimate
 from rig.estimation.gyroscope.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.estimation.reference import triaxial
-from rig.estimation.reference.reference_budget import fewest_freedom, scale_and_bias_covariance
+from rig.estimation.reference.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference.reference_model import BIAS as OFFSET
 from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD
@@ -189,29 +189,28 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
-    """What its covariance is made of: of means nothing but their scatter."""
+    """What its covariance is made of: of means their scatter, and the errors of the motion that is stated of them."""
     if data.turned is None or not isinstance(solution, TurnedSolution):
-        freedom, whole = _noise_freedom(solution, data), solution.covariance
-        more = contradiction(solution, data) if isinstance(solution, VectorSolution) else 1.0
-        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, whole / more**2)
-        if more == 1 or not isinstance(solution, VectorSolution):
+        vector = solution if isinstance(solution, VectorSolution) else _vector(data)
+        more, covariance = sweep_errors(vector, data), solution.covariance
+        freedom = noise_freedom(vector, data) if vector is solution else _fewest_of_means(data)
+        if more is not None and vector is solution:
+            covariance = covariance - more.covariance
+        noise = Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, covariance)
+        if more is None:
             return Budget((noise,))
-        beyond, left = whole - noise.covariance, float(max(rows_left(data), 1))
-        return Budget((noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, left, beyond)))
+        return Budget(
+            (noise, Contributor(SWEEPS, "A", "normal", None, "", FROM_RESIDUALS, more.freedom, more.covariance))
+        )
     known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
     known |= dict.fromkeys((known_turns.ENDS, known_turns.AXES), solution.widened_freedom)
     lines = solution.budget.contributors
     return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
 
 
-def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
-    """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
-    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
-    freedom = by_axis(each.freedom for each in averages)
-    if not isinstance(solution, VectorSolution):
-        return float(freedom.min())
-    variances = np.array([each.variance_rad2_s2 for each in averages])
-    return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
+def _fewest_of_means(data: ExternalData) -> float:
+    """The fewest degrees of freedom that the noise of any mean is known with."""
+    return float(by_axis(each.freedom for each in [*(sweep.average for sweep in data.sweeps), *data.rests]).min())
 
 
 def _vector(data: ExternalData) -> VectorSolution:

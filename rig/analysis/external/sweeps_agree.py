@@ -1,20 +1,26 @@
-"""Whether the sweeps of somebody else's file agree with each other, and what it costs where they do not."""
+"""Whether the sweeps of another laboratory's file agree with each other, and what their errors do to the solution."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix
+from rig.estimation.gyroscope.stated_motion import MotionErrors, StatedMotion, motion_errors
+from rig.estimation.gyroscope.vector_model import VectorSolution, design_matrix, places, regress
+from rig.estimation.reference.reference_budget import fewest_freedom
+from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
+from rig.estimation.statistics.coverage import coverage_factors, effective_freedom
 from rig.observation.external.csv_import import ExternalData
+from rig.observation.statistics.mean import by_axis
 
 WRONG = 0.1  # of a sweep's rate, by which the others put it elsewhere: no table is that far off, a wrong row is
 BEYOND_NOISE = 6.0  # standard deviations of its mean
 TOLD = 0.05  # of a row that the others tell at least: else nothing can contradict it
 SAME_AXIS = 0.9  # cosine of two rows' axes, either way
-CHANCE = 4.5  # standard deviations that one of some dozens of means may be off by chance
-BY_CHANCE = 0.01  # of sound files leave as much in all, of all their means
+CHANCE = 4.0  # standard deviations that one of some dozens of means may be off by chance
+FEWEST_FREEDOM = 3  # with fewer, the next coarser whole number alone would make U half as large again
+BISECTIONS = 30
 
 
 def check_agree(solution: VectorSolution, data: ExternalData) -> None:
@@ -50,25 +56,57 @@ def _named(worst: int, data: ExternalData) -> str:
     return f"sweep {data.sweeps[worst].sweep} contradicts the others"
 
 
-def contradiction(solution: VectorSolution, data: ExternalData) -> float:
-    """How many times its noise the worst of the means contradicts the others by; 1 where chance may explain it.
+@dataclass(frozen=True, slots=True)
+class SweepErrors:
+    """What errors of the stated motion add to a solution's covariances, and with how many degrees of `freedom`.
 
-    Not their mean square, which only tells whether it is chance: one wrong row among twelve is hidden in that, and is
-    all that two sweeps of an axis tell.
+    `covariance` (6, 6) of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6) as in
+    `VectorSolution`, so that twice a standard uncertainty is U.
+    """
+
+    covariance: Array
+    matrix_covariance: Array
+    angles_covariance_rad2: Array
+    freedom: float
+
+
+def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | None:
+    """Return what the errors of the stated motion do to the vector model's `solution`.
+
+    None for means that polynomials have taken to one temperature: these count how the repeats contradict each other.
     """
     if data.at_reference:
-        return 1.0
-    from scipy.special import chdtri
+        return None
+    means, variances, design = _equations(data)
+    stated = StatedMotion.of(solution.residuals_rad_s, design[:, :3], variances, solution.matrix)
+    sizes = motion_errors(stated)
+    gain = _gain(design, means, variances)
+    noise = np.einsum("qni,ni->qni", gain, np.sqrt(variances)).reshape(12, -1)
+    by_rate = np.einsum("qni,ni->qn", gain, stated.rate_patterns)
+    by_axis = np.einsum("qni,kni->qkn", gain, stated.axis_patterns).reshape(12, -1)
+    own = np.einsum("qni,ni->qn", gain, _beyond_chance(stated, sizes, design))
+    axes = SensorAxes.of(solution.matrix)
+    to_angles = np.hstack([axes.to_angles, np.zeros((6, 3))])
+    rate_variance, axis_variance = sizes.median_variances
 
-    _, variances, design = _equations(data)
-    worst, chi_square, freedom = 1.0, 0.0, 3 * rows_left(data)
-    for left, variance in zip(solution.residuals_rad_s.T, variances.T, strict=True):
-        weighted = design / np.sqrt(variance)[:, None]
-        told = 1 - np.einsum("ij,ji->i", weighted, np.linalg.pinv(weighted))
-        worst = max(worst, float((np.abs(left) / np.sqrt(variance * np.maximum(told, TOLD))).max()))
-        chi_square += float(np.sum(left**2 / variance))
-    chance = freedom <= 0 or chi_square <= float(chdtri(freedom, BY_CHANCE))
-    return 1.0 if chance and worst <= CHANCE else worst
+    def added(to_values: Array, freedom: float, noise_freedom: float) -> Array:
+        """The covariance (q, q) that makes U of values, by their derivatives (q, 12), what it is over all sizes."""
+        of_noise, of_rate, of_axis, of_own = (
+            to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, own)
+        )
+        expanded = sizes.expanded(np.diag(of_noise + of_own), np.diag(of_rate), np.diag(of_axis))
+        beyond = rate_variance * of_rate + axis_variance * of_axis + of_own
+        std = _std_beside(np.sqrt(np.diag(of_noise)), expanded, noise_freedom, freedom)
+        stretch = std / np.sqrt(np.maximum(np.diag(beyond), np.finfo(np.float64).tiny))
+        return np.asarray(stretch[:, None] * beyond * stretch, dtype=np.float64)
+
+    freedom = float(max(rows_left(data), FEWEST_FREEDOM))
+    return SweepErrors(
+        covariance=added(parameter_jacobian(solution.matrix, axes.scale), freedom, noise_freedom(solution, data)),
+        matrix_covariance=added(np.eye(12), np.inf, np.inf),
+        angles_covariance_rad2=added(to_angles, np.inf, np.inf),
+        freedom=freedom,
+    )
 
 
 def rows_left(data: ExternalData) -> int:
@@ -79,15 +117,60 @@ def rows_left(data: ExternalData) -> int:
     return len(data.sweeps) + len(data.rests) - 4
 
 
+def noise_freedom(solution: VectorSolution, data: ExternalData) -> float:
+    """Return the noise's fewest degrees of freedom, by how the vector model weighs the means."""
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    variances = np.array([each.variance_rad2_s2 for each in averages])
+    freedom = by_axis(each.freedom for each in averages)
+    return fewest_freedom(solution.response.reshape(6, -1), variances.ravel(), freedom.ravel())
+
+
 def counted(solution: VectorSolution, data: ExternalData) -> VectorSolution:
-    """The solution with what the sweeps contradict each other by in its covariances."""
-    more = contradiction(solution, data) ** 2
+    """Return the solution with the errors of the stated motion in its covariances."""
+    more = sweep_errors(solution, data)
+    if more is None:
+        return solution
     return replace(
         solution,
-        covariance=more * solution.covariance,
-        matrix_covariance=more * solution.matrix_covariance,
-        angles_covariance_rad2=more * solution.angles_covariance_rad2,
+        covariance=solution.covariance + more.covariance,
+        matrix_covariance=solution.matrix_covariance + more.matrix_covariance,
+        angles_covariance_rad2=solution.angles_covariance_rad2 + more.angles_covariance_rad2,
     )
+
+
+def _gain(design: Array, means: Array, variances: Array) -> Array:
+    """(12, N, 3) derivative of F, row by row, then c, with respect to each mean reading."""
+    _, inverse = regress(design, means, variances)  # (3, 4, N)
+    of_matrix, _ = places(4)
+    gain = np.zeros((3, 4, len(means), 3))
+    for axis in range(3):
+        gain[axis, :, :, axis] = inverse[axis]
+    return np.asarray(gain.reshape(12, len(means), 3)[of_matrix], dtype=np.float64)
+
+
+def _beyond_chance(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
+    """(N, 3) by how much each sweep contradicts the others, where that is farther than errors of these sizes explain.
+
+    One wrong row among many makes the sizes little larger, and is all that two sweeps about an axis tell.
+    """
+    rate_variance, axis_variance = sizes.median_variances
+    spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
+    told = np.maximum(1 - np.einsum("ij,ji->i", design, np.linalg.pinv(design)), TOLD)[:, None]
+    off = np.abs(stated.residuals_rad_s) / np.sqrt(told * (stated.variances_rad2_s2 + spread))
+    beyond: Array = np.where(off.max(axis=1, keepdims=True) > CHANCE, stated.residuals_rad_s / told, 0.0)
+    return beyond
+
+
+def _std_beside(known: Array, expanded: Array, known_freedom: float, freedom: float) -> Array:
+    """(q,) standard uncertainties that, beside those `known` (q,), make U = k u as large as `expanded` (q,)."""
+    low, high = np.zeros(len(known)), expanded.copy()
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        variances = np.array([known**2, middle**2])
+        factors = coverage_factors(effective_freedom(variances, np.array([[known_freedom], [freedom]])))
+        small = factors * np.sqrt(variances.sum(axis=0)) < expanded
+        low, high = np.where(small, middle, low), np.where(small, high, middle)
+    return high
 
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
