@@ -1,4 +1,4 @@
-"""What a gyroscope read in the rests in which the arm stood still."""
+"""Averages of a gyroscope's readings in the rests in which the arm stood still."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
@@ -8,40 +8,40 @@ import numpy as np
 
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.average import Average, Stream, averaged, between
+from rig.observation.average import Average, Stream, between, build_average
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.statistics.beside_lines import mean_of_standing
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Window, rested
 
-REST_SETTLING_S = 0.2  # kept away from either end of a rest
+REST_SETTLING_S = 0.2  # cut off at either end of a rest
 MIN_SAMPLES_AT_REST = 20
-MIN_RESTS = 3  # to tell whether the bias drifts
+MIN_RESTS = 3  # the fewest that show a drift of the bias
 
 
-def rests_of(
+def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Average the rests in which the arm stood still for long enough, but those beside a step in `superseded`.
+    """Average the rests in which the arm stood still for long enough, except those next to a step in `superseded`.
 
-    An arm that swings where it stands does so in what its encoders tell and in what the sensor reads, by `response`
-    (3, 3) of that: the means are those of an arm that does not.
+    An arm that oscillates at rest does so in its encoders and, by `response` (3, 3), in the sensor's readings. The
+    means are corrected for this oscillation.
     """
-    rests = (_rest(stream, motion, window, response) for window in rested(run, superseded))
+    rests = (_average_rest(stream, motion, window, response) for window in rested(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
-def standing(motion: ArmMotion, rest: Window) -> Window | None:
-    """Return a rest without its beginning and its end; None if the arm moved in it or too few states tell."""
+def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
+    """Return a rest without its beginning and end; None if the arm moved in it or too few states cover it."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.moved_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
 
 
 def still_samples(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
-    """Return the samples of every rest and dwell in which the arm stood still, apart where one is missing."""
+    """Yield the samples of every rest and dwell in which the arm stood still, split at each missing sample."""
     for window in rested(run):
-        still = standing(motion, window)
+        still = trim_rest(motion, window)
         if still is None:
             continue
         inside = between(stream, still.start_s, still.end_s)
@@ -51,15 +51,15 @@ def still_samples(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[s
         yield from (slice(start, end) for start, end in pairwise(edges))
 
 
-def place(average: Average, motion: ArmMotion) -> Average:
-    """Return the average with the attitude the arm had meanwhile."""
+def add_attitude(average: Average, motion: ArmMotion) -> Average:
+    """Return the average with the arm's mean attitude in the same window."""
     return replace(average, attitude=motion.attitude(average.start_s, average.end_s))
 
 
-def bias_drift(rests: Sequence[Average]) -> Array:
+def estimate_bias_drift(rests: Sequence[Average]) -> Array:
     """Return the variance (3,) of the bias from rest to rest, (rad/s)², beyond what the noise of a rest explains.
 
-    Zero unless that is significant over all axes (χ² at 0.999), so that a steady sensor is left alone.
+    Zero unless it is significant over all axes together (χ² at 0.999): a steady sensor's variance is not raised.
     """
     from scipy.special import chdtri
 
@@ -68,14 +68,14 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     means = np.array([rest.mean_rad_s for rest in rests])
     noise = np.array([rest.variance_rad2_s2 for rest in rests]).mean(axis=0)
     scatter = means.var(axis=0, ddof=1)
-    freedom = len(rests) - 1
-    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.001)
+    dof = len(rests) - 1
+    significant = dof * float(np.sum(scatter / noise)) > chdtri(3 * dof, 0.001)
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) -> Average | None:
-    """Average a rest; None if the arm did not stand still or the rest is too short to say anything."""
-    still = standing(motion, window)
+def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) -> Average | None:
+    """Average a rest; return None if the arm moved in it or if it holds too few samples."""
+    still = trim_rest(motion, window)
     if still is None:
         return None
     inside = between(stream, still.start_s, still.end_s)
@@ -83,5 +83,5 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) ->
         return None
     time_s = stream.time_s[inside]
     readings = stream.readings_rad_s[inside] - motion.swing_rates(time_s) @ response.T
-    found, lasting = mean_of_standing(readings, time_s, still, stream.steps)
-    return place(averaged(stream, inside, lasting, found), motion)
+    mean, averaged_window = mean_of_standing(readings, time_s, still, stream.steps)
+    return add_attitude(build_average(stream, inside, averaged_window, mean), motion)

@@ -1,4 +1,4 @@
-"""A sensor's samples on the controller's clock, and their averages with the variance of the mean."""
+"""A sensor's samples on the controller's clock, and averages of them with the variance of the mean."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -23,13 +23,17 @@ NO_STEPS = Steps(0.0)
 
 @dataclass(frozen=True, slots=True)
 class Average:
-    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
+    """The average of a gyroscope's readings over a window, and its uncertainty.
 
-    The variance of a revolution or a rest also holds the drift of the bias from rest to rest, `drift_rad2_s2` (3,).
-    `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
-    arm's base frame into the flange's, None where no arm tells it. `freedom` (3,): with how many degrees of freedom the
-    noise's part of the variance is known, infinite where nobody counted. `lines_hz` (k,): frequencies of what vibrates
-    and was taken out of the mean. `rounding_rad2_s2` (3,) is the part of the variance that is of the rounding to steps.
+    - `mean_rad_s` (3,): the mean.
+    - `variance_rad2_s2` (3,): variance of the mean. It includes the drift of the bias and the rounding.
+    - `noise_rad_s` (3,): standard deviation of one sample.
+    - `start_s`, `end_s`: the window on the controller's clock.
+    - `attitude` (3, 3): mean rotation from the arm's base frame into the flange's; None without an arm.
+    - `drift_rad2_s2` (3,): the part of the variance by drift of the bias from rest to rest.
+    - `freedom` (3,): degrees of freedom of the noise's part of the variance, infinite if they were not counted.
+    - `lines_hz` (k,): frequencies of the vibrations that were removed from the mean.
+    - `rounding_rad2_s2` (3,): the part of the variance by rounding to steps.
     """
 
     mean_rad_s: Array
@@ -52,21 +56,21 @@ class Average:
 
     @property
     def noise_rad2_s2(self) -> Array:
-        """(3,) the part of the variance that is of the noise, (rad/s)²."""
+        """(3,) the noise's part of the variance, (rad/s)²."""
         return self.variance_rad2_s2 - self.drift_rad2_s2 - self.rounding_rad2_s2
 
     @property
     def mean_std_rad_s(self) -> Array:
-        """(3,) standard deviation of the mean."""
+        """(3,) standard deviation of the mean, rad/s."""
         std: Array = np.sqrt(self.variance_rad2_s2)
         return std
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """A sensor's samples in physical units, on the controller's clock; by `polynomials` at one temperature.
+    """A sensor's n samples in physical units, on the controller's clock.
 
-    Its rates come in `steps`.
+    Rates are recorded in `steps`. If there are `polynomials`, readings are corrected to one temperature.
     """
 
     sensor: RecordedSensor
@@ -79,19 +83,19 @@ class Stream:
     steps: Steps = NO_STEPS
 
     def at_reference(self, polynomials: Mapping[Quantity, OverTemperature]) -> "Stream":
-        """A stream whose readings are those at the reference of these polynomials."""
-        taken = replace(self, polynomials=polynomials)
-        return replace(taken, readings_rad_s=taken.taken(RATE, self.readings_rad_s, slice(None)))
+        """Return the stream with its rates corrected to the reference temperature of these polynomials."""
+        stream = replace(self, polynomials=polynomials)
+        return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))
 
-    def taken(self, quantity: Quantity, readings: Array, inside: slice) -> Array:
-        """Readings (n, 3) of the samples inside, at the reference temperature if there are polynomials of them."""
+    def correct_temperature(self, quantity: Quantity, readings: Array, inside: slice) -> Array:
+        """Return readings (n, 3) of the samples `inside` at the reference temperature, if there are polynomials."""
         if quantity not in self.polynomials:
             return readings
         warm = self.sensor.channel(TEMPERATURE).values(self.raw[inside])
         return self.polynomials[quantity].correct_to_reference(readings, warm)
 
     def temperature_c(self, inside: slice) -> float:
-        """The mean of the samples inside, NaN of a sensor whose temperature nothing tells."""
+        """Return the mean temperature of the samples `inside`; NaN if nothing measures the sensor's temperature."""
         if not self.sensor.measures(TEMPERATURE):
             return float("nan")
         thermometer = self.sensor.channel(TEMPERATURE)
@@ -99,13 +103,13 @@ class Stream:
 
 
 def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:
-    """Samples (n,) of a gyroscope in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
+    """Return a gyroscope's samples (n,) in rad/s at controller times. Raise Fault as `estimate_time_base` does."""
     readings = sensor.channel(RATE).values(raw)
-    return on_clock(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))
+    return convert_stream(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))
 
 
-def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
-    """Samples (n,) of a gyroscope in rad/s at the controller's times, by a board's clock that is known."""
+def convert_stream(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
+    """Return a gyroscope's samples (n,) in rad/s at controller times, by the time base `clock`."""
     board_time_s = raw["board_time_us"] * 1e-6
     readings = sensor.channel(RATE).values(raw)
     return Stream(
@@ -120,18 +124,18 @@ def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stre
 
 
 def steps_of(raw: NDArray[Any], sensor: RecordedSensor, quantity: Quantity) -> Steps:
-    """The steps in which a quantity of all samples (n,) of a sensor comes: a board records the converter's counts."""
+    """Return the steps of a quantity in a sensor's samples (n,): a board records the converter's counts."""
     channel = sensor.channel(quantity)
     return channel.steps(channel.values(raw), trusts_counts=sensor.on_board)
 
 
 def between(stream: Stream, start_s: float, end_s: float) -> slice:
-    """The samples taken between two controller times."""
+    """Return the samples taken between two controller times."""
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def averaged(stream: Stream, inside: slice, window: Window, mean: Mean) -> Average:
-    """The `mean` of the samples inside, and the window it is over, with when and how warm it was."""
+def build_average(stream: Stream, inside: slice, window: Window, mean: Mean) -> Average:
+    """Return the `mean` of the samples `inside` as an average over `window`, with their temperature."""
     return Average(
         mean_rad_s=mean.mean,
         variance_rad2_s2=mean.variance,

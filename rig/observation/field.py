@@ -1,4 +1,4 @@
-"""What a magnetometer read at rest: its means in dwells, each with the attitude the arm stood in, and at home. Pure."""
+"""Averages of a magnetometer's readings at rest: in dwells, with the arm's attitude, and at the home position. Pure."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
@@ -19,29 +19,28 @@ from rig.observation.statistics.mean import Held, Mean, even_mean
 from rig.observation.windows import Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
-SETTLING_S = 0.2  # kept away from either end of a rest
+SETTLING_S = 0.2  # cut off at either end of a rest
 
 
-def beside(recording: ObservedRun, name: str) -> str | None:
-    """The sensor whose clock stamps the samples of the magnetometer `name`, and whose accelerometer was read in dwells.
+def find_companion(recording: ObservedRun, name: str) -> str | None:
+    """Return the sensor on the clock of the magnetometer `name` whose accelerometer was read in dwells, or None."""
+    return dwelt_beside(
+        recording.run, name, (sensor for sensor, observations in recording.sensors.items() if observations.dwells)
+    )
 
-    None where there is none.
-    """
-    return dwelt_beside(recording.run, name, (sensor for sensor, found in recording.sensors.items() if found.dwells))
 
-
-def dwelt_beside(run: RunData, name: str, dwelt: Iterable[str]) -> str | None:
-    """The first of the sensors read in dwells whose clock stamps the samples of the magnetometer, as of `beside`."""
-    return next((sensor for sensor in dwelt if one_clock(run, sensor, name)), None)
+def dwelt_beside(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
+    """Return the first of `sensors` that is on the clock of the magnetometer `name`; None without one."""
+    return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[Held, ...]:
-    """What a magnetometer read in the dwells of the recording that an accelerometer was read in.
+    """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
-    One clock stamps the samples of both, so the gyroscope's time base serves; how late the magnetometer is beside that
-    gyroscope does not matter to a mean at rest. Raises Fault `lost_samples`, `saturation`.
+    The gyroscope's time base serves both. The magnetometer's delay against that gyroscope does not matter for a mean at
+    rest. Raise Fault `lost_samples` or `saturation`.
     """
-    other = beside(recording, name)
+    other = find_companion(recording, name)
     if other is None:
         return ()
     time_s = recording.time_s(name, other)
@@ -58,32 +57,32 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
 
 
 def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:
-    """The mean reading of a magnetometer in a dwell, tesla; `time_s` (n,) are its samples' times on the arm's clock.
+    """Average a magnetometer's readings in a dwell, in tesla; `time_s` (n,) are its samples' times on the arm's clock.
 
-    Raises Fault `lost_samples`, `saturation`.
+    Raise Fault `lost_samples` or `saturation`.
     """
     samples = _samples(run, name, time_s, dwell.window)
     return _mean(run, name, samples, f"dwell {dwell.index} ({dwell.name}) of {name}", thresholds)
 
 
-def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
-    """The field's readings in each dwell as recorded (n, 3), and their times (n,) on the arm's clock."""
-    other = beside(recording, name)
+def read_field_in_dwells(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
+    """Yield each dwell with the magnetometer's raw counts (n, 3) in it and their times (n,) on the arm's clock."""
+    other = find_companion(recording, name)
     if other is not None:
         time_s, channel = recording.time_s(name, other), recording.run.sensors[name].channel(FIELD)
         for dwell in recording.sensors[other].dwells:
-            held = inside(time_s, dwell.window)
-            yield dwell, channel.counts(recording.run.samples[name])[held], time_s[held]
+            samples = inside(time_s, dwell.window)
+            yield dwell, channel.counts(recording.run.samples[name])[samples], time_s[samples]
 
 
 def field_tests(
     recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
 ) -> tuple[Mean, ...]:
-    """The mean readings in tesla of the rests at home, in their order. Raises as `field_readings`.
+    """Average the magnetometer's readings, in tesla, in the rests at home, in order. Raise as `field_readings` does.
 
-    One of fewer samples than a dwell needs is none: the last samples of a run may still be on their way when it ends.
+    A rest with fewer samples than a dwell needs is skipped: a run's last samples may not have arrived when it ends.
     """
-    other = beside(recording, name)
+    other = find_companion(recording, name)
     if other is None:
         return ()
     time_s = recording.time_s(name, other)
@@ -93,12 +92,12 @@ def field_tests(
         _mean(recording.run, name, samples(window), f"a field test of {name}", thresholds)
         for window in windows
         if window.end_s > window.start_s
-        and _at_home(recording, window, home_q_rad)
+        and _is_at_home(recording, window, home_q_rad)
         and len(samples(window)) >= MIN_SAMPLES_AT_REST
     )
 
 
-def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
+def _is_at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
     away_rad = recording.motion.away_rad(rest, home_q_rad)
     return away_rad is not None and away_rad < AT_HOME_RAD
 
@@ -116,6 +115,6 @@ def _mean(run: RunData, name: str, samples: NDArray[Any], where: str, thresholds
 
 
 def _samples(run: RunData, name: str, time_s: Array, window: Window) -> NDArray[Any]:
-    """The samples (n,) of a sensor in a window of the arm's clock, by the times (N,) of all of them on it."""
+    """Return a sensor's samples (n,) in a window, by the times (N,) of all its samples on the arm's clock."""
     samples: NDArray[Any] = run.samples[name]
     return samples[inside(time_s, window)]

@@ -1,4 +1,4 @@
-"""Which sweeps and dwells of its plan a recording holds from start to end, and when they were. Pure."""
+"""The sweeps and dwells that a recording holds from start to end, and their times. Pure."""
 
 from rig.data.recording.run_file import RunData
 from rig.observation.windows import dwelt, swept
@@ -15,5 +15,5 @@ def finished_dwells(run: RunData) -> frozenset[int]:
 
 
 def dwell_times_s(run: RunData) -> dict[int, tuple[float, float]]:
-    """Return when each finished dwell began and ended by the controller's clock, by its index."""
+    """Return the start and end of each finished dwell on the controller's clock, by the dwell's index."""
     return {finished.dwell.index: (finished.window.start_s, finished.window.end_s) for finished in dwelt(run)}

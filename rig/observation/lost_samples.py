@@ -1,4 +1,4 @@
-"""The error for samples that are missing: which way they go from a sensor to the recording says what to look at."""
+"""The error for missing samples. The path of the samples to the recording decides what to check."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -11,8 +11,8 @@ from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.errors import Fault
 
 ON_THE_BOARD = "Check the cable to the board and the load of this computer"
-# By the part of a sensor with a port of its own.
-BESIDE_THE_BOARD: Mapping[str, str] = MappingProxyType(
+# Keyed by the part of a sensor that has a port of its own.
+ON_OWN_PORT: Mapping[str, str] = MappingProxyType(
     {
         "mavlink": "See that no ground station has changed how often the autopilot sends this message, and that no "
         "other program reads the same port; check its line and the load of this computer",
@@ -27,10 +27,10 @@ BESIDE_THE_BOARD: Mapping[str, str] = MappingProxyType(
 def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what: str, then: str) -> Fault:
     """Return the Fault `lost_samples` for samples (n,) of a sensor: `where` and `what` is missing, what to do `then`.
 
-    If every so many of them is there alone, the source has sent fewer, and nothing was lost on the way.
+    If only every k-th sample is there, the source sent fewer, and nothing was lost on its path. The message says so.
     """
     steps = np.diff(samples["sequence"].astype(np.int64))
-    each = int(np.median(steps)) if len(steps) else 1
-    evenly = f": one of {each} comes, about {sensor.rate_hz / each:.4g} a second" if each > 1 else ""
-    look_at = ON_THE_BOARD if sensor.on_board else BESIDE_THE_BOARD.get(sensor.part, ON_THE_BOARD)
+    stride = int(np.median(steps)) if len(steps) else 1
+    evenly = f": one of {stride} comes, about {sensor.rate_hz / stride:.4g} a second" if stride > 1 else ""
+    look_at = ON_THE_BOARD if sensor.on_board else ON_OWN_PORT.get(sensor.part, ON_THE_BOARD)
     return Fault("lost_samples", f"in {where} {what}{evenly}", f"{look_at}; then {then}")

@@ -1,11 +1,10 @@
-"""From a recording to averaged revolutions: what the estimators see.
+"""Averaged revolutions of a recording, which the estimators take as input.
 
 An observation is the mean reading over exactly one turn of a joint, or over an arc of it. Over a whole turn the mean
-speed is 2π/T whatever the servo's vibration, over an arc it is Δθ/T by the encoders at its ends. The weights that make
-the mean of the readings also make that of the arm's rate, so what the encoders see of a vibration is no noise either.
-The mean comes first; squaring is the estimator's business.
+speed is 2π/T whatever the servo's vibration; over an arc it is Δθ/T by the encoders at its ends. The same weights
+average the readings and the arm's rate, so a vibration that the encoders measure adds no noise. The mean comes first.
 
-Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
+Nothing doubtful is averaged: whatever does not belong in a calibration raises a Fault with a name of its own.
 """
 
 from collections.abc import Collection, Sequence
@@ -23,40 +22,43 @@ from rig.errors.attempts import Attempts, attempt_each
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.motion.steps import Sweep
-from rig.observation.arm_rests import bias_drift, place, rests_of
-from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
+from rig.observation.arm_rests import add_attitude, average_rests, estimate_bias_drift
+from rig.observation.average import Average, Stream, between, build_average, on_the_arms_clock
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
 from rig.observation.reference.acceleration import DwellReading, dwell_readings
 from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.statistics.lines import BEATS, turning
-from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
+from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from rig.observation.windows import Finished, Window, swept
 
-ABOUT_ALL_AXES = 0.05  # of the largest turns, the smallest about any axis that tell how a sensor follows it
-STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
-FROZEN = 0.5  # of the rate of a sweep, by which an axis that repeats one reading must misread it
-MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
+ABOUT_ALL_AXES = 0.05  # least singular value, relative to the design's norm, from which a response is fitted
+STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds one count
+FROZEN = 0.5  # of a sweep's rate: an axis that repeats one reading is stuck if it misreads by more
+MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor causes these faults too
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
+    """One revolution, or one arc of a joint, averaged.
 
-    Or an arc of `angle_rad` at Δθ/T; `arc_rad` are the joint's angles at its ends, the lower first, None of whole
-    turns, over which no encoder errs. `ripple` is how unevenly it turned, RMS as a share of the rate. `speed_rad_s` and
-    `axis_flange` are those of the arm's mean rate under the weights of the mean reading.
-
-    What turned the sensor is not known (None) of data recorded elsewhere.
-    `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
-    vector of the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change
-    it, per radian (`rig.motion.geometry.AXIS_ERRORS`); `arm_m` (3,) is a way from the joint's axis to the flange's
-    origin, in the flange's frame. `speed_std_rad_s` comes from arm states too far apart to tell the turn's ends
-    exactly; `lost` samples are missing from the average. `acceleration` is what the accelerometer beside it read, where
-    one is to be calibrated.
+    - `sweep`: index of the sweep in the plan. `joint_name`, `direction`: what turned; None in data recorded elsewhere.
+    - `axis` ("x", "y", "z"), `sign`: the sensor axis that is nominally along the turn.
+    - `axis_flange` (3,), `speed_rad_s`: the arm's mean rate by the weights of the mean reading: its unit vector in the
+      flange's frame, and its size (2π/T nominally; Δθ/T of an arc).
+    - `speed_std_rad_s`: standard deviation of the speed, if the arm's states are too far apart to locate the turn's
+      ends.
+    - `lost`: number of samples missing from the average.
+    - `axis_errors` (13, 3): change of the axis per radian of each of the arm's errors
+      (`rig.motion.geometry.AXIS_ERRORS`).
+    - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
+    - `acceleration`: the accelerometer's readings in the same turn, if one is to be calibrated.
+    - `angle_rad`: angle of an arc; `arc_rad`: the joint's angles at its ends, the lower first. None for whole turns,
+      over which an encoder's periodic error cancels.
+    - `ripple`: RMS unevenness of the turn, relative to its rate.
     """
 
     sweep: int
@@ -80,9 +82,9 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class SensorObservations:
-    """What a recording tells of a sensor: its clock, its revolutions, its rests (mean readings at zero rate).
+    """The observations of one sensor: its clock, its revolutions and its rests (mean readings at zero rate).
 
-    `dwells` are what its accelerometer read in attitudes, of a sensor whose accelerations were recorded.
+    `dwells` are the averages of its accelerometer in attitudes, if accelerations were recorded.
     """
 
     time_base: TimeBase
@@ -94,14 +96,13 @@ class SensorObservations:
 def observe_sensor(
     run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
-    """Average every finished sweep of a recording, in which the arm moved by `motion`.
+    """Average every finished sweep of a recording in which the arm moved by `motion`.
 
-    An interrupted sweep has no end in the recording and is left out. So are sweeps and dwells whose index is in
-    `superseded`, and the rests beside them: a later recording of the same run repeats them.
-    Raises Fault as `dwell_readings` does, and `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
-    `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
-    `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
-    `impossible_times`.
+    An interrupted sweep is left out. So are sweeps and dwells whose index is in `superseded`, and the rests next to
+    them: a later recording of the same run repeats them. Raise Fault as `dwell_readings` does, and
+    `incomplete_revolution`, `arm_states_lost`, `speed_slider`, `speed_not_constant`, `other_joint_moved`,
+    `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`, `wrong_unit`, `not_finite`,
+    `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`, `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = list[Observation]()
@@ -109,21 +110,22 @@ def observe_sensor(
         if finished.sweep.index in superseded:
             continue
         try:
-            revolutions.append(_revolution(run, stream, motion, finished, settings))
+            revolutions.append(_observe_revolution(run, stream, motion, finished, settings))
         except Fault as fault:
             if fault.name in MISREAD:
-                check_feeling(run, rests_of(run, stream, motion, response_of(stream, revolutions), superseded), ())
-                check_other_way(finished.sweep, [each.joint_name for each in revolutions], fault)
+                rests = average_rests(run, stream, motion, fit_response(stream, revolutions), superseded)
+                check_response(run, rests, ())
+                check_other_direction(finished.sweep, [turn.joint_name for turn in revolutions], fault)
             raise
-    rests = rests_of(run, stream, motion, response_of(stream, revolutions), superseded)
-    felt = stream.sensor.measures(ACCELERATION)
-    dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if felt else ()
-    check_feeling(run, rests, dwells)
-    drift = bias_drift(rests)
+    rests = average_rests(run, stream, motion, fit_response(stream, revolutions), superseded)
+    has_accelerometer = stream.sensor.measures(ACCELERATION)
+    dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if has_accelerometer else ()
+    check_response(run, rests, dwells)
+    drift = estimate_bias_drift(rests)
     return SensorObservations(
         stream.clock,
-        tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
-        tuple(_drifting(rest, drift) for rest in rests),
+        tuple(replace(turn, average=_add_drift(turn.average, drift)) for turn in revolutions),
+        tuple(_add_drift(rest, drift) for rest in rests),
         dwells,
     )
 
@@ -131,69 +133,72 @@ def observe_sensor(
 def observe_each_sweep(
     run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> Attempts[int, Observation]:
-    """Observe every finished sweep by itself; return the observations, and why there is none, by the sweep's index."""
-    observe = partial(_revolution, run, stream, motion, settings=settings)
+    """Observe every finished sweep by itself; return the observations, and the faults, by the sweep's index."""
+    observe = partial(_observe_revolution, run, stream, motion, settings=settings)
     return attempt_each({finished.sweep.index: partial(observe, finished) for finished in swept(run)})
 
 
 def nearest_axis(vector: Array) -> tuple[str, int]:
-    """The axis, "x", "y" or "z", nearest to a direction (3,), and the sign (1, −1) of the direction along it."""
+    """Return the axis, "x", "y" or "z", nearest to a direction (3,), and the sign (1, −1) of the direction along it."""
     nearest = int(np.argmax(np.abs(vector)))
     return "xyz"[nearest], 1 if vector[nearest] > 0 else -1
 
 
-def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
-    """Raise Fault `stuck_sensor` where a sensor does not feel what the arm did."""
+def check_response(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
+    """Raise Fault `stuck_sensor` if a sensor's readings do not follow the arm's motion."""
     speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
     if speeds:
         check_rests(rests, min(speeds))
     check_dwells(dwells, run.settings.site)
 
 
-def _revolution(
+def _observe_revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = motion.turn(finished.sweep, finished.window, settings)
-    seen = _observation(stream, motion, finished.sweep, turn, settings)
+    observation = _average_revolution(stream, motion, finished.sweep, turn, settings)
     if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
-        felt = swept_acceleration(stream, motion, finished.sweep, turn, run.settings.site)
-        return replace(seen, acceleration=felt)
-    return seen
+        acceleration = swept_acceleration(stream, motion, finished.sweep, turn, run.settings.site)
+        return replace(observation, acceleration=acceleration)
+    return observation
 
 
-def response_of(stream: Stream, turns: Sequence[Observation]) -> Array:
-    """Return (3, 3) how readings follow the flange's rates: by least squares, or nominal if turns do not tell all."""
+def fit_response(stream: Stream, turns: Sequence[Observation]) -> Array:
+    """Return the response (3, 3) of readings to the flange's rates, by least squares over the turns.
+
+    Return the nominal mounting if the turns do not cover all axes.
+    """
     design = np.array([(*(turn.speed_rad_s * turn.axis_flange), 1.0) for turn in turns]).reshape(-1, 4)
     if np.linalg.matrix_rank(design, tol=ABOUT_ALL_AXES * np.linalg.norm(design)) < 4:
         return np.array(stream.sensor.mounting)
-    found: Array = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)[0]
-    return found[:3].T
+    coefficients: Array = np.linalg.lstsq(design, np.array([turn.average.mean_rad_s for turn in turns]), rcond=None)[0]
+    return coefficients[:3].T
 
 
-def _drifting(average: Average, drift: Array) -> Average:
+def _add_drift(average: Average, drift: Array) -> Average:
     return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift, drift_rad2_s2=drift)
 
 
-def _observation(
+def _average_revolution(
     stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
-    lost = _lost(stream, inside, where, settings)
+    lost = _count_lost(stream, inside, where, settings)
     _check_saturation(stream, inside, where)
     _check_stuck(stream, inside, where)
     covered = motion.covered(stream.time_s[inside])
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
-    sampled = _sampled(stream.time_s[inside], motion, turn, covered)
+    sampled = _sample_turn(stream.time_s[inside], motion, turn, covered)
     readings = stream.readings_rad_s[inside][covered]
-    found, weights = turn_mean(readings, stream.steps, sampled)
-    average = place(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
+    mean, weights = turn_mean(readings, stream.steps, sampled)
+    average = add_attitude(build_average(stream, inside, Window(turn.start_s, turn.end_s), mean), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
-    turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
-    _check_frozen(readings, turned, turn.speed_rad_s * expected, where)
-    _check_direction(turned, expected, where, settings)
-    check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
+    rate_read = average.mean_rad_s - stream.clock.zero_rate_rad_s
+    _check_frozen(readings, rate_read, turn.speed_rad_s * expected, where)
+    _check_direction(rate_read, expected, where, settings)
+    check_reading_ratio(float(np.linalg.norm(rate_read)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
     rate = turn.speed_rad_s * turn.axis_flange if turn.uneven else weights @ sampled.rates_rad_s
     speed_rad_s = float(np.linalg.norm(rate))
@@ -217,15 +222,15 @@ def _observation(
     )
 
 
-def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """A turn as samples at times (n,) see it, of which the arm's motion is known where they are `covered` (n,)."""
-    share = (time_s - turn.start_s) / turn.duration_s
-    waves = turning(turn.angle_rad * share, 2 * turn.beats)[covered]
+def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
+    """Return a turn at the sample times (n,), for those samples whose arm motion is recorded: `covered` (n,)."""
+    fraction = (time_s - turn.start_s) / turn.duration_s
+    waves = turning(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:
-        waves -= waves.mean(axis=0)  # of an arc, gravity's share belongs into the mean, as the attitudes tell it
+        waves -= waves.mean(axis=0)  # over an arc gravity's part stays in the mean; the attitudes account for it
     rates = motion.sampled_rates(time_s)[covered]
     return SampledTurn(
-        share=share[covered],
+        share=fraction[covered],
         rates_rad_s=rates,
         uneven_rad_s=rates @ turn.axis_flange - turn.speed_rad_s,
         passing=waves,
@@ -236,8 +241,11 @@ def _sampled(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArra
     )
 
 
-def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
-    """Samples missing in the revolution: by sequence number, and by time for those the board itself did not see."""
+def _count_lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
+    """Return the number of missing samples: by sequence number, and by time for those that the board itself missed.
+
+    Raise Fault `lost_samples` if there are too many.
+    """
     around = slice(max(inside.start - 1, 0), inside.stop + 1)
     steps = np.diff(stream.raw["sequence"][around])  # modulo 2³², like the board's counter
     intervals = np.diff(stream.board_time_s[around])
@@ -245,9 +253,9 @@ def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresh
     by_sequence = int(steps.astype(np.int64).sum()) - len(steps)
     by_time = int(np.sum(np.round(intervals / np.median(intervals)) - 1)) if covered else 0
     lost = max(by_sequence, by_time)
-    count = inside.stop - inside.start
-    if not covered or lost > settings.max_lost_fraction * (count + lost):
-        what = f"{lost} of {count + lost} samples are missing" if covered else "the samples do not cover the revolution"
+    got = inside.stop - inside.start
+    if not covered or lost > settings.max_lost_fraction * (got + lost):
+        what = f"{lost} of {got + lost} samples are missing" if covered else "the samples do not cover the revolution"
         what += f", {100 * settings.max_lost_fraction:g} % may be missing"
         raise lost_samples(stream.sensor, stream.raw[inside], where, what, "repeat the sweep")
     return lost
@@ -264,7 +272,7 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
-    """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
+    """Raise Fault `stuck_sensor` if all axes repeat one reading, although the noise exceeds one count."""
     counts = stream.sensor.channel(RATE).counts(stream.raw)
     if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return
@@ -278,13 +286,13 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
         )
 
 
-def _check_frozen(readings: Array, turned: Array, expected_rad_s: Array, where: str) -> None:
-    """An axis that is turned does not repeat one reading that is not its rate, however coarse its steps are.
+def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, where: str) -> None:
+    """Raise Fault `stuck_axis` if a turned axis repeats one reading that is not its rate, however coarse its steps.
 
-    Of readings (n, 3), which read `turned` (3,) in the mean, `expected_rad_s` (3,) by the nominal mounting.
+    The readings (n, 3) have the mean `rate_read` (3,); the nominal mounting gives `expected_rad_s` (3,).
     """
     still = np.ptp(readings, axis=0) == 0
-    misread = np.abs(turned - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)
+    misread = np.abs(rate_read - expected_rad_s) > FROZEN * np.linalg.norm(expected_rad_s)
     for axis in np.flatnonzero(still & misread):
         raise Fault(
             "stuck_axis",
@@ -294,9 +302,9 @@ def _check_frozen(readings: Array, turned: Array, expected_rad_s: Array, where: 
         )
 
 
-def _check_direction(turned: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
-    """The reading, less its value at rest, must point along the turn as the nominal mounting has it."""
-    cosine = float(turned @ expected / (np.linalg.norm(turned) * np.linalg.norm(expected)))
+def _check_direction(rate_read: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
+    """Raise Fault `wrong_sign` or `wrong_axis` if the reading less its value at rest is not along the nominal axis."""
+    cosine = float(rate_read @ expected / (np.linalg.norm(rate_read) * np.linalg.norm(expected)))
     angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     limit = settings.max_axis_deviation_deg
     if angle <= limit:

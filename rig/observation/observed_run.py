@@ -1,4 +1,4 @@
-"""A recording and all it tells: the arm's motion, and of each sensor its time, its revolutions and its rests."""
+"""An observed recording: the arm's motion, and of each sensor its time base, revolutions and rests."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,18 +13,18 @@ from rig.data.recording.run_file import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.estimation.arrays import Array
 from rig.estimation.temperature.over_temperature import OverTemperature
-from rig.observation.average import Stream, on_clock
+from rig.observation.average import Stream, convert_stream
 from rig.observation.finished import finished_dwells, finished_sweeps
 from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import TimeBase
 
-AS_STATED: Mapping[int, Array] = MappingProxyType({})  # no stage's mount is known to be off
+AS_STATED: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted as its settings say
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How much one sensor's filter lags another's, s, and the standard deviation of that."""
+    """The delay of one sensor's filter against another's, s, and its standard deviation."""
 
     delay_s: float
     std_s: float
@@ -34,8 +34,8 @@ class Delay:
 class ObservedRun:
     """One recording, observed once; `sensors` by name.
 
-    By `polynomials` its readings were taken to one temperature, and are whenever they are asked for. `clock_offset_s`
-    takes its times to the clock of the first recording of its run.
+    With `polynomials` its readings are corrected to one temperature. `clock_offset_s` converts its times to the clock
+    of the first recording of its run.
     """
 
     run: RunData
@@ -45,46 +45,46 @@ class ObservedRun:
     clock_offset_s: float = 0.0
 
     def stream(self, sensor: str) -> Stream:
-        """A sensor's samples in rad/s on the arm's clock."""
-        stream = on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
+        """Return a sensor's samples in rad/s on the arm's clock."""
+        stream = convert_stream(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
         return stream.at_reference(self.polynomials[sensor]) if sensor in self.polynomials else stream
 
-    def time_s(self, sensor: str, beside: str | None = None) -> Array:
-        """Times (n,) of all samples of any sensor on the arm's clock.
+    def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
+        """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        By the time base of the gyroscope `beside`; left out, by the sensor's own or that of the first gyroscope on the
-        same clock. Where there is none, by when samples came to the computer, as the arm's states did: to milliseconds.
+        The time base is that of `gyroscope`; by default the sensor's own, or that of the first gyroscope on the same
+        clock. Without any, the times at which samples and arm states arrived at the computer serve, to milliseconds.
         """
-        bases = {name: seen.time_base for name, seen in self.sensors.items()}
-        return times_s(self.run, sensor, bases, beside)
+        bases = {name: observations.time_base for name, observations in self.sensors.items()}
+        return times_s(self.run, sensor, bases, gyroscope)
 
     def delay(self, sensor: str, behind: str) -> Delay | None:
-        """How much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
+        """Return how much `sensor` lags the sensor `behind`; None if no single clock stamps the samples of both.
 
-        Where the board's does, what their time bases differ by is their filters' doing.
+        Both must be on the board: then their time bases differ only by their filters.
         """
         if not all(self.run.sensors[name].on_board for name in (sensor, behind)):
             return None
-        late, known = self.sensors[sensor].time_base, self.sensors[behind].time_base
-        middle = np.array([known.reference_s])
-        delay_s = float(known.controller_time_s(middle)[0] - late.controller_time_s(middle)[0])
-        return Delay(delay_s, float(np.hypot(known.offset_std_s, late.offset_std_s)))
+        late, reference = self.sensors[sensor].time_base, self.sensors[behind].time_base
+        middle = np.array([reference.reference_s])
+        delay_s = float(reference.controller_time_s(middle)[0] - late.controller_time_s(middle)[0])
+        return Delay(delay_s, float(np.hypot(reference.offset_std_s, late.offset_std_s)))
 
 
 def one_clock(run: RunData, sensor: str, other: str) -> bool:
-    """Whether one clock stamps the samples of both sensors of a recording."""
+    """Return whether one clock stamps the samples of both sensors of a recording."""
     return run.sensors[sensor].clock == run.sensors[other].clock
 
 
-def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], beside: str | None = None) -> Array:
-    """Times (n,) of all samples of a sensor on the arm's clock, by what is known of the gyroscopes' `bases`.
+def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], gyroscope: str | None = None) -> Array:
+    """Return the times (n,) of all samples of a sensor on the arm's clock, by the gyroscopes' time bases.
 
-    Which of them, `ObservedRun.time_s` says.
+    See `ObservedRun.time_s` for the choice among `bases`.
     """
     samples = run.samples[sensor]
     stamps_s: Array = samples["board_time_us"] * 1e-6
-    known = (beside, sensor) if beside else (sensor, *bases)
-    base = next((each for each in known if each in bases and one_clock(run, sensor, each)), None)
+    candidates = (gyroscope, sensor) if gyroscope else (sensor, *bases)
+    base = next((name for name in candidates if name in bases and one_clock(run, sensor, name)), None)
     if base is not None:
         return bases[base].controller_time_s(stamps_s)
     came_s = np.interp(samples["host_time_s"], run.states["host_time_s"], run.states["time_s"])
@@ -92,29 +92,31 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], beside: st
 
 
 def observe_run(
-    run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = (), turned: Array | None = None
+    run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = (), correction: Array | None = None
 ) -> ObservedRun:
-    """Observe every gyroscope of a recording; raises Fault as `motion_of` and `observe_sensor` do.
+    """Observe every gyroscope of a recording. Raise Fault as `motion_of` and `observe_sensor` do.
 
-    `turned` (3, 3) is by how the item sits off its nominal mount, where that is known.
+    `correction` (3, 3): rotation of the item from its nominal mount, if it was determined.
     """
-    motion = motion_of(run, turned)
+    motion = motion_of(run, correction)
     sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.measuring(RATE)}
     return ObservedRun(run, motion, sensors)
 
 
-def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
-    """Every recording of one run that adds a finished sweep or dwell; one that several hold counts in the last one.
+def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = AS_STATED) -> tuple[ObservedRun, ...]:
+    """Observe each recording of a run that adds a finished sweep or dwell; a repeated one counts in the last recording.
 
-    The thresholds are those of the first recording; `turned` is as of `observe_run`, by the stage of the procedure.
-    Raises as `turner_of`; Fault as `observe_run` does.
+    The thresholds are those of the first recording; `corrections` are as in `observe_run`, by the stage of the
+    procedure. Raise as `turner_of`, and Fault as `observe_run`.
     """
     for run in runs:
         turner_of(run)
     recordings = [
-        observe_run(run, runs[0].settings.observation, _repeated(runs, place), turned.get(run.settings.stage))
-        for place, run in enumerate(runs)
-        if _finished(run) - _repeated(runs, place)
+        observe_run(
+            run, runs[0].settings.observation, _find_superseded(runs, index), corrections.get(run.settings.stage)
+        )
+        for index, run in enumerate(runs)
+        if _finished_steps(run) - _find_superseded(runs, index)
     ]
     offsets_s = _clock_offsets_s(recordings)
     return tuple(
@@ -123,7 +125,7 @@ def observe_runs(runs: Sequence[RunData], turned: Mapping[int, Array] = AS_STATE
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return what takes the times of each recording to the clock of the first: the controller may have been off.
+    """Return the offset of each recording's clock against the first's: the controller may have been off in between.
 
     No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
     accelerated laboratory's time passes faster.
@@ -131,21 +133,21 @@ def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):
         first_s = float(recordings[0].motion.time_s[0])
-        by_computer_s = (_started(recording) - _started(recordings[0])).total_seconds() + first_s
+        by_computer_s = (_start_time(recording) - _start_time(recordings[0])).total_seconds() + first_s
         ended_s = float(last.motion.time_s[-1]) + offsets_s[-1]
         offsets_s.append(max(by_computer_s, ended_s) - float(recording.motion.time_s[0]))
     return offsets_s
 
 
-def _started(recording: ObservedRun) -> datetime:
+def _start_time(recording: ObservedRun) -> datetime:
     return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
-def _repeated(runs: Sequence[RunData], place: int) -> frozenset[int]:
-    """The sweeps and dwells that recordings after the one at a place may hold as well: those of the same stage."""
-    stage = runs[place].settings.stage
-    return frozenset[int]().union(*(_finished(run) for run in runs[place + 1 :] if run.settings.stage == stage))
+def _find_superseded(runs: Sequence[RunData], index: int) -> frozenset[int]:
+    """Return the sweeps and dwells that later recordings of the same stage repeat."""
+    stage = runs[index].settings.stage
+    return frozenset[int]().union(*(_finished_steps(run) for run in runs[index + 1 :] if run.settings.stage == stage))
 
 
-def _finished(run: RunData) -> frozenset[int]:
+def _finished_steps(run: RunData) -> frozenset[int]:
     return finished_sweeps(run) | finished_dwells(run)

@@ -1,4 +1,4 @@
-"""What the board is told of a sweep, and which sweeps it has told of: its own averages, beside the host's. Pure."""
+"""The revolution's window that the board averages, and the sweeps for which the board has an average. Pure."""
 
 from collections.abc import Collection, Sequence
 from typing import Any
@@ -28,11 +28,11 @@ def revolution_on_the_board(
     kinematics: DenavitHartenberg,
     reading_std_rad: float = 0.0,
 ) -> tuple[int, int, float]:
-    """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
+    """Return a revolution's start and end on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
-    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) may reach further back than the sweep, which began after
-    the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
-    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `ArmMotion.turn` do.
+    `samples` (n,) SAMPLE_DTYPE and the turner's `states` (m,) should reach further back than the sweep, which began
+    after the state `first`: a slow sweep alone may not stand out from the noise or hold too few samples, but the fast
+    motion to its start fixes the time base. Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)
@@ -44,14 +44,14 @@ def revolution_on_the_board(
 
 
 def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
-    """The sweeps of a recording of which the board has an observation for every one of these sensors that is on it."""
-    everything = finished_sweeps(run)
+    """Return the sweeps for which the board has an average for each of the sensors that is on it."""
+    sweeps = finished_sweeps(run)
     on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
-    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in on_board))
+    return sweeps.intersection(*(observed_before([run], sensor, sweeps) for sensor in on_board))
 
 
 def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
-    """What the board observed of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
+    """Return the board's averages of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
     return {
         event.sweep: event
         for run in earlier

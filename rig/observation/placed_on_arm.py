@@ -1,4 +1,4 @@
-"""What any sensor read in the dwells of an arm, as placements: for kinds of sensors that packages add. Pure."""
+"""Placements from an arm's dwells, for kinds of sensors that packages add. Pure."""
 
 from collections.abc import Sequence
 
@@ -22,35 +22,35 @@ NO_REST = Rested({}, {}, {}, (), ())
 def placements_on_arm(
     recordings: Sequence[ObservedRun], name: str, quantity: Quantity, thresholds: ObservationThresholds
 ) -> Placements:
-    """The dwells that a sensor was read in; one that several recordings hold counts in the last.
+    """Average a sensor's readings in all dwells; a dwell that several recordings hold counts in the last.
 
-    Raises Fault `no_attitudes`, `lost_samples`, `saturation`.
+    Raise Fault `no_attitudes`, `lost_samples` or `saturation`.
     """
-    found: dict[int, tuple[Window, Mean, Array]] = {}
+    readings: dict[int, tuple[Window, Mean, Array]] = {}
     for recording in recordings:
         for finished in dwelt(recording.run):
-            stood = without_leaving(recording.run, finished)
-            mean = _mean(recording, name, quantity, stood, thresholds)
-            found[stood.dwell.index] = stood.window, mean, _attitude(recording, name, stood.window)
-    if not found:
+            settled = without_leaving(recording.run, finished)
+            mean = _average_dwell(recording, name, quantity, settled, thresholds)
+            readings[settled.dwell.index] = settled.window, mean, _sensor_attitude(recording, name, settled.window)
+    if not readings:
         raise Fault(
             "no_attitudes",
             f"recorded only: without attitudes {name} is not calibrated",
             "Use the procedure static_attitudes or imu, which hold attitudes",
         )
-    windows, means, attitudes = zip(*found.values(), strict=True)
-    freedom = np.array([np.broadcast_to(mean.freedom, mean.mean.shape) for mean in means])
-    read = Rested(
+    windows, means, attitudes = zip(*readings.values(), strict=True)
+    dof = np.array([np.broadcast_to(mean.freedom, mean.mean.shape) for mean in means])
+    rested = Rested(
         {quantity: np.array([mean.mean for mean in means])},
         {quantity: np.array([mean.variance for mean in means])},
-        {quantity: freedom},
+        {quantity: dof},
         windows,
         tuple(mean.samples for mean in means),
     )
-    return Placements(read, np.array(attitudes), None, NO_REST, 0)
+    return Placements(rested, np.array(attitudes), None, NO_REST, 0)
 
 
-def _mean(
+def _average_dwell(
     recording: ObservedRun, name: str, quantity: Quantity, dwell: Dwelt, thresholds: ObservationThresholds
 ) -> Mean:
     where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"
@@ -63,8 +63,8 @@ def _mean(
     return even_mean(channel.values(samples), steps)
 
 
-def _attitude(recording: ObservedRun, name: str, window: Window) -> Array:
-    """(3, 3) the rotation from the sensor's nominal axes into the arm's base."""
+def _sensor_attitude(recording: ObservedRun, name: str, window: Window) -> Array:
+    """Return the rotation (3, 3) from the sensor's nominal axes into the arm's base frame."""
     to_flange = nearest_rotation(recording.motion.attitude(window.start_s, window.end_s))
     attitude: Array = (np.array(recording.run.sensors[name].mounting) @ to_flange).T
     return attitude

@@ -1,8 +1,8 @@
-"""The sampling interval of a log, and where readings are missing, from time stamps that may be bad.
+"""The sampling interval of a log and its missing readings, from time stamps that may be bad.
 
 Loggers round their stamps (8, 9, 8, 9 ms of 119 Hz) or stamp readings on arrival (five at once every 50 ms). So the
-difference of two neighbouring stamps tells neither the interval nor a loss. But an error of a stamp does not add up
-over many readings, while every lost reading shifts all stamps after it. So the stamps are compared with an even series,
+difference of two neighbouring stamps shows neither the interval nor a loss. But a stamp's error does not add up over
+many readings, while every lost reading shifts all later stamps. So the stamps are compared with an even series,
 
     lateness of stamp k = t[k] − T (k + readings missing before it)
 
@@ -11,7 +11,7 @@ among those before it, is that of the readings missing in between. The width is 
 are whole multiples of the interval. It is 1 if the stamps are good to a quarter of an interval.
 
 Random losses of readings whose stamps are worse cannot be counted one by one. They make the lateness a random walk,
-whose Allan variance (IEEE 952, annex C) tells how many readings are missing.
+whose Allan variance (IEEE 952, annex C) gives the number of missing readings.
 """
 
 from dataclasses import dataclass, replace
@@ -23,35 +23,35 @@ from numpy.typing import NDArray
 from rig.estimation.arrays import Array
 
 WIDTHS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # readings
-MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval to begin with: of few losses, and of many
-LONG = (64, 512)  # readings over which the interval is found at first: more than a burst, between two gaps
-LONG_STEP = 6.0  # intervals, by which a step is long or a reading late where all are uneven
+MEDIAN, UNDISTURBED = 0.5, 0.1  # quantiles of the interval to begin with: for few losses, and for many
+LONG = (64, 512)  # readings over which the interval is estimated first: more than a burst, less than between two gaps
+LONG_STEP = 6.0  # intervals: a longer step is a gap, a later reading was buffered, if all stamps are uneven
 PACKET_S = 0.5  # readings that follow each other evenly for longer have not arrived at once
-NEAR, MOSTLY = 0.25, 0.8  # of an interval, to which so many of the differences are whole multiples of it
-LOST = 0.6  # of an interval, from which on a difference is a lost reading
-COARSE = 1 / 3  # of the interval, from which on the resolution of the stamps is worse than `NEAR`
-SHORT, SOME_SHORT = 0.6, 0.05  # of the interval: if so many steps are shorter, readings are stamped on arrival
+NEAR, MOSTLY = 0.25, 0.8  # of an interval: tolerance of a whole multiple; fraction of differences that must be one
+LOST = 0.6  # of an interval: a larger difference is a lost reading
+COARSE = 1 / 3  # of the interval: with a coarser resolution the stamps are worse than `NEAR`
+SHORT, SOME_SHORT = 0.6, 0.05  # of the interval; if this fraction of steps is shorter, readings are stamped on arrival
 MORE = 1.5  # times the resolution: stamps that are later than this are not only rounded
-SMALLER, OF_NORMAL = 0.85, 0.5204  # of the squares of normal deviates; their mean over that of all
+SMALLER, OF_NORMAL = 0.85, 0.5204  # quantile of squared normal deviates; mean of those below it over the mean of all
 PASSES, SETTLED = 6, 1e-9
-DECIMALS = 7  # of a second, which stamps may be rounded to
-COUNTED = 50  # missing readings: of a longer gap their number is not exact enough to tell the interval
-PIECES, FARTHEST = 24, 1024  # of a log, at least, that tell a random walk; readings of one at most
-GROWN = (2.5, 12.0)  # times, by which its variance grows over four pieces
-WIDEST_BURST = 16  # readings, of which the least late one must be among those looked at
+DECIMALS = 7  # of a second, to which stamps may be rounded
+COUNTED = 50  # missing readings: the number in a longer gap is too inexact to refine the interval
+SEGMENTS, FARTHEST = 24, 1024  # the fewest segments of a log that show a random walk; readings of one at most
+GROWN = (2.5, 12.0)  # range of the factor by which a random walk's variance grows over four segments
+WIDEST_BURST = 16  # readings: at least one of them in a row must be on time
 
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """How n readings were sampled.
+    """The sampling of n readings.
 
-    - `interval_s`: the mean time from one reading to the next.
-    - `missing` (n − 1,): how many readings are missing between each reading and the next.
-    - `scattered`: the fraction of readings that are missing besides, nobody can say where.
-    - `width`: how many stamps have to be looked at together; 1 if each is good.
+    - `interval_s`: mean time from one reading to the next.
+    - `missing` (n − 1,): number of readings missing between each reading and the next.
+    - `scattered`: fraction of readings that are missing at unknown positions.
+    - `width`: number of stamps that have to be compared together; 1 if each is good.
     - `on_arrival`: readings were stamped when they arrived, several at once, and not when they were taken.
-    - `late` (n,): readings that were stamped much later than others soon after them, where stamps are too bad to count
-      missing readings: they had waited in a buffer.
+    - `late` (n,): readings that were stamped much later than others soon after them because they had waited in a
+      buffer; only given if stamps are too bad to count missing readings.
     """
 
     interval_s: float
@@ -62,9 +62,9 @@ class Sampling:
     late: NDArray[np.bool_] | None = None
 
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
-        """Return the steps (n − 1,) between readings at times (n,) over which so many readings or more are missing.
+        """Return the steps (n − 1,) between readings at times (n,) over which at least `fewest` readings are missing.
 
-        By bad stamps, those that are so long, and those from or to a late reading.
+        With bad stamps: the steps that are as long, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)
@@ -73,34 +73,36 @@ class Sampling:
 
     @property
     def numbers(self) -> NDArray[np.intp]:
-        """(n,) the readings' numbers, from 0, those that are missing counted."""
+        """(n,) the readings' numbers, from 0, missing ones counted."""
         return np.concatenate([[0], np.cumsum(1 + self.missing)])
 
-    def expected(self, time_s: Array, windows_s: Array) -> Array:
-        """Return how many of the readings at times (n,) belong in each of windows (k, 2), those missing counted."""
+    def count_expected(self, time_s: Array, windows_s: Array) -> Array:
+        """Return how many readings belong in each of `windows_s` (k, 2), missing ones counted, from times (n,)."""
         beyond_s = np.minimum(windows_s - time_s[0], 0.0) + np.maximum(windows_s - time_s[-1], 0.0)
         numbers = np.interp(windows_s, time_s, self.numbers) + beyond_s / self.interval_s
         return np.asarray(numbers[:, 1] - numbers[:, 0], dtype=np.float64)
 
 
 def find_sampling(time_s: Array) -> Sampling:
-    """Return how the readings at rising times (n,) were sampled; n is 2 at least."""
+    """Return the sampling of readings at rising times (n ≥ 2,)."""
     steps_s = np.diff(time_s)
     mean_s = min(_slope(time_s, apart) for apart in LONG)
     # Equal steps are as coarse as their resolution, and good.
     coarse = _resolution_s(time_s) > COARSE * mean_s and float(np.ptp(steps_s)) > SETTLED * mean_s
     uneven = float(np.quantile(steps_s, SOME_SHORT)) < SHORT * mean_s
-    single = _counted(time_s, 1, MEDIAN)
-    if single.fit >= MOSTLY and not coarse and (not uneven or single.between_gaps_s(time_s) > PACKET_S):
+    single = _count_missing(time_s, 1, MEDIAN)
+    if single.fit >= MOSTLY and not coarse and (not uneven or single.median_run_s(time_s) > PACKET_S):
         return Sampling(single.interval_s, single.missing, 0.0, 1, on_arrival=False)
     widths = takewhile(lambda width: 4 * width <= len(time_s), WIDTHS[1:])
-    counted = (_counted(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
-    found = [each for each in (single, *counted) if each.fit >= MOSTLY]
-    found = [each for each in found if each.interval_s > mean_s / 2]  # no burst is told from a gap by its own steps
-    if not found:
-        return _unlocated(time_s)
-    fewest = min(each.places for each in found)
-    best = next(each for each in found if each.places <= 2 * fewest + 1)  # a wider one also explains true losses
+    candidates = (_count_missing(time_s, width, begun) for width in widths for begun in (MEDIAN, UNDISTURBED))
+    fitting = [candidate for candidate in (single, *candidates) if candidate.fit >= MOSTLY]
+    # The steps inside a burst would make the time between bursts look like a gap.
+    fitting = [candidate for candidate in fitting if candidate.interval_s > mean_s / 2]
+    if not fitting:
+        return _estimate_unlocated_losses(time_s)
+    fewest = min(candidate.gap_count for candidate in fitting)
+    # A wider one also explains true losses.
+    best = next(candidate for candidate in fitting if candidate.gap_count <= 2 * fewest + 1)
     sampling = Sampling(best.interval_s, best.missing, 0.0, best.width, on_arrival=False)
     late_s = time_s - best.interval_s * sampling.numbers
     rounded_s = max(_resolution_s(time_s), NEAR * best.interval_s)
@@ -109,9 +111,9 @@ def find_sampling(time_s: Array) -> Sampling:
 
 
 def even_times(time_s: Array, sampling: Sampling) -> Array:
-    """Return the times (n,) at which readings were taken that were stamped on arrival; others as they are.
+    """Return the times (n,) at which readings that were stamped on arrival were taken; others unchanged.
 
-    The latency that all readings have in common stays: no stamp tells it.
+    The latency that all readings have in common stays in: no stamp shows it.
     """
     if not sampling.on_arrival:
         return time_s
@@ -126,8 +128,8 @@ def even_times(time_s: Array, sampling: Sampling) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class _Counted:
-    """The interval and the missing readings (n − 1,) by a `width`; the `fit` says how many differences agree."""
+class _Candidate:
+    """The interval and the missing readings (n − 1,) for a `width`; `fit` is the fraction of differences that agree."""
 
     width: int
     interval_s: float
@@ -135,35 +137,35 @@ class _Counted:
     fit: float
 
     @property
-    def places(self) -> int:
-        """How many steps have readings missing."""
+    def gap_count(self) -> int:
+        """Number of steps with readings missing."""
         return int(np.count_nonzero(self.missing))
 
-    def between_gaps_s(self, time_s: Array) -> float:
-        """The median time from one gap to the next, of readings at times (n,)."""
+    def median_run_s(self, time_s: Array) -> float:
+        """Return the median time from one gap to the next, of readings at times (n,)."""
         gaps = np.flatnonzero(self.missing)
         starts, ends = np.append(0, gaps + 1), np.append(gaps, len(time_s) - 1)
         return float(np.median(time_s[ends] - time_s[starts]))
 
 
-def _counted(time_s: Array, width: int, begun: float) -> _Counted:
+def _count_missing(time_s: Array, width: int, quantile: float) -> _Candidate:
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
-    interval_s, last_s = _slope(time_s, max(8, 4 * width), begun), 0.0
+    interval_s, last_s = _slope(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
     for _ in range(PASSES):
         late_s = time_s - interval_s * numbers
         later_s = _least_ahead(late_s, width)[1:] - _least_behind(late_s, width)[:-1]
         whole = np.rint(later_s / interval_s) * (later_s > LOST * interval_s)
         fit = float(np.mean(np.abs(later_s - interval_s * whole) < NEAR * interval_s))
-        missing = _at_longest(whole.astype(np.intp), steps_s) if width > 1 else whole.astype(np.intp)
+        missing = _merge_at_longest(whole.astype(np.intp), steps_s) if width > 1 else whole.astype(np.intp)
         if abs(interval_s - last_s) <= SETTLED * interval_s:
             break
         last_s, interval_s = interval_s, _interval_s(time_s, missing, width)
-    return _Counted(width, interval_s, missing, fit)
+    return _Candidate(width, interval_s, missing, fit)
 
 
 def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
-    """The mean interval, whatever is missing; from the least late readings at either end, whatever their width."""
+    """Return the mean interval from the least late readings at either end, missing readings counted."""
     steps_s, few = np.diff(time_s), missing <= COUNTED
     interval_s = float(steps_s[few].sum() / (1 + missing[few]).sum())
     numbers = np.concatenate([[0], np.cumsum(1 + missing)])
@@ -174,30 +176,30 @@ def _interval_s(time_s: Array, missing: NDArray[np.intp], width: int) -> float:
     return interval_s + float((late_s[last] - late_s[first]) / (numbers[last] - numbers[first]))
 
 
-def _unlocated(time_s: Array) -> Sampling:
-    """The sampling by stamps that are too bad, or of which too many are missing, to say where they are.
+def _estimate_unlocated_losses(time_s: Array) -> Sampling:
+    """Return the sampling if the stamps are too bad, or too many are missing, to locate the losses.
 
-    Of random losses of p of all readings the lateness gains the variance p m T² over m readings. It grows fourfold from
-    m to 4 m; what does not add up stays, and what a clock wanders grows much more.
+    Random losses of a fraction p of all readings give the lateness the variance p m T² over m readings. It grows
+    fourfold from m to 4 m; errors that do not add up stay constant, and the wander of a clock grows much more.
     """
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
-    apart = min(len(time_s) // PIECES, FARTHEST)
+    apart = min(len(time_s) // SEGMENTS, FARTHEST)
     width = max((width for width in WIDTHS if 4 * width <= apart), default=1)
     least_s = _least_ahead(time_s - mean_s * np.arange(len(time_s)), width)[: len(time_s) - width]
-    near, far = (_gained(least_s, each) for each in (max(apart // 4, 1), max(apart, 1)))
+    near, far = (_walk_variance(least_s, steps) for steps in (max(apart // 4, 1), max(apart, 1)))
     lost = width >= WIDEST_BURST and GROWN[0] * near < far < GROWN[1] * near
     nowhere = np.zeros(len(time_s) - 1, dtype=np.intp)
     scattered = far / (apart * mean_s**2) if lost else 0.0
-    usual_s = min(_slope(time_s, each) for each in LONG)
+    usual_s = min(_slope(time_s, steps) for steps in LONG)
     late_s = time_s - usual_s * np.arange(len(time_s))
     late = late_s - _least_ahead(late_s, LONG[0]) > LONG_STEP * usual_s
     return Sampling(_interval_s(time_s, nowhere, width), nowhere, scattered, width, on_arrival=False, late=late)
 
 
-def _gained(walk: Array, apart: int) -> float:
-    """The variance that a random walk (k,) gains over so many steps, whatever its trend (overlapping Allan variance).
+def _walk_variance(walk: Array, apart: int) -> float:
+    """Return the variance that a random walk (k,) gains over `apart` steps, without trend (overlapping Allan variance).
 
-    Of the smaller bends: where a buffer is emptied at first, its trend has a large one.
+    Only the smaller second differences count: a buffer that is emptied at first makes a large one.
     """
     bends = (walk[2 * apart :] - 2 * walk[apart:-apart] + walk[: -2 * apart]) ** 2
     if not len(bends):
@@ -205,27 +207,27 @@ def _gained(walk: Array, apart: int) -> float:
     return float(np.mean(bends[bends <= np.quantile(bends, SMALLER)]) / (2 * OF_NORMAL))
 
 
-def _at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """The missing readings (n − 1,) once: neighbouring steps that tell of them together, at the longest of these."""
-    found = np.zeros_like(missing)
+def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
+    """Return the missing readings (n − 1,) counted once, at the longest of neighbouring steps with the same loss."""
+    merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):
-        return found
+        return merged
     first = np.concatenate([[0], 1 + np.flatnonzero(np.diff(steps) > 1)])
     group = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(steps))))
     longest = np.lexsort((steps_s[steps], group))[np.append(first[1:], len(steps)) - 1]
-    found[steps[longest]] = np.maximum.reduceat(missing[steps], first)
-    return found
+    merged[steps[longest]] = np.maximum.reduceat(missing[steps], first)
+    return merged
 
 
 def _slope(time_s: Array, apart: int, quantile: float = MEDIAN) -> float:
-    """The interval over so many readings, the median or another quantile of it."""
+    """Return a quantile, by default the median, of the interval over `apart` readings."""
     apart = min(apart, len(time_s) - 1)
     return float(np.quantile(time_s[apart:] - time_s[:-apart], quantile) / apart)
 
 
 def _resolution_s(time_s: Array) -> float:
-    """The power of ten of a second that all stamps are multiples of; 0 if there is none."""
+    """Return the power of ten of a second that all stamps are multiples of; 0 without one."""
     for decimals in range(DECIMALS):
         scaled = (time_s - time_s[0]) * 10**decimals
         if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
@@ -234,7 +236,7 @@ def _resolution_s(time_s: Array) -> float:
 
 
 def _least(values: Array, width: int) -> Array:
-    """(n,) the least of the values around each: the larger of what is ahead and behind, where there is both."""
+    """Return the least (n,) of the values around each: the larger of the least ahead and behind, if there are both."""
     ahead, behind = _least_ahead(values, width), _least_behind(values, width)
     least = np.maximum(ahead, behind)
     least[:width], least[-width:] = ahead[:width], behind[-width:]
@@ -242,15 +244,15 @@ def _least(values: Array, width: int) -> Array:
 
 
 def _least_ahead(values: Array, width: int) -> Array:
-    """(n,) the least of each value and those after it, `width` in all."""
-    least, taken = values.copy(), 1
-    while taken < min(width, len(values)):
-        more = min(taken, width - taken)
+    """Return the least (n,) of each value and those after it, `width` in all."""
+    least, covered = values.copy(), 1
+    while covered < min(width, len(values)):
+        more = min(covered, width - covered)
         least[:-more] = np.minimum(least[:-more], least[more:])
-        taken += more
+        covered += more
     return least
 
 
 def _least_behind(values: Array, width: int) -> Array:
-    """(n,) the least of each value and those before it, `width` in all."""
+    """Return the least (n,) of each value and those before it, `width` in all."""
     return _least_ahead(values[::-1], width)[::-1]

@@ -1,4 +1,4 @@
-"""Whether a sensor still feels what the arm does: its means must change where the movement does, and not at rest."""
+"""Checks that a sensor follows the arm: its means must change with the motion, and not at rest."""
 
 from collections.abc import Collection, Sequence
 from itertools import pairwise
@@ -13,15 +13,15 @@ from rig.motion.steps import Sweep
 from rig.observation.average import Average
 from rig.observation.reference.acceleration import DwellReading
 
-OF_A_SWEEP = 0.5  # of the slowest one's speed: so much no bias changes from rest to rest
-TURNED = 0.5  # of gravity, by which two attitudes in a row must differ to tell
-FELT = 0.05  # of what they differ by; readings in g, given as m/s², are twice that
-WITHOUT_NOISE = 0.01  # of that of the other axes
+OF_A_SWEEP = 0.5  # of the slowest sweep's speed: no bias changes by as much from rest to rest
+TURNED = 0.5  # of gravity: the least difference between two attitudes in a row that is judged
+SENSED = 0.05  # of the expected difference; readings in g that are declared as m/s² show twice that
+WITHOUT_NOISE = 0.01  # of the noise of the other axes
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Readings at rest are those of no turn. Raises Fault `stuck_sensor`; `stuck_axis` if one alone has no noise."""
+    """Raise Fault `stuck_sensor` if rests read as if the sensor turned; `stuck_axis` if one axis alone has no noise."""
     if len(rests) < 2:
         return
     apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0)
@@ -38,21 +38,18 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
         )
 
 
-def check_other_way(sweep: Sweep, read: Collection[str | None], fault: Fault) -> None:
-    """What was `read` well in a sweep about the same joint before is neither mounted nor set up wrong.
-
-    Raises Fault `stuck_sensor`.
-    """
-    if sweep.joint_name in read:
+def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
+    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly: the mounting is not wrong then."""
+    if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 
 
 def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
-    """Readings in two attitudes differ as gravity in them does. Raises Fault `stuck_sensor`."""
+    """Raise Fault `stuck_sensor` if the readings in two attitudes do not differ as gravity does."""
     for one, other in pairwise(dwells):
         differ = float(np.linalg.norm((one.attitude - other.attitude) @ site.up))
-        felt_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
-        if differ > TURNED and felt_m_s2 < FELT * differ * site.gravity_m_s2:
+        sensed_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
+        if differ > TURNED and sensed_m_s2 < SENSED * differ * site.gravity_m_s2:
             raise Fault("stuck_sensor", f"the accelerometer reads the same in {one.name} and {other.name}", REMEDY)
 
 

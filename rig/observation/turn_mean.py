@@ -1,11 +1,11 @@
-"""The mean of readings over a turn or an arc, and the mean of what the arm turned meanwhile, by the same weights.
+"""The mean of readings over a turn or an arc, and the mean rate of the arm by the same weights.
 
-An even mean keeps of a vibration by how much its phase differs between both ends: 3 mrad/s at 8.5 Hz leave 20 µrad/s in
-six seconds, more than the noise of a good gyroscope does. What the encoders see of it is in both means alike, and does
-no harm. What they do not see is found in the readings as lines, and the weights leave nothing of these. The same
-weights then make the mean of the arm's rate: whatever they do to a ripple they do to both (`mean_weights`).
+An even mean leaves of a vibration the difference of its phase between both ends: 3 mrad/s at 8.5 Hz leave 20 µrad/s in
+six seconds, more than the noise of a good gyroscope. A vibration that the encoders measure is in both means alike and
+does no harm. Another one is found in the readings as spectral lines, and the weights cancel these. The same weights
+then average the arm's rate, so that a ripple has the same effect on both (`mean_weights`).
 
-What is left of the readings beside lines and rate is the noise, which is white more often than not.
+The residual of the readings after lines and rate is the noise, which is usually white.
 """
 
 from dataclasses import dataclass, replace
@@ -30,21 +30,23 @@ from rig.observation.statistics.lines import (
 )
 from rig.observation.statistics.mean import Mean, weighted_means, whole
 
-SLOW = 8.0  # cycles in a turn: slower lines are told badly from what comes once and twice in it
-UNSEEN = LineSearch(slowest=5.0)
-SEEN = LineSearch(slowest=2.5, beats=0, most=5)
+SLOW = 8.0  # cycles in a turn: slower lines are hard to separate from what comes once and twice in it
+NOT_ENCODED = LineSearch(slowest=5.0)
+ENCODED = LineSearch(slowest=2.5, beats=0, most=5)
 
 
 @dataclass(frozen=True, slots=True)
 class SampledTurn:
-    """A turn or an arc as a sensor's n samples see it.
+    """A turn or an arc at a sensor's n samples.
 
-    share (n,): which share of its time was over. rates_rad_s (n, 3): the flange's mean rate around each sample, as the
-    encoders have it. uneven_rad_s (n,): of that what is along the axis, less its mean over the turn by both ends.
-    passing (n, k): columns of what comes once, twice and so on in a turn, of an arc less their means. beats: those of
-    its lines, see `Revolution`. encoders_true: whether the encoders tell the turning within a turn, and not over whole
-    turns alone. closed: whether it is of whole turns. complete: whether samples follow each other closely, and none is
-    missing for long.
+    - `share` (n,): elapsed fraction of its time.
+    - `rates_rad_s` (n, 3): the flange's mean rate around each sample, by the encoders.
+    - `uneven_rad_s` (n,): the part of that along the axis, less its mean over the turn by both ends.
+    - `passing` (n, k): columns of what comes once, twice and so on in a turn; for an arc less their means.
+    - `beats`: number of sidebands of its lines, see `Revolution`.
+    - `encoders_true`: whether the encoders are right within a turn, and not over whole turns alone.
+    - `closed`: whether it consists of whole turns.
+    - `complete`: whether samples follow each other closely, and no long gap is among them.
     """
 
     share: Array
@@ -59,116 +61,114 @@ class SampledTurn:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Lines that are taken out of a mean: `cycles` (k,) of each in the turn, the last `unseen` ones by no encoder.
+    """Lines to remove from a mean: `cycles` (k,) of each in the turn, the last `not_encoded` of which no encoder shows.
 
-    What the encoders see of a slow ripple needs no line: it is `seen` (n, m) as one column, beside how it changes and
-    what else they tell, their noise above all. Columns (n, 0 to 2) of the `rate` are taken out. Of few samples, and of
-    those with a gap between, it is the rate, for they do not meet a ripple evenly. Else it is how the slow ripple
-    changes in a whole turn, which a sensor reads as well as it lags: even weights leave nothing of that, those that are
-    free of slow lines do.
+    A slow ripple that the encoders measure needs no line: it is one column of `encoded` (n, m), with its changes and
+    the rest of what the encoders show, mostly noise. Columns (n, 0 to 2) of the `rate` are removed: the rate itself
+    with few samples or with a gap, which do not sample a ripple evenly; else the changes of the slow ripple in a whole
+    turn, which a sensor that lags reads too. Even weights cancel those changes; weights without slow lines do not.
     """
 
     cycles: Array
-    unseen: int
-    seen: Array
+    not_encoded: int
+    encoded: Array
     rate: Array
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) in these steps and its weights (n,), which are to make that of what turned.
+    """Return the mean of readings (n, 3) in these steps, and its weights (n,), for averaging the arm's rate as well.
 
-    A line slower than `SLOW` is told badly: what it changes in the mean counts as a standard deviation, or what one of
-    its size does.
+    A line slower than `SLOW` is poorly determined: its effect on the mean, or that of one of its size, adds variance.
     """
     ones = whole(readings)
     steady = np.column_stack([ones, turn.passing])
-    lines = _lines(readings, steady, turn)
+    lines = _find_turn_lines(readings, steady, turn)
     shaking = waves(lines.cycles, turn.share, turn.beats)
     weights = mean_weights(ones, np.column_stack([turn.passing, lines.rate, shaking]))
-    columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.seen]))
+    columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
-    noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.unseen else MEMORIES)
+    noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
     slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
     changed = np.zeros(3)
     if slow.any():
-        beside = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
-        without = mean_weights(ones, beside)
-        even = _beside(np.column_stack([ones, turn.uneven_rad_s]), readings)
-        left = _beside(np.column_stack([ones, beside, lines.seen]), readings)
+        nuisance = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
+        without = mean_weights(ones, nuisance)
+        even = _fit_residuals(np.column_stack([ones, turn.uneven_rad_s]), readings)
+        residuals = _fit_residuals(np.column_stack([ones, nuisance, lines.encoded]), readings)
         change = (weights - without)[0]
-        changed = np.maximum((change @ even) ** 2, _by_size(shaking[:, slow], change, left))
+        changed = np.maximum((change @ even) ** 2, _line_variance(shaking[:, slow], change, residuals))
     return replace(mean, variance=mean.variance + changed, cycles=lines.cycles), weights[0]
 
 
-def _by_size(slow: Array, weights: Array, left: Array) -> Array:
-    """Return (3,) the variance that slow columns (n, k) in what is left of readings (n, 3) make by weights (n,).
+def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
+    """Return the variance (3,) that slow columns (n, k) fitted to residuals (n, 3) cause in a mean by weights (n,).
 
-    By their size alone: a line may come with any phase, and that of one turn may change a mean by little where the line
-    is large.
+    By their size alone: a line may come with any phase, and the phase of one turn may change the mean by little
+    although the line is large.
     """
-    powers = (fitted(slow, left) ** 2).reshape(-1, 2, 3).sum(axis=1)
+    powers = (fitted(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
     variance: Array = kept @ powers / 2
     return variance
 
 
-def _beside(columns: Array, values: Array) -> Array:
-    """Return what columns (n, k) of any size leave of values (n, m)."""
+def _fit_residuals(columns: Array, values: Array) -> Array:
+    """Return the residuals of values (n, m) after a fit of columns (n, k) of any size."""
     unit = unit_columns(columns)
-    left: Array = values - unit @ fitted(unit, values)
-    return left
+    residuals: Array = values - unit @ fitted(unit, values)
+    return residuals
 
 
-def _lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find what vibrates in readings (n, 3) beside steady columns (n, k) and what the encoders see.
+def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
+    """Find the vibrations in readings (n, 3), apart from steady columns (n, k) and what the encoders measure.
 
-    Fast lines of the arm's rate are known to be in the readings, at the same frequency. What is left tells the others.
+    Fast lines of the arm's rate are in the readings too, at the same frequency. The residuals show the others.
     """
     uneven = turn.uneven_rad_s[:, None]
     none = uneven[:, :0]
     if len(readings) < FEWEST:
         return Lines(NONE, 0, none, uneven)
     if not turn.complete:
-        known = np.column_stack([steady, uneven])
-        cycles = find_lines(readings - known @ fitted(known, readings), LineSearch(beats=turn.beats), share=turn.share)
+        fixed = np.column_stack([steady, uneven])
+        cycles = find_lines(readings - fixed @ fitted(fixed, readings), LineSearch(beats=turn.beats), share=turn.share)
         return Lines(cycles, len(cycles), none, uneven)
-    along, left = (each - steady @ fitted(steady, each) for each in (uneven, readings))
+    ripple_rate, residuals = (values - steady @ fitted(steady, values) for values in (uneven, readings))
     if not turn.encoders_true:
-        cycles = find_lines(left, LineSearch(beats=turn.beats), share=turn.share)
-        return Lines(cycles, len(cycles), along, none)
-    heard = LineSearch(SEEN.stands_out, SEEN.slowest, SEEN.beats, SEEN.most, floor=median_power(left))
-    ripple = find_lines(along, heard, share=turn.share)
-    columns = waves(ripple, turn.share, SEEN.beats)
-    sizes = fitted(columns, along)
-    fast = np.repeat(ripple >= SLOW, wide(SEEN.beats))
-    slow = along - columns[:, fast] @ sizes[fast]
+        cycles = find_lines(residuals, LineSearch(beats=turn.beats), share=turn.share)
+        return Lines(cycles, len(cycles), ripple_rate, none)
+    search = LineSearch(ENCODED.stands_out, ENCODED.slowest, ENCODED.beats, ENCODED.most, floor=median_power(residuals))
+    ripple = find_lines(ripple_rate, search, share=turn.share)
+    columns = waves(ripple, turn.share, ENCODED.beats)
+    sizes = fitted(columns, ripple_rate)
+    fast = np.repeat(ripple >= SLOW, wide(ENCODED.beats))
+    slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = slow_part(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it looks like what encoders err
-    seen = np.column_stack([smooth, late, slow - smooth])
-    left = _beside(np.column_stack([steady, seen, columns[:, fast]]), readings)
-    heard_too = ripple[ripple >= SLOW]
-    cycles = find_lines(left, UNSEEN, heard_too, turn.share)
-    return Lines(cycles, len(cycles) - len(heard_too), seen, late)
+    encoded = np.column_stack([smooth, late, slow - smooth])
+    residuals = _fit_residuals(np.column_stack([steady, encoded, columns[:, fast]]), readings)
+    encoded_lines = ripple[ripple >= SLOW]
+    cycles = find_lines(residuals, NOT_ENCODED, encoded_lines, turn.share)
+    return Lines(cycles, len(cycles) - len(encoded_lines), encoded, late)
 
 
-def lagging(along: Array, columns: Array, share: Array) -> Array:
-    """Return (n, 2) what a sensor that lags reads of the slow part of a rate `along` (n,), beside columns (n, k)."""
-    beside = along[:, None] - columns @ fitted(columns, along[:, None])
-    return _changes(slow_part(beside, share))
+def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
+    """Return columns (n, 2) that a lagging sensor reads of the slow part of a rate (n,), apart from columns (n, k)."""
+    residuals = rate[:, None] - columns @ fitted(columns, rate[:, None])
+    return _changes(slow_part(residuals, share))
 
 
 def _changes(slow: Array) -> Array:
-    """(n, 2) how a rate (n, 1) changes, which a lag shows, and how that does, which a filter shows."""
+    """Return the first and second differences (n, 2) of a rate (n, 1): a lag shows the first, a filter the second."""
     change = np.gradient(slow, axis=0)
     return np.column_stack([change, np.gradient(change, axis=0)])
 
 
 def slow_part(rates: Array, share: Array) -> Array:
-    """Return what of rates (n, m) comes less often than `SLOW` times in a turn, of which a share (n,) was over.
+    """Return the part of rates (n, m) that comes less often than `SLOW` times in a turn; `share` (n,) is elapsed time.
 
-    Waves of half a turn tell it, for a vibration does not end with the turn.
+    Waves of half a turn describe it, for a vibration does not end with the turn.
     """
     halves = turning(np.pi * share, int(2 * SLOW))
     slow: Array = halves @ fitted(halves, rates)

@@ -1,4 +1,4 @@
-"""When the sweeps, rests and dwells of a recording were, on the controller's clock. Pure."""
+"""The windows of a recording's sweeps, rests and dwells on the controller's clock. Pure."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -31,13 +31,13 @@ class Window:
 
 
 def inside(time_s: Array, window: Window) -> slice:
-    """The samples of a window among those at rising times (n,)."""
+    """Return the samples of a window among those at rising times (n,)."""
     return slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A sweep that was begun and finished, and when."""
+    """A sweep that was started and finished, and its window."""
 
     sweep: Sweep
     window: Window
@@ -45,37 +45,41 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Dwelt:
-    """A dwell that was begun and finished, and when."""
+    """A dwell that was started and finished, and its window."""
 
     dwell: Dwell
     window: Window
 
 
 def swept(run: RunData) -> Iterator[Finished]:
-    """The sweeps of a recording that were begun and finished, in order; an interrupted one is left out."""
-    for event, window in _between(run, SweepStarted, SweepFinished):
+    """Yield the sweeps that were started and finished, in order; interrupted ones are left out."""
+    for event, window in _pair_events(run, SweepStarted, SweepFinished):
         yield Finished(event.sweep, window)
 
 
 def rested(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
-    """The rests that were begun and finished, in order; a dwell is one too.
+    """Yield the rests and dwells that were started and finished, in order.
 
-    Not those whose index is in `superseded`, nor a rest just before or after such a sweep or dwell: what made it worth
-    repeating may have begun before it, and have lasted.
+    Left out are those whose index is in `superseded`, and rests just before or after such a sweep or dwell: the
+    disturbance for which it was repeated may have begun earlier or lasted longer.
     """
-    rests = [window for _, window in _between(run, RestStarted, RestFinished) if not _beside(run, window, superseded)]
-    dwells = [each.window for each in dwelt(run) if each.dwell.index not in superseded]
+    rests = [
+        window
+        for _, window in _pair_events(run, RestStarted, RestFinished)
+        if not _is_superseded(run, window, superseded)
+    ]
+    dwells = [dwell.window for dwell in dwelt(run) if dwell.dwell.index not in superseded]
     yield from sorted([*rests, *dwells], key=lambda window: window.start_s)
 
 
 def dwelt(run: RunData) -> Iterator[Dwelt]:
-    """The dwells that were begun and finished, in order."""
-    for event, window in _between(run, DwellStarted, DwellFinished):
+    """Yield the dwells that were started and finished, in order."""
+    for event, window in _pair_events(run, DwellStarted, DwellFinished):
         yield Dwelt(event.dwell, window)
 
 
-def _beside(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
-    """Whether what came before the rest, or was to come after it, is in `superseded`."""
+def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
+    """Return whether the step before the rest, or the one due after it, is in `superseded`."""
     before, after = -1, None
     for recorded in run.events if superseded else ():
         match recorded.event:
@@ -87,8 +91,8 @@ def _beside(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
     return before in superseded or (before + 1 if after is None else after) in superseded
 
 
-def _between(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
-    """Every event of type `end` that has one of type `begin` before it, both at a known time of the controller's."""
+def _pair_events(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
+    """Yield every event of type `end` after one of type `begin`, with its window, if both have a controller time."""
     started_s = None
     for recorded in run.events:
         event, time_s = recorded.event, recorded.controller_time_s

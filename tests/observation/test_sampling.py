@@ -24,7 +24,7 @@ def test_nothing_is_lost_where_stamps_are_only_bad(rate_hz: float, stamps: Stamp
     found = find_sampling(stamped_s)
     assert found.interval_s == pytest.approx(1 / rate_hz, rel=1e-3)
     assert found.missing.sum() <= 1e-3 * count and found.scattered == 0
-    expected = found.expected(stamped_s, stamped_s[[[0, -1]]])
+    expected = found.count_expected(stamped_s, stamped_s[[[0, -1]]])
     assert expected[0] == pytest.approx(count - 1, abs=4)
 
 

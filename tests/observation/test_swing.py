@@ -10,7 +10,7 @@ import pytest
 from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
-from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD, without_swing
+from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from support.recordings.synthetic_run import Setup, synthetic_run
 
 TIME_S = 0.008 * np.arange(370)
@@ -18,7 +18,7 @@ MOVED_RAD = 3.5e-3
 
 
 def left_rad(angle: Array) -> float:
-    return float(np.ptp(without_swing(np.column_stack([angle, 0.3 * angle])), axis=0).max())
+    return float(np.ptp(remove_oscillation(np.column_stack([angle, 0.3 * angle])), axis=0).max())
 
 
 @pytest.mark.parametrize("hertz", [0.3, 0.37, 0.81, 2.6])

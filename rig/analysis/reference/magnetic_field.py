@@ -22,7 +22,7 @@ from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.reference.accelerometer_model import Dwells
 from rig.estimation.reference.magnetometer import FieldDrift, Uniformity, field_drift, uniformity
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
-from rig.observation.field import beside, field_readings, field_tests
+from rig.observation.field import field_readings, field_tests, find_companion
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.mean import Held, by_axis
 
@@ -152,7 +152,7 @@ def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
     """How far off the arm's attitudes may be, with 2σ, by the accelerometer that stood in them on the same clock."""
-    by = next((other for run in recordings if (other := beside(run, name)) in accelerometers), None)
+    by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     found = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = found.solution.attitude_error
     return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)

@@ -15,7 +15,7 @@ from rig.observation.average import Stream
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.lines import fitted, turning, waves
-from rig.observation.turn_mean import lagging
+from rig.observation.turn_mean import lag_columns
 
 NEXT_S = 1e-7  # rounding of a sample's time
 
@@ -75,4 +75,4 @@ def _passing(time_s: Array, turn: Observation, along_rad_s: Array) -> Array:
     if turn.arc_rad is not None:
         return np.column_stack([of_turn, lines])
     columns = np.column_stack([np.ones(len(share)), of_turn, lines])
-    return np.column_stack([of_turn, lines, lagging(along_rad_s, columns, share)])
+    return np.column_stack([of_turn, lines, lag_columns(along_rad_s, columns, share)])

@@ -10,7 +10,7 @@ from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
 from rig.observation.average import between
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
-from rig.observation.field import dwelt_field
+from rig.observation.field import read_field_in_dwells
 from rig.observation.observed_run import ObservedRun
 from rig.observation.reference.acceleration import DwellReading, gravity_beside
 from rig.observation.windows import Window
@@ -73,7 +73,7 @@ def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
     """Return what a magnetometer read in each of its dwells."""
     return [
         _raw_dwell(dwell, counts.astype(np.int64), time_s, recording)
-        for dwell, counts, time_s in dwelt_field(recording, name)
+        for dwell, counts, time_s in read_field_in_dwells(recording, name)
     ]
 
 

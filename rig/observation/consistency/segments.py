@@ -18,7 +18,7 @@ from rig.estimation.statistics.rounding import Steps
 from rig.observation.average import Average, Stream, between
 from rig.observation.consistency.raw_readings import REST, RawReadings, counts_of
 from rig.observation.motion.arm_motion import ArmMotion
-from rig.observation.observe import Observation, response_of
+from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
 from rig.observation.statistics.coloured_noise import widening
 from rig.observation.statistics.lines import LineSearch, find_lines, fitted, swings, waves
@@ -98,7 +98,7 @@ def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[Se
         ),
         *(
             _segment_rest(
-                stream, recording.motion, rest, of_rest, response_of(stream, recording.sensors[name].revolutions)
+                stream, recording.motion, rest, of_rest, fit_response(stream, recording.sensors[name].revolutions)
             )
             for recording, stream, rest in rests
         ),

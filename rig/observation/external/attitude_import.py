@@ -124,7 +124,7 @@ def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool 
     check_overlap(time_s, said.windows)
     sampling = find_sampling(time_s)
     check_scattered(sampling)
-    expected = sampling.expected(time_s, said.rows_s)
+    expected = sampling.count_expected(time_s, said.rows_s)
     counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
     mostly = (counts > 0) & (counts >= MOSTLY * expected - 1)
     sampled = said.of(np.flatnonzero(mostly))

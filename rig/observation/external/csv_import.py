@@ -117,7 +117,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     check_overlap(time_s, windows)
     sampling = find_sampling(time_s)
     check_scattered(sampling)
-    expected = sampling.expected(time_s, sweeps[:, :2]).tolist()
+    expected = sampling.count_expected(time_s, sweeps[:, :2]).tolist()
     turns, rests = [], []
     for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
         within = inside(time_s, window)

@@ -77,7 +77,7 @@ class Account:
         """The readings that are missing in dwells with the samples `kept`, if there are any."""
         sampling = find_sampling(self.time_s)
         windows_s = np.array([(each.start_s, each.end_s) for each in self.rows.windows]).reshape(-1, 2)
-        expected = np.floor(sampling.expected(self.time_s, windows_s[self._kept])).astype(int)
+        expected = np.floor(sampling.count_expected(self.time_s, windows_s[self._kept])).astype(int)
         gaps = [each[:-1][sampling.missing[each[:-1]] > 0] for each in kept]
         inside = [int(sampling.missing[each].sum()) for each in gaps]
         lost = [max(within, wanted - len(each)) for within, wanted, each in zip(inside, expected, kept, strict=True)]

@@ -11,7 +11,7 @@ import numpy as np
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.known_turns import Gyroscope, Mean, Turn
-from rig.observation.arm_rests import bias_drift
+from rig.observation.arm_rests import estimate_bias_drift
 from rig.observation.average import Average
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_windows import average_of
@@ -78,7 +78,7 @@ def turned(
         return None
     interval_s = find_sampling(time_s).interval_s
     noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * interval_s)
-    gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(bias_drift(resting)))
+    gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(estimate_bias_drift(resting)))
     samples = sum(rest.samples - 1 for rest in resting)
     return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1))
 

@@ -25,7 +25,7 @@ from rig.motion.steps import Sweep
 from rig.observation.motion.even_turn import SMOOTHED_S, find_even_turn, smoothed, well_timed
 from rig.observation.motion.known_motion import MIN_RATE_RAD_S, check_span, closely_followed, not_finite
 from rig.observation.motion.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
-from rig.observation.swing import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, without_swing
+from rig.observation.swing import FEWEST_OF_SWING, MAX_TRAVEL_AT_REST_RAD, remove_oscillation
 from rig.observation.windows import Window
 
 RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
@@ -132,7 +132,7 @@ class ArmMotion:
             return None
         moved_rad = float(np.ptp(q_rad, axis=0).max())
         if moved_rad > MAX_TRAVEL_AT_REST_RAD and len(q_rad) >= FEWEST_OF_SWING:
-            moved_rad = float(np.ptp(without_swing(q_rad), axis=0).max())
+            moved_rad = float(np.ptp(remove_oscillation(q_rad), axis=0).max())
         return moved_rad
 
     def swing_rates(self, time_s: Array) -> Array:

@@ -70,7 +70,9 @@ def read_each_dwell(
 
 def accelerations(stream: Stream, inside: slice) -> Array:
     """(n, 3) m/s² of the samples inside."""
-    return stream.taken(ACCELERATION, stream.sensor.channel(ACCELERATION).values(stream.raw[inside]), inside)
+    return stream.correct_temperature(
+        ACCELERATION, stream.sensor.channel(ACCELERATION).values(stream.raw[inside]), inside
+    )
 
 
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.errors import Fault
-from rig.observation.arm_rests import standing
+from rig.observation.arm_rests import trim_rest
 from rig.observation.motion.arm_motion import motion_of
 from rig.observation.motion.even_turn import smoothed
 from rig.observation.windows import rested, swept
@@ -46,7 +46,7 @@ def test_what_turned_the_encoder_wrong_is_not_in_the_speed() -> None:
 @pytest.mark.slow
 def test_a_shaft_that_dithers_is_at_rest(drawn: Drawn) -> None:
     motion = motion_of(drawn.runs[0])
-    assert all(standing(motion, window) is not None for window in rested(drawn.runs[0]))
+    assert all(trim_rest(motion, window) is not None for window in rested(drawn.runs[0]))
 
 
 @pytest.mark.slow
