@@ -10,7 +10,7 @@ from rig.data.recording.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.average import Average, Stream, between, build_average
 from rig.observation.motion.arm_motion import ArmMotion
-from rig.observation.statistics.beside_lines import mean_of_standing
+from rig.observation.statistics.beside_lines import average_standstill
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Window, rested
 
@@ -83,5 +83,5 @@ def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: A
         return None
     time_s = stream.time_s[inside]
     readings = stream.readings_rad_s[inside] - motion.swing_rates(time_s) @ response.T
-    mean, averaged_window = mean_of_standing(readings, time_s, still, stream.steps)
+    mean, averaged_window = average_standstill(readings, time_s, still, stream.steps)
     return add_attitude(build_average(stream, inside, averaged_window, mean), motion)

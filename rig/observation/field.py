@@ -15,7 +15,7 @@ from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import steps_of
 from rig.observation.observed_run import ObservedRun, one_clock
 from rig.observation.reference.acceleration import DwellReading, check_complete
-from rig.observation.statistics.mean import Held, Mean, even_mean
+from rig.observation.statistics.mean import Mean, StaticReading, even_mean
 from rig.observation.windows import Window, inside, rested
 
 AT_HOME_RAD = 1e-3  # of any joint
@@ -34,7 +34,7 @@ def dwelt_beside(run: RunData, name: str, sensors: Iterable[str]) -> str | None:
     return next((sensor for sensor in sensors if one_clock(run, sensor, name)), None)
 
 
-def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[Held, ...]:
+def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
     """Average a magnetometer's readings in the dwells in which an accelerometer on its clock was read.
 
     The gyroscope's time base serves both. The magnetometer's delay against that gyroscope does not matter for a mean at
@@ -45,7 +45,7 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
         return ()
     time_s = recording.time_s(name, other)
     return tuple(
-        Held(
+        StaticReading(
             dwell.index,
             dwell.name,
             field_mean(recording.run, name, time_s, dwell, thresholds),

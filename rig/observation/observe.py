@@ -29,7 +29,7 @@ from rig.observation.motion.arm_motion import ArmMotion, is_sparse
 from rig.observation.motion.revolution import Revolution, arm_states_lost, describe
 from rig.observation.reference.acceleration import DwellReading, dwell_readings
 from rig.observation.reference.swept_acceleration import SweptAcceleration, swept_acceleration
-from rig.observation.statistics.lines import BEATS, turning
+from rig.observation.statistics.lines import BEATS, harmonics
 from rig.observation.stuck_check import check_dwells, check_other_direction, check_rests
 from rig.observation.timebase import TimeBase
 from rig.observation.turn_mean import SampledTurn, turn_mean
@@ -225,7 +225,7 @@ def _average_revolution(
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
     """Return a turn at the sample times (n,), for those samples whose arm motion is recorded: `covered` (n,)."""
     fraction = (time_s - turn.start_s) / turn.duration_s
-    waves = turning(turn.angle_rad * fraction, 2 * turn.beats)[covered]
+    waves = harmonics(turn.angle_rad * fraction, 2 * turn.beats)[covered]
     if not turn.closed:
         waves -= waves.mean(axis=0)  # over an arc gravity's part stays in the mean; the attitudes account for it
     rates = motion.sampled_rates(time_s)[covered]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.motion.known_motion import KnownMotion, check_span, not_finite
-from rig.observation.statistics.coloured_noise import widening
+from rig.observation.statistics.coloured_noise import correlation_inflation
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
@@ -322,7 +322,7 @@ def _refine_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion:
     by_offset = motion.rate(t, 1) @ fitted[:3]
     by_clock = np.hstack([by_offset, by_offset * since[:, None]])
     by_clock -= columns @ (inverse @ by_clock)
-    inflation = np.array([widening(noise) for noise in residual.T])
+    inflation = np.array([correlation_inflation(noise) for noise in residual.T])
     weights = 1 / (np.einsum("na,na->a", residual, residual) / len(t) * inflation + np.finfo(np.float64).tiny)
     normal = np.einsum("iaja,a->ij", (by_clock.T @ by_clock).reshape(2, 3, 2, 3), weights)
     right = np.einsum("iaa,a->i", (by_clock.T @ residual).reshape(2, 3, 3), weights)

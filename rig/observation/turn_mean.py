@@ -15,18 +15,18 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import mean_weights
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.beside_lines import BRIEF, FEWEST, noise_of
+from rig.observation.statistics.beside_lines import BRIEF, FEWEST, estimate_noise
 from rig.observation.statistics.coloured_noise import MEMORIES
 from rig.observation.statistics.lines import (
     NONE,
     LineSearch,
+    column_count,
     find_lines,
-    fitted,
+    fit_columns,
+    harmonics,
     median_power,
-    turning,
     unit_columns,
     waves,
-    wide,
 )
 from rig.observation.statistics.mean import Mean, weighted_means, whole
 
@@ -88,9 +88,9 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
     columns = unit_columns(np.column_stack([steady, lines.rate, shaking, lines.encoded]))
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=1e-6)
     smooth = columns @ coefficients
-    noise = noise_of(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
+    noise = estimate_noise(readings - smooth, int(rank), steps, BRIEF if lines.not_encoded else MEMORIES)
     (mean,) = weighted_means(readings, ones, weights, smooth=smooth, noise=noise, steps=steps)
-    slow = np.repeat(lines.cycles < SLOW, wide(turn.beats))
+    slow = np.repeat(lines.cycles < SLOW, column_count(turn.beats))
     changed = np.zeros(3)
     if slow.any():
         nuisance = np.column_stack([turn.passing, lines.rate, shaking[:, ~slow]])
@@ -108,7 +108,7 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     By their size alone: a line may come with any phase, and the phase of one turn may change the mean by little
     although the line is large.
     """
-    powers = (fitted(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
+    powers = (fit_columns(slow, residuals) ** 2).reshape(-1, 2, 3).sum(axis=1)
     kept = ((weights @ slow) ** 2).reshape(-1, 2).sum(axis=1)
     variance: Array = kept @ powers / 2
     return variance
@@ -117,7 +117,7 @@ def _line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 def _fit_residuals(columns: Array, values: Array) -> Array:
     """Return the residuals of values (n, m) after a fit of columns (n, k) of any size."""
     unit = unit_columns(columns)
-    residuals: Array = values - unit @ fitted(unit, values)
+    residuals: Array = values - unit @ fit_columns(unit, values)
     return residuals
 
 
@@ -132,17 +132,19 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
         return Lines(NONE, 0, none, uneven)
     if not turn.complete:
         fixed = np.column_stack([steady, uneven])
-        cycles = find_lines(readings - fixed @ fitted(fixed, readings), LineSearch(beats=turn.beats), share=turn.share)
+        cycles = find_lines(
+            readings - fixed @ fit_columns(fixed, readings), LineSearch(beats=turn.beats), fraction=turn.share
+        )
         return Lines(cycles, len(cycles), none, uneven)
-    ripple_rate, residuals = (values - steady @ fitted(steady, values) for values in (uneven, readings))
+    ripple_rate, residuals = (values - steady @ fit_columns(steady, values) for values in (uneven, readings))
     if not turn.encoders_true:
-        cycles = find_lines(residuals, LineSearch(beats=turn.beats), share=turn.share)
+        cycles = find_lines(residuals, LineSearch(beats=turn.beats), fraction=turn.share)
         return Lines(cycles, len(cycles), ripple_rate, none)
     search = LineSearch(ENCODED.stands_out, ENCODED.slowest, ENCODED.beats, ENCODED.most, floor=median_power(residuals))
-    ripple = find_lines(ripple_rate, search, share=turn.share)
+    ripple = find_lines(ripple_rate, search, fraction=turn.share)
     columns = waves(ripple, turn.share, ENCODED.beats)
-    sizes = fitted(columns, ripple_rate)
-    fast = np.repeat(ripple >= SLOW, wide(ENCODED.beats))
+    sizes = fit_columns(columns, ripple_rate)
+    fast = np.repeat(ripple >= SLOW, column_count(ENCODED.beats))
     slow = ripple_rate - columns[:, fast] @ sizes[fast]
     smooth = slow_part(slow, turn.share)
     late = _changes(smooth) if turn.closed else none  # over an arc it looks like what encoders err
@@ -155,7 +157,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 def lag_columns(rate: Array, columns: Array, share: Array) -> Array:
     """Return columns (n, 2) that a lagging sensor reads of the slow part of a rate (n,), apart from columns (n, k)."""
-    residuals = rate[:, None] - columns @ fitted(columns, rate[:, None])
+    residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
     return _changes(slow_part(residuals, share))
 
 
@@ -170,6 +172,6 @@ def slow_part(rates: Array, share: Array) -> Array:
 
     Waves of half a turn describe it, for a vibration does not end with the turn.
     """
-    halves = turning(np.pi * share, int(2 * SLOW))
-    slow: Array = halves @ fitted(halves, rates)
+    halves = harmonics(np.pi * share, int(2 * SLOW))
+    slow: Array = halves @ fit_columns(halves, rates)
     return slow

@@ -58,11 +58,11 @@ def along(axis_flange: Sequence[float] | Array) -> float:
 
 def dwell_row(read: ReadAtRest) -> Row:
     """What was read in an attitude: the size of it stands beside the one that is expected, in the unit on a screen."""
-    quantity, reading = read.of.quantity, read.reading
+    quantity, reading = read.subject.quantity, read.reading
     mean, size, unit = reading.mean, float(np.linalg.norm(reading.mean)), quantity.reading
     axis, sign = nearest_axis(mean)
     return {
-        **_dwell(read.of),
+        **_dwell(read.subject),
         "towards": f"{'+' if sign > 0 else '−'}{axis} {quantity.towards}",
         "size": size / unit.size,
         "std": float(np.sqrt(mean**2 @ reading.variance)) / size / unit.size if size else None,

@@ -55,7 +55,7 @@ from rig.observation.average import Average
 from rig.observation.external.omitted import Omitted
 from rig.observation.observe import Observation
 from rig.observation.reference.acceleration import DwellReading
-from rig.observation.statistics.mean import Held, Mean
+from rig.observation.statistics.mean import Mean, StaticReading
 from rig.observation.timebase import TimeBase
 
 
@@ -150,7 +150,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
     accelerometer.AccelerationSolutionEntry: (_OTHER_METHOD,),
     accelerometer.DwellEntry: (
         _row(DwellReading, same="index name attitude temperature_c"),
-        _row(Held, same="index name attitude"),
+        _row(StaticReading, same="index name attitude"),
         _MEAN,
     ),
     accelerometer.AlignmentEntry: (_row(Alignment, rotation_rad="vector_rad"),),
@@ -162,7 +162,7 @@ SOURCES: Final[Mapping[type[BaseModel], tuple[Row, ...]]] = {
         _TRIAXIAL,
     ),
     magnetometer.FieldSolutionEntry: (_OTHER_METHOD,),
-    magnetometer.FieldDwellEntry: (_row(DwellReading, Held, same="index name attitude"), _MEAN),
+    magnetometer.FieldDwellEntry: (_row(DwellReading, StaticReading, same="index name attitude"), _MEAN),
     magnetometer.UniformityEntry: (_row(Uniformity, same="chi_square degrees_of_freedom limit attitude_error_rad"),),
     magnetometer.FieldDriftEntry: (_row(FieldDrift, same="change_t std_t chi_square limit"),),
     magnetometer.ReversalEntry: (

@@ -22,7 +22,7 @@ from rig.data.run_folder import next_recording, recordings, resuming
 from rig.errors import Fault, ProblemError, Refused
 from rig.motion.steps import Plan
 from rig.observation.reference.acceleration import DwellReading
-from rig.observation.statistics.mean import Held, QuantityInDwell, ReadAtRest
+from rig.observation.statistics.mean import QuantityInDwell, ReadAtRest, StaticReading
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
@@ -274,5 +274,5 @@ def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead
             yield _read(name, FIELD, each, solved.field_t)
 
 
-def _read(name: str, quantity: Quantity, dwell: DwellReading | Held, expected: float) -> AttitudeRead:
+def _read(name: str, quantity: Quantity, dwell: DwellReading | StaticReading, expected: float) -> AttitudeRead:
     return AttitudeRead(ReadAtRest(QuantityInDwell(name, quantity, dwell.index, dwell.name), dwell.reading, expected))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.statistics.rounding import Steps, found_steps, rounding_left
-from rig.observation.statistics.beside_lines import rest_beside_lines
+from rig.observation.statistics.beside_lines import average_rest
 from rig.observation.statistics.mean import even_mean
 from rig.observation.windows import Window
 
@@ -56,6 +56,6 @@ def test_a_mean_of_readings_that_hardly_change_is_known(other: slice) -> None:
     readings[other, 0] = -0.0035
     time_s = np.arange(233) / 100
     steps = Steps(1e-3, cut=True)
-    for mean in (even_mean(readings, steps), rest_beside_lines(readings, time_s, Window(0.0, 2.33), steps)):
+    for mean in (even_mean(readings, steps), average_rest(readings, time_s, Window(0.0, 2.33), steps)):
         assert np.isfinite(mean.variance).all() and (mean.variance >= steps.variance).all()
         assert np.isfinite(mean.freedom).all()

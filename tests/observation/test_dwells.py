@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.beside_lines import mean_of_standing
+from rig.observation.statistics.beside_lines import average_standstill
 from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window
 
@@ -18,7 +18,7 @@ def dwelt(seed: int) -> tuple[Mean, Array]:
     true = rng.normal(size=3)
     shaken = np.sin(2 * np.pi * rng.uniform(10, 18) * time_s[:, None] + rng.uniform(0, 6, 3))
     readings = true + NOISE_M_S2 * rng.normal(size=(300, 3)) + SHAKEN_M_S2 * shaken
-    return mean_of_standing(readings, time_s, Window(0.0, LASTING_S), Steps(1e-5))[0], true
+    return average_standstill(readings, time_s, Window(0.0, LASTING_S), Steps(1e-5))[0], true
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
-from rig.observation.statistics.coloured_noise import noise_left, widening
+from rig.observation.statistics.coloured_noise import correlation_inflation, fit_noise_factor
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
 from rig.report.entries.gyroscope import sensor_entry
@@ -188,11 +188,11 @@ def test_a_clock_that_runs_far_off_is_refused() -> None:
 def test_coloured_noise_widens_the_uncertainty() -> None:
     rng = np.random.default_rng(8)
     white = rng.normal(size=(200, 1500))
-    assert np.mean([widening(draw) for draw in white]) < 1.01
+    assert np.mean([correlation_inflation(draw) for draw in white]) < 1.01
     coloured = np.zeros_like(white)
     for i in range(1, white.shape[1]):
         coloured[:, i] = 0.6 * coloured[:, i - 1] + 0.8 * white[:, i]
-    factors = [widening(draw) for draw in coloured]
+    factors = [correlation_inflation(draw) for draw in coloured]
     true = np.var(coloured.mean(axis=1)) / (np.var(coloured) / white.shape[1])
     assert np.mean(factors) == pytest.approx(4.0, rel=0.1)  # (1 + 0.6) / (1 − 0.6)
     assert true == pytest.approx(4.0, rel=0.3)
@@ -209,9 +209,9 @@ def test_of_a_vibration_hardly_anything_is_left_in_a_mean() -> None:
     for wave_hz, noise in ((14.0, 0.4), (9.0, 0.2), (25.0, 1.0)):
         waves = np.sqrt(2) * np.sin(2 * np.pi * wave_hz * time_s + rng.uniform(0, 2 * np.pi, (60, 1)))
         draws = waves + noise * rng.normal(size=(60, len(time_s)))
-        stated = np.mean([noise_left(draw) * np.var(draw) / len(draw) for draw in draws])
+        stated = np.mean([fit_noise_factor(draw) * np.var(draw) / len(draw) for draw in draws])
         assert stated == pytest.approx(noise**2 / len(time_s), rel=0.8), wave_hz
-        assert np.mean([widening(draw) * np.var(draw) / len(draw) for draw in draws]) > 3 * stated
+        assert np.mean([correlation_inflation(draw) * np.var(draw) / len(draw) for draw in draws]) > 3 * stated
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.lines import BEATS, turning
+from rig.observation.statistics.lines import BEATS, harmonics
 from rig.observation.statistics.mean import Mean
 from rig.observation.turn_mean import SampledTurn, turn_mean
 from support.recordings.drawn_ripple import Ripple, drawn_ripple
@@ -55,7 +55,7 @@ def sampled(
         share=share,
         rates_rad_s=rates,
         uneven_rad_s=rates @ AXIS - SPEED_RAD_S,
-        passing=turning(2 * np.pi * share, 2 * BEATS),
+        passing=harmonics(2 * np.pi * share, 2 * BEATS),
         beats=BEATS,
         closed=True,
         encoders_true=encoders_true,

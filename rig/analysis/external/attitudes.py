@@ -27,7 +27,7 @@ from rig.estimation.reference.triaxial import EqualWeights, Method, TriaxialSolu
 from rig.observation.external.attitude_import import PlacedReadings
 from rig.observation.external.fixes import Turning
 from rig.observation.external.placements import Placements
-from rig.observation.statistics.mean import Held
+from rig.observation.statistics.mean import StaticReading
 from rig.observation.stuck_check import check_reads
 
 Chosen = Method | Literal["increments"]
@@ -57,7 +57,7 @@ class InAttitudes:
     laid: LaidDown | None = None
     elsewhere: int = 0
     moving: int = 0
-    dwells: tuple[Held, ...] = ()
+    dwells: tuple[StaticReading, ...] = ()
 
 
 Result = InAttitudes | InIncrements
@@ -165,10 +165,10 @@ def _of_placements(
     )
 
 
-def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Held]:
+def _dwells(placements: Placements, quantity: Quantity) -> Iterator[StaticReading]:
     read = placements.read
     for number, (attitude, window) in enumerate(zip(placements.attitudes, read.windows, strict=True)):
-        yield Held(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
+        yield StaticReading(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
 
 
 def _solved(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:

@@ -24,7 +24,7 @@ from rig.estimation.reference.magnetometer import FieldDrift, Uniformity, field_
 from rig.estimation.reference.triaxial import UNTRUSTWORTHY_RAD, Method, TriaxialSolution, solve_triaxial
 from rig.observation.field import field_readings, field_tests, find_companion
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.mean import Held, by_axis
+from rig.observation.statistics.mean import StaticReading, by_axis
 
 ESTIMATOR: Method = "attitude_weighted"
 ELSEWHERE = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
@@ -50,7 +50,7 @@ class MagnetometerResult:
     triad: Triad
     budget: Budget
     beside: Attempts[Method, TriaxialSolution]
-    dwells: tuple[Held, ...]
+    dwells: tuple[StaticReading, ...]
     seen: Dwells
 
 

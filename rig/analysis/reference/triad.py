@@ -16,7 +16,7 @@ from rig.estimation.reference.triaxial import Method, TriaxialSolution
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.observation.reference.acceleration import DwellReading
-from rig.observation.statistics.mean import Held
+from rig.observation.statistics.mean import StaticReading
 
 BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")  # whose solutions stand beside the chosen one
 SEEN = 3.0  # standard deviations that the largest second-order term must have
@@ -66,7 +66,7 @@ def known_field(site: Site, key: str) -> KnownNorm:
     return KnownNorm(site.magnetic_field_t, up if site.magnetic_field_upwards else -up)
 
 
-def seen_in(dwells: Sequence[DwellReading | Held], mounting: Array) -> Dwells:
+def seen_in(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
     """The dwells in the nominal mounting's axes; the mean of rotations that hardly differ shrinks by encoder steps."""
     return Dwells(
         np.array([dwell.reading.mean for dwell in dwells]),

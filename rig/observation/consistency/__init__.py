@@ -1,1 +1,1 @@
-"""What checks compare within a recording: segments, transfers, halves of dwells, readings as they were recorded."""
+"""Parts of a recording that checks compare: segments, transfers, halves of dwells, raw readings."""

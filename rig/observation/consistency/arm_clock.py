@@ -1,4 +1,4 @@
-"""What the times of a controller's states tell of its clock: its rate by the computer's, and how its times scatter."""
+"""The controller's clock by the times of its states: its rate against the computer's, and its jitter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ import numpy as np
 
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.coloured_noise import widening
+from rig.observation.statistics.coloured_noise import correlation_inflation
 from rig.observation.windows import inside, swept
 
 ORDER = 6
-EVEN_S = 1e-4  # states whose steps in time differ by less follow each other evenly
+EVEN_S = 1e-4  # states count as evenly spaced if their time steps differ by less
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Jitter:
 
 @dataclass(frozen=True, slots=True)
 class ClockRate:
-    """How much too fast a clock runs by another, its standard deviation, both fractions, and degrees of freedom."""
+    """The rate error of a clock against another and its standard deviation, both fractions, with degrees of freedom."""
 
     error: float
     std: float
@@ -33,28 +33,28 @@ class ClockRate:
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
-    """Return the rate of the controller's clock by the computer's: a line through when the states came.
+    """Return the rate of the controller's clock against the computer's: a line through the arrival times of states.
 
-    States come late in bursts, so fewer than all of them count as independent.
+    States arrive late in bursts, so fewer than all of them count as independent.
     """
     host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
     design = np.column_stack([np.ones_like(host_s), host_s])
     (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
     late_s = arm_s - design @ (offset, slope)
-    independent = len(late_s) / widening(late_s)
+    independent = len(late_s) / correlation_inflation(late_s)
     std = float(late_s.std() / host_s.std() / np.sqrt(independent))
     return ClockRate(float(slope - 1), std, max(independent - 2, 1.0))
 
 
 def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
-    """Return the jitter of the times of the arm's states, by how the joint angles of all sweeps of a run scatter.
+    """Return the jitter of the times of the arm's states, from the scatter of the joint angles in all sweeps of a run.
 
-    Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
-    left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
-    n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
+    Differences of the sixth order remove the servo's motion, which is slow compared with the states. They keep the
+    times' errors and the encoder's steps. Neighbouring differences share states: n of them have n / Σ ρ² degrees of
+    freedom, with Σ ρ² = C(24, 12) / C(12, 6)² over all lags.
     """
     scatter, count = [], 0
-    sweeps = [(each, finished) for each in recordings for finished in swept(each.run)]
+    sweeps = [(recording, finished) for recording in recordings for finished in swept(recording.run)]
     for recording, finished in sweeps:
         motion = recording.motion
         time_s = motion.time_s[inside(motion.time_s, finished.window)]

@@ -1,4 +1,4 @@
-"""How much the means of a dwell's halves differ, which noise alone may tell apart. Pure."""
+"""The difference of the means of a dwell's halves, for a test against noise. Pure."""
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
@@ -10,7 +10,7 @@ from rig.observation.windows import Window
 def compare_halves(dwell: RawDwell, steps: Steps) -> tuple[Array, Array]:
     """Return the mean of a dwell's second half less that of its first, and its variance by noise, (3,) each, in counts.
 
-    The counts come in `steps`. What the arm swings by, as its encoders tell, is in neither.
+    The counts come in `steps`. The arm's oscillation, as its encoders measure it, is removed from both.
     """
     window, middle_s = dwell.window, dwell.middle_s
     halves = Window(window.start_s, middle_s), Window(middle_s, window.end_s)

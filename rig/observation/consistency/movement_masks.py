@@ -1,4 +1,4 @@
-"""Which samples belong to which part of a recorded movement. Pure."""
+"""Masks of the samples in each part of a recorded movement. Pure."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class MovementMasks:
 
 
 def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
-    """Return the masks of samples at times (n,) of the controller's clock, in a recording that holds a sweep."""
+    """Return the masks of samples at controller times (n,), in a recording that holds a sweep."""
     sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
     return MovementMasks(
         moving=_within(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),

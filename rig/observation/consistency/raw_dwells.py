@@ -1,4 +1,4 @@
-"""The readings of accelerometers and magnetometers in dwells and sweeps, as they were recorded. Pure."""
+"""Raw readings of accelerometers and magnetometers in dwells and sweeps. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,10 +18,10 @@ from rig.observation.windows import Window
 
 @dataclass(frozen=True, slots=True)
 class RawDwell:
-    """The readings of one dwell: counts (n, 3) at times (n,) of the controller's, within the `window`.
+    """The raw readings of one dwell: counts (n, 3) at controller times (n,) within the `window`.
 
-    The arm stood at `q_rad` (6,); `clock_offset_s` takes those times to the clock of the first recording. By
-    `swing_counts` (n, 3) readings differ from their mean because the arm swings, as its encoders tell.
+    The arm stood at `q_rad` (6,); `clock_offset_s` converts those times to the clock of the first recording.
+    `swing_counts` (n, 3): readings less their mean because of the arm's oscillation, as its encoders measure it.
     """
 
     index: int
@@ -34,7 +34,7 @@ class RawDwell:
 
     @property
     def still_counts(self) -> Array:
-        """(n, 3) the counts of an arm that does not swing."""
+        """(n, 3) counts of an arm that does not oscillate."""
         return np.subtract(self.counts, self.swing_counts, dtype=np.float64)
 
     @property
@@ -44,7 +44,7 @@ class RawDwell:
 
 
 def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) -> list[RawDwell]:
-    """Return what a sensor's accelerometer, of that F (3, 3), read in each of its dwells."""
+    """Return a sensor's raw accelerations in each of its dwells; `matrix` is the accelerometer's F (3, 3)."""
     stream, site = recording.stream(name), recording.run.settings.site
     per_count = matrix / stream.sensor.channel(ACCELERATION).unit_per_count
     dwells = []
@@ -58,7 +58,7 @@ def raw_acceleration_dwells(name: str, recording: ObservedRun, matrix: Array) ->
 
 
 def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadings]:
-    """Return what a sensor's accelerometer read in its revolutions, each with its index among the recording's."""
+    """Return a sensor's raw accelerations in its revolutions, each with its index among the recording's."""
     stream, sweeps = recording.stream(name), []
     for index, turn in enumerate(recording.sensors[name].revolutions):
         if turn.acceleration is not None:
@@ -70,7 +70,7 @@ def raw_acceleration_sweeps(name: str, recording: ObservedRun) -> list[RawReadin
 
 
 def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
-    """Return what a magnetometer read in each of its dwells."""
+    """Return a magnetometer's raw readings in each of its dwells."""
     return [
         _raw_dwell(dwell, counts.astype(np.int64), time_s, recording)
         for dwell, counts, time_s in read_field_in_dwells(recording, name)
@@ -78,9 +78,9 @@ def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
 
 
 def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
-    """Return the dwells as rests: what of a reading its dwell's mean does not explain."""
+    """Return the dwells as rests: their raw readings with the residuals from the dwell's mean."""
     residuals = [dwell.still_counts - dwell.still_counts.mean(axis=0) for dwell in dwells]
-    return [RawReadings(REST, dwell.counts, left, np.zeros(3)) for dwell, left in zip(dwells, residuals, strict=True)]
+    return [RawReadings(REST, dwell.counts, rest, np.zeros(3)) for dwell, rest in zip(dwells, residuals, strict=True)]
 
 
 def _raw_dwell(dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun) -> RawDwell:

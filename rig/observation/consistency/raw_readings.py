@@ -1,4 +1,4 @@
-"""The readings of a revolution, a rest or a dwell as they were recorded, with their residuals. Pure."""
+"""Raw readings of a revolution, a rest or a dwell, with their residuals. Pure."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -11,21 +11,19 @@ from rig.estimation.arrays import Array
 from rig.observation.average import Stream
 from rig.observation.statistics.coloured_noise import innovations
 
-REST = -1  # in the place of the index of a revolution
-MEMORY = 12  # readings before one, by which it is predicted
+REST = -1  # instead of the index of a revolution
+MEMORY = 12  # earlier readings from which a reading is predicted
 NORMAL = 1.4826  # standard deviation over median deviation
 
 
 @dataclass(frozen=True, slots=True)
 class RawReadings:
-    """Readings of one revolution, rest or dwell.
+    """Raw readings of one revolution, rest or dwell.
 
-    sweep: the index of the revolution among all of the sensor's, −1 of a rest.
-    counts (n, 3): the readings as recorded.
-    residual_counts (m, 3): readings less the mean of their segment and less the arm's vibration; in a rest less what
-    vibrates, too. Of a revolution there are none where the arm's motion is not known.
-    vibration_counts (3,): RMS of the arm's vibration.
-    swing_rad2 (3,): mean square by which the angle of what vibrates in a rest differs between two moments.
+    sweep: the index of the revolution among all of the sensor's, −1 of a rest. counts (n, 3): the readings as recorded.
+    residual_counts (m, 3): readings less the mean of their segment and less the arm's vibration, or in a rest any
+    vibration. Only samples for which the arm's motion is recorded. vibration_counts (3,): RMS of the arm's vibration.
+    swing_rad2 (3,): mean square difference of the vibration's angle between two moments of a rest.
     """
 
     sweep: int
@@ -42,7 +40,7 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 
 
 def innovation_std(counts: NDArray[np.int64]) -> Array:
-    """Return the standard deviation (3,) of what the readings before a reading do not predict of it, in counts.
+    """Return the standard deviation (3,), in counts, of a reading's error of prediction from the readings before it.
 
     Drift and vibration do not count: they carry a reading across counts together with its neighbours.
     """
@@ -50,7 +48,7 @@ def innovation_std(counts: NDArray[np.int64]) -> Array:
 
 
 def _innovation_std(readings: Array) -> float:
-    """Return that of readings (n,): the error of the best linear prediction from the `MEMORY` readings before."""
+    """Return the standard deviation of the error of predicting readings (n,) linearly from `MEMORY` earlier ones."""
     if len(readings) < 4 * MEMORY:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
     return float(NORMAL * np.median(np.abs(innovations(readings, MEMORY))))

@@ -1,8 +1,7 @@
-"""Revolutions and rests in segments of equal length: each is averaged as the whole is, by weights of its own.
+"""Revolutions and rests in segments of equal length, each averaged like the whole, with weights of its own.
 
-The lines that were taken out of a revolution's mean are taken out of its segments' means, and the weights that make the
-means of their readings make those of the arm's rate. Both are `weighted_means`: a whole window is one group of
-readings, its segments are several.
+The spectral lines that were removed from a revolution's mean are removed from its segments' means, and the same weights
+average the readings and the arm's rate. Both are `weighted_means`: of one group of readings, or of several.
 """
 
 from collections.abc import Sequence
@@ -20,21 +19,21 @@ from rig.observation.consistency.raw_readings import REST, RawReadings, counts_o
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.observe import Observation, fit_response
 from rig.observation.observed_run import ObservedRun
-from rig.observation.statistics.coloured_noise import widening
-from rig.observation.statistics.lines import LineSearch, find_lines, fitted, swings, waves
+from rig.observation.statistics.coloured_noise import correlation_inflation
+from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, line_swing, waves
 from rig.observation.statistics.mean import Mean, Noise, weighted_means
 from rig.observation.statistics.tapered_weights import noise_at_zero
 
 # Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no segment shows it.
-OF_REVOLUTION, OF_REST, MOST = 6, 3, 72  # segments; of a rest as many times fewer; of all revolutions
+OF_REVOLUTION, OF_REST, MOST = 6, 3, 72  # segments of one revolution; times fewer in a rest; of all revolutions
 FEWEST_SAMPLES = 20  # of a segment
-FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
-PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
-AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise one bin in 10⁹ does
+FEWEST_AT_REST = 60  # of a whole rest: fewer do not show its noise well enough for a weight
+PREVAILS = 0.7  # of the residuals' variance: below it the noise of a long mean is that at zero frequency
+AT_REST = LineSearch(stands_out=30.0, beats=0)  # of noise alone one bin in 10⁹ stands out so far
 
 
 def segment_counts(revolutions: int) -> tuple[int, int]:
-    """Return how many segments each revolution has, of which there are so many, and each rest."""
+    """Return the number of segments of each revolution, of which there are `revolutions`, and of each rest."""
     segments = max(1, min(OF_REVOLUTION, MOST // max(revolutions, 1)))
     return segments, max(1, segments // OF_REST)
 
@@ -43,7 +42,7 @@ def segment_counts(revolutions: int) -> tuple[int, int]:
 class MotionInterval:
     """An interval of time in which the arm made a motion, on the clock of its states.
 
-    `unseen_rad` is what samples may miss of where the motion begins or ends.
+    `unseen_rad`: angle at the motion's beginning or end that the samples may miss.
     """
 
     motion: ArmMotion
@@ -71,9 +70,9 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class SegmentedAverage:
-    """A revolution or rest: its `average` as a whole, its segments, its readings as recorded.
+    """A revolution or rest: its `average` as a whole, its segments, its raw readings.
 
-    `speed_std` is the standard deviation of the mean speed, relative to it; zero of a rest.
+    `speed_std` is the standard deviation of the mean speed, relative to it; zero for a rest.
     """
 
     average: Average
@@ -85,7 +84,7 @@ class SegmentedAverage:
 def segment_recordings(name: str, recordings: Sequence[ObservedRun]) -> tuple[SegmentedAverage, ...]:
     """Return all revolutions of a gyroscope in segments, then all its rests, in the order of the recordings.
 
-    A rest of too few samples to tell its noise has no segments.
+    A rest with too few samples to show its noise has no segments.
     """
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*streamed, turn) for streamed in streams for turn in streamed[0].sensors[name].revolutions]
@@ -127,19 +126,19 @@ class _Division:
         """(p, m) weights of the even means of the segments."""
         return mean_weights(self.groups, self.groups[:, :0])
 
-    def without_means(self, values: Array, weights: Array) -> Array:
+    def subtract_means(self, values: Array, weights: Array) -> Array:
         """Return values (m, k) less their segments' means by weights (p, m)."""
         residuals: Array = values - self.groups @ (weights @ values)
         return residuals
 
 
-def _divide(stream: Stream, average: Average, known: NDArray[np.bool_], count: int) -> _Division:
-    """Divide the samples of an average that are `known` (n,) into so many segments, or into fewer of few samples."""
+def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: int) -> _Division:
+    """Divide the samples of an average that are `usable` (n,) into `count` segments, or into fewer of few samples."""
     inside = between(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
-    count = max(1, min(count, int(known.sum()) // FEWEST_SAMPLES))
+    count = max(1, min(count, int(usable.sum()) // FEWEST_SAMPLES))
     ends_s = np.linspace(average.start_s, average.end_s, count + 1)
-    index = np.where(known, np.clip(np.searchsorted(ends_s, time_s, side="right") - 1, 0, count - 1), -1)
+    index = np.where(usable, np.clip(np.searchsorted(ends_s, time_s, side="right") - 1, 0, count - 1), -1)
     enough = tuple(segment for segment in range(count) if np.sum(index == segment) >= FEWEST_SAMPLES / 2)
     used = np.isin(index, enough)
     readings = stream.readings_rad_s[inside][used]
@@ -150,28 +149,28 @@ def _divide(stream: Stream, average: Average, known: NDArray[np.bool_], count: i
 def _segment_revolution(
     stream: Stream, motion: ArmMotion, turn: Observation, count: int, sweep: int
 ) -> SegmentedAverage:
-    """Average a revolution or an arc in segments beside the lines that were found when it was averaged as a whole.
+    """Average a revolution or an arc in segments, without the spectral lines of its average as a whole.
 
-    The encoders do not see all that vibrates, and what they miss of a ripple is no noise of a segment's.
+    The encoders do not measure all of a vibration; what they miss of a ripple is no noise of a segment's.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[between(stream, average.start_s, average.end_s)]
     division = _divide(stream, average, motion.covered(times_s), count)
     rates = motion.sampled_rates(times_s)[division.used]
-    share = (division.time_s - average.start_s) / average.duration_s
-    lines = waves(average.lines_hz * average.duration_s, share, turn.beats)
+    fraction = (division.time_s - average.start_s) / average.duration_s
+    lines = waves(average.lines_hz * average.duration_s, fraction, turn.beats)
     vibration = np.column_stack([rates @ axis, motion.rate(division.time_s, 1) @ axis])
     residual, vibration = (
-        division.without_means(values, division.averages) for values in (division.readings_rad_s, vibration)
+        division.subtract_means(values, division.averages) for values in (division.readings_rad_s, vibration)
     )
-    shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
-    unshaken = residual - shaken
+    vibrating = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
+    noise_alone = residual - vibrating
     noise = Noise(average.noise_rad_s**2, average.noise_rad2_s2 * average.samples, average.freedom)
     segments = _average(
         division,
         motion,
         weights=mean_weights(division.groups, lines),
-        residuals=unshaken - lines @ fitted(lines, unshaken),
+        residuals=noise_alone - lines @ fit_columns(lines, noise_alone),
         rates=rates,
         noise=noise,
     )
@@ -179,24 +178,24 @@ def _segment_revolution(
     readings = RawReadings(
         sweep=sweep,
         counts=counts_of(stream, RATE, division.inside),
-        residual_counts=unshaken / lsb,
-        vibration_counts=np.sqrt(np.mean(shaken**2, axis=0)) / lsb,
+        residual_counts=noise_alone / lsb,
+        vibration_counts=np.sqrt(np.mean(vibrating**2, axis=0)) / lsb,
     )
     return SegmentedAverage(average, segments, readings, turn.speed_std_rad_s / turn.speed_rad_s)
 
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
-    """Average a rest in segments beside what vibrates in it, of an arm that does not swing: see `rests_of`."""
+    """Average a rest in segments, without vibrations and the arm's oscillation: see `average_rests`."""
     inside = between(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
     readings = division.readings_rad_s - motion.swing_rates(division.time_s) @ response.T
     division = replace(division, readings_rad_s=readings)
-    share = (division.time_s - average.start_s) / average.duration_s
-    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, share=share)
-    lines = waves(cycles, share, AT_REST.beats)
+    fraction = (division.time_s - average.start_s) / average.duration_s
+    cycles = find_lines(readings - readings.mean(axis=0), AT_REST, fraction=fraction)
+    lines = waves(cycles, fraction, AT_REST.beats)
     weights = mean_weights(division.groups, lines)
-    beside_lines = division.without_means(readings, weights)
-    residuals = beside_lines - lines @ fitted(lines, beside_lines)
+    residuals = division.subtract_means(readings, weights)
+    residuals = residuals - lines @ fit_columns(lines, residuals)
     segments = _average(
         division,
         motion,
@@ -206,22 +205,22 @@ def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: in
         noise=_noise_at_rest(residuals, len(division.enough), lines.shape[1], division.steps),
     )
     lsb = stream.sensor.channel(RATE).unit_per_count
-    vibrating = division.without_means(readings, division.averages)
+    vibrating = division.subtract_means(readings, division.averages)
     raw = RawReadings(
         sweep=REST,
         counts=counts_of(stream, RATE, division.inside),
         residual_counts=residuals / lsb,
         vibration_counts=np.zeros(3),
-        swing_rad2=swings(vibrating, lines, cycles / average.duration_s),
+        swing_rad2=line_swing(vibrating, lines, cycles / average.duration_s),
     )
     return SegmentedAverage(average, segments if average.samples >= FEWEST_AT_REST else (), raw)
 
 
 def _noise_at_rest(residuals: Array, segments: int, columns: int, steps: Steps) -> Noise:
-    """Return the noise of readings whose residuals (n, 3) so many segments and columns of lines leave."""
+    """Return the noise of readings with residuals (n, 3) after a fit of the segments' means and columns of lines."""
     dof = max(len(residuals) - segments - columns, 1)
     scatter = np.maximum(np.sum(residuals**2, axis=0) / dof, steps.variance)
-    in_a_mean = scatter * np.array([widening(axis) for axis in residuals.T])
+    in_a_mean = scatter * np.array([correlation_inflation(axis) for axis in residuals.T])
     if columns:
         at_zero = np.maximum(noise_at_zero(residuals), steps.variance)
         in_a_mean = np.where(at_zero < PREVAILS * scatter, at_zero, in_a_mean)
@@ -233,9 +232,9 @@ def _average(
 ) -> tuple[Segment, ...]:
     """Return the segments with enough samples: readings and the flange's rates (m, 3) by the same weights (p, m)."""
     readings = division.readings_rad_s
-    own, rows = division.groups[:, division.enough], weights[list(division.enough)]
+    groups, rows = division.groups[:, division.enough], weights[list(division.enough)]
     smooth = readings - residuals
-    means = weighted_means(readings, own, rows, smooth=smooth, noise=noise, steps=division.steps)
+    means = weighted_means(readings, groups, rows, smooth=smooth, noise=noise, steps=division.steps)
     last, segments = len(weights) - 1, list[Segment]()
     for index, mean, rate_rad_s in zip(division.enough, means, rows @ rates, strict=True):
         start_s, end_s = division.ends_s[index : index + 2].tolist()

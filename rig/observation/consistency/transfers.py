@@ -1,11 +1,11 @@
 """Transfers between sweeps and rests, each averaged whole: the only rotation about some axes at another time.
 
-Each axis is swept in one interval of time, so that the sweeps alone do not show that its scale factor changed before or
-after. In the transfers the wrists turn by half a turn, from standing to standing, two of them at a time: so the
-sensor's mean reading is as well known by the arm as in a sweep, about axes that are not being swept.
+Each axis is swept in one interval of time, so the sweeps alone do not show whether its scale factor changed before or
+after. In a transfer two wrists turn by half a turn, from standstill to standstill: the arm gives the mean rate as well
+as in a sweep, about axes that are not being swept.
 
-No lines are sought in a transfer: it is short, and the servo's own vibration grows faster and slower in it. Where that
-passes the data rate it stands still in the samples, and their mean is off by more than their scatter tells: see
+No spectral lines are sought in a transfer: it is short, and the servo's vibration sweeps up and down in it. At the data
+rate that vibration aliases to zero, and the mean is in error by more than the scatter shows: see
 `rig.analysis.consistency.gyroscope_checks`.
 """
 
@@ -30,32 +30,30 @@ from rig.observation.statistics.lines import unit_columns
 from rig.observation.statistics.tapered_weights import noise_at_zero
 from rig.observation.windows import rested, swept
 
-BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
+BEYOND_S = 0.1  # before and after the motion: an arm this slow may still be moving
 SHORTEST_S, LONGEST_S = 0.5, 30.0
-SPARSE_S = 0.0105  # samples that are farther apart miss what the servo's vibration does while it grows faster
-# Samples add up to a transfer but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, by the
-# place x in an interval (Euler and Maclaurin). B₂, Bernoulli's second polynomial, is √(1/180) RMS; either end has two.
+SPARSE_S = 0.0105  # samples that are farther apart miss the servo's vibration while it speeds up
+# Samples add up to a transfer but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, at x
+# of an interval (Euler and Maclaurin). B₂, Bernoulli's second polynomial, is √(1/180) RMS; either end has two corners.
 CORNERS = (2 / 180) ** 0.5 / 2
-LOST = 0.01  # of the samples, at most, by a rate that a board keeps so well
-GAP = 1.5  # of the interval between samples: one is missing, and with it so much of the transfer
+LOST = 0.01  # largest fraction of missing samples, by the nominal rate, which a board keeps as well
+GAP = 1.5  # of the interval between samples: a longer step misses one
 STEPS = 48
-FILTERED = range(-2, 3)  # samples, from which to which a filter makes one reading of the arm's rates
-WRISTS = 3  # whose transfers count, the last joints
-STANDS_RAD = 1e-3  # what a joint that does not turn seems to
-LOW = 0.0  # of the data rate: no more low frequencies than the fewest, for a servo's vibration is near
+FILTERED = range(-2, 3)  # samples whose rates a sensor's filter combines into one reading
+WRISTS = 3  # the last joints, whose transfers count
+STANDS_RAD = 1e-3  # apparent travel of a joint that does not turn
+LOW = 0.0  # of the data rate: as few low frequencies as possible, for a servo's vibration is near
 
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
     """A transfer in which only the wrists turned, averaged; times are on the clock of its recording.
 
-    clock_offset_s: takes its times to the clock of the first recording.
-    mean_rad_s (3,): mean of the readings.
-    scatter_rad2_s2 (3,): variance of that by what neither the arm nor gravity explains of the readings.
-    rounding_rad2_s2 (3,): variance of that by rounding.
-    rate_rad_s (3,): mean rate of the flange against the base, in its frame.
-    gravity_m_s2 (3,): as it is sensed where the sensors sit, in that frame.
-    attitude (3, 3): from the base into that frame.
+    clock_offset_s: converts its times to the clock of the first recording. mean_rad_s (3,): mean of the readings.
+    scatter_rad2_s2 (3,): variance of the mean by the residuals of a fit of the arm's rate and gravity. rounding_rad2_s2
+    (3,): variance of the mean by rounding. rate_rad_s (3,): mean rate of the flange against the base, in its frame.
+    gravity_m_s2 (3,): gravity less the acceleration of the sensors' position, in that frame. attitude (3, 3): from the
+    base into that frame.
     """
 
     clock_offset_s: float
@@ -71,9 +69,9 @@ class Transfer:
 def average_transfers(
     name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
 ) -> list[Transfer]:
-    """Average all transfers of a gyroscope of F (3, 3) that sits at `extension_m` (3,) from the flange, in its frame.
+    """Average all transfers of a gyroscope of F (3, 3) mounted at `extension_m` (3,) from the flange, in its frame.
 
-    In none of them a sample is missing or out of range.
+    Transfers with a missing sample or one out of range are left out.
     """
     transfers = list[Transfer]()
     for recording in recordings:
@@ -98,7 +96,7 @@ def average_transfers(
 
 
 def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
-    """Return the interval from before the arm moves to when it stands; None if it does not move in this time."""
+    """Return the interval from before the arm moves until it stands; None if it does not move in this time."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
     if not len(moving):
@@ -115,7 +113,7 @@ def is_by_wrists(interval: MotionInterval) -> bool:
 
 
 def sensed_gravity_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m: Array) -> Array:
-    """Return the mean (3,) of gravity less the acceleration of where the sensors sit, in the flange's frame."""
+    """Return the mean (3,) of gravity less the acceleration of the sensors' position, in the flange's frame."""
     time_s, step_s = np.linspace(interval.start_s, interval.end_s, STEPS, retstep=True)
     pose = flange_pose(interval.motion.angles(time_s), interval.motion.kinematics)
     position_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
@@ -125,24 +123,24 @@ def sensed_gravity_m_s2(interval: MotionInterval, down_m_s2: Array, extension_m:
 
 
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
-    """Return (3,) the variance of the mean of readings (n, 3) by what neither the arm nor gravity explains.
+    """Return the variance (3,) of the mean of readings (n, 3) that neither the arm's rate nor gravity explains.
 
-    A sensor's filter, whatever it is, makes of the arm's rates those of the samples around. A ripple that is faster
-    than readings and states come looks like noise, at low frequencies too.
+    A sensor's filter combines the arm's rates of the samples around. A ripple above half the data rate looks like
+    noise, at low frequencies too.
     """
     step_s = float(np.median(np.diff(time_s)))
-    rates = [motion.sampled_rates(time_s + late * step_s) for late in FILTERED]
+    rates = [motion.sampled_rates(time_s + shift * step_s) for shift in FILTERED]
     gravity = flange_attitude(motion.angles(time_s), motion.kinematics) @ down_m_s2
     columns = unit_columns(np.column_stack([np.ones(len(time_s)), *rates, gravity]))
-    left = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
-    variance: Array = noise_at_zero(left, LOW) / len(readings)
+    residuals = readings - columns @ np.linalg.lstsq(columns, readings, rcond=None)[0]
+    variance: Array = noise_at_zero(residuals, LOW) / len(readings)
     return variance
 
 
 def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
-    """Return those from before the arm moves to when it stands, in which nothing is missing.
+    """Yield the intervals from before the arm moves until it stands, with all samples present.
 
-    There is none of a shaft whose encoder is known over whole turns alone: a transfer is a part of one.
+    None for a shaft whose encoder is right over whole turns alone: a transfer is a part of one.
     """
     if not motion.tells_parts_of_turns:
         return

@@ -9,7 +9,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
 from rig.observation.sampling import Sampling
-from rig.observation.statistics.coloured_noise import left_of, widening
+from rig.observation.statistics.coloured_noise import correlation_inflation, fit_autoregression
 from rig.observation.windows import Window
 
 MIN_SAMPLES = 20
@@ -49,9 +49,10 @@ def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     From the scatter about the mean; vibration counts as noise here, for no arm reports it.
     """
     variance = readings.var(axis=0, ddof=1)
-    left = (readings - readings.mean(axis=0)).T
-    wider, freedom = np.array([widening(each) for each in left]), np.array([left_of(each).freedom for each in left])
-    return variance * wider / len(readings), freedom, np.sqrt(variance)
+    residuals = (readings - readings.mean(axis=0)).T
+    inflation = np.array([correlation_inflation(axis) for axis in residuals])
+    freedom = np.array([fit_autoregression(axis).freedom for axis in residuals])
+    return variance * inflation / len(readings), freedom, np.sqrt(variance)
 
 
 def average_of(readings: Array, window: Window) -> Average:

@@ -19,7 +19,7 @@ from rig.observation.arm_rests import MIN_SAMPLES_AT_REST
 from rig.observation.average import Stream, between, steps_of
 from rig.observation.lost_samples import lost_samples
 from rig.observation.motion.arm_motion import ArmMotion
-from rig.observation.statistics.beside_lines import mean_of_standing
+from rig.observation.statistics.beside_lines import average_standstill
 from rig.observation.statistics.mean import Mean
 from rig.observation.swing import MAX_TRAVEL_AT_REST_RAD
 from rig.observation.windows import Dwelt, Window, dwelt
@@ -116,7 +116,7 @@ def _dwell_reading(
     steps = steps_of(stream.raw, stream.sensor, ACCELERATION)
     attitudes = motion.attitudes(time_s)
     swing = gravity_beside(attitudes, attitudes.mean(axis=0), stream.sensor, run.settings.site)  # no noise
-    reading, _ = mean_of_standing(readings - swing, time_s, window, steps)
+    reading, _ = average_standstill(readings - swing, time_s, window, steps)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,

@@ -13,7 +13,7 @@ from rig.observation.average import Stream, between
 from rig.observation.motion.arm_motion import ArmMotion
 from rig.observation.motion.revolution import Revolution, describe
 from rig.observation.reference.acceleration import accelerations, check_acceleration, gravity_beside
-from rig.observation.statistics.beside_lines import colour_left, swinging
+from rig.observation.statistics.beside_lines import fit_inflation, line_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ def swept_acceleration(
         accelerations(stream, inside)[known] - gravity_beside(attitudes, rotations @ began, stream.sensor, site),
         angle_rad,
         motion.angle(sweep, time_s, 1),
-        coloured=colour_left,
-        swings=swinging,
+        coloured=fit_inflation,
+        swings=line_columns,
     )
     return of_turn(sweep, replace(turn, attitude=began), harmonic)
 

@@ -1,1 +1,1 @@
-"""Means and the variance of means: coloured noise, vibrations as spectral lines, windows that taper."""
+"""Means and the variance of means: coloured noise, vibrations as spectral lines, tapered windows."""

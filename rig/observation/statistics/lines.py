@@ -1,7 +1,7 @@
-"""Vibrations found in readings: lines that stand out of the noise's spectrum, whether the encoders see them or not.
+"""Spectral lines in readings: vibrations that stand out of the noise's spectrum, whether encoders show them or not.
 
-A part of a revolution is too short for a vibration to average out in it: 4 mrad/s at 8 Hz leave 0.1 mrad/s in a second
-and a half, several times what the noise of a good gyroscope does.
+A part of a revolution is too short for a vibration to average out: 4 mrad/s at 8 Hz leave 0.1 mrad/s in a second and a
+half, several times the noise of a good gyroscope.
 """
 
 from dataclasses import dataclass
@@ -10,56 +10,56 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.mean_weights import ALIKE
-from rig.observation.statistics.tapered_weights import MAIN_LOBE, shaped
+from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
-AROUND = 161  # bins, of which the median is taken
-MOST_LINES = 8  # three of a servo, and what shakes in the room, which a turning sensor may feel as two
-APART = 2.5  # cycles in all the readings, from a line that was found
-SAME = 1.5  # cycles in all the readings: lines that come so near each other are no lines, but a jerk
+AROUND = 161  # bins of the running median
+MOST_LINES = 8  # three of a servo, and vibrations in the room, each of which a turning sensor may read as two
+APART = 2.5  # cycles in all the readings: least distance from a line that was found
+SAME = 1.5  # cycles in all the readings: lines that are nearer to each other are a jerk
 PASSES = 1
-WIDE = 4  # columns of a line, and of each of its beats
-BEATS = 1  # as a sensor that makes a turn feels what shakes in the room
-SAMPLES_EACH = 5  # are needed to find what one column has in them
-NEARER = 1.02  # times as much must a line explain whose beat stands out, to be taken for that
-LEAST_GAP = 1.5  # steps between samples, of which some are missing then
-ROUNDING = 1e-12  # of the longest column: shorter ones hold what arithmetic leaves
+WIDE = 4  # columns of a line, and of each of its sidebands
+BEATS = 1  # sidebands of a vibration in the room for a sensor that makes a turn
+SAMPLES_EACH = 5  # needed per column
+NEARER = 1.02  # times as much must a line explain to be chosen instead of its sideband that stands out
+LEAST_GAP = 1.5  # steps between samples: over a longer one some are missing
+ROUNDING = 1e-12  # of the longest column: shorter ones hold rounding errors alone
 NONE: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
 class LineSearch:
-    """What counts as a line.
+    """The criteria of a spectral line.
 
-    It stands `stands_out` times over the median power around it, and over `floor`, a power of the same window, where
-    what is looked at has less noise than what it is compared with. It makes `slowest` cycles at least in all the
-    readings, and has `beats`: see `waves`. At most so many are found, those known before among them.
+    It stands `stands_out` times over the median power around it, and over `floor`, a power of the same window for data
+    with less noise than what they are compared with. It makes at least `slowest` cycles in all the readings, and has
+    `beats` sidebands: see `waves`. At most `most` are found, previous ones included.
     """
 
-    stands_out: float = 16.0  # one line in seventy that is none costs nothing
-    slowest: float = 8.0  # what is slower is told badly from what comes once and twice in a turn
+    stands_out: float = 16.0  # one false line in seventy recordings costs nothing
+    slowest: float = 8.0  # slower ones are hard to separate from what comes once and twice in a turn
     beats: int = BEATS
     most: int = MOST_LINES
     floor: float = 0.0
 
 
-def find_lines(residuals: Array, search: LineSearch, known_cycles: Array = NONE, share: Array | None = None) -> Array:
-    """Return (k,) how many cycles each line makes in all of the residuals (n, axes); k may be zero.
+def find_lines(residuals: Array, search: LineSearch, previous: Array = NONE, fraction: Array | None = None) -> Array:
+    """Return the number of cycles (k,) that each spectral line makes in all of the residuals (n, axes); k may be zero.
 
-    share (n,): which share of the time was over at each reading; evenly spaced if it is not given, and nearly so, but
-    for gaps, if it is. None is looked for nearer to another than `APART`, and one that comes to be another is none. The
-    known lines are among them, as they are.
+    `fraction` (n,): elapsed fraction of the time at each reading, nearly even but for gaps; even by default. No line is
+    sought nearer to another than `APART`; one that merges with another is dropped. `previous` lines are returned
+    unchanged.
     """
-    count, merged, held = len(residuals), NONE, len(known_cycles)
-    cycles = known_cycles
-    most = min(search.most, count // (wide(search.beats) * SAMPLES_EACH))
-    share = np.arange(count) / count if share is None else share
+    count, merged, fixed = len(residuals), NONE, len(previous)
+    cycles = previous
+    most = min(search.most, count // (column_count(search.beats) * SAMPLES_EACH))
+    fraction = np.arange(count) / count if fraction is None else fraction
     while len(cycles) < most and len(merged) < most:
-        columns = waves(cycles, share, search.beats)
-        left = residuals - columns @ fitted(columns, residuals)
-        strongest = _strongest(left, np.append(cycles, merged), share, search)
+        columns = waves(cycles, fraction, search.beats)
+        remainder = residuals - columns @ fit_columns(columns, residuals)
+        strongest = _find_strongest(remainder, np.append(cycles, merged), fraction, search)
         if strongest is None:
             break
-        refined = _refined(np.append(cycles, strongest), residuals, held, share, search.beats)
+        refined = _refine(np.append(cycles, strongest), residuals, fixed, fraction, search.beats)
         if np.diff(np.sort(refined)).min(initial=np.inf) < SAME or refined.min() < 1.0:
             merged = np.append(merged, strongest)
         else:
@@ -68,36 +68,36 @@ def find_lines(residuals: Array, search: LineSearch, known_cycles: Array = NONE,
 
 
 def median_power(residuals: Array) -> float:
-    """Return the median power of residuals (n, axes) under the window of the search, of the quietest axis."""
-    return float(np.median(np.abs(np.fft.rfft(shaped(residuals).T)) ** 2, axis=1).min())
+    """Return the median power of residuals (n, axes) under the search's window, on the quietest axis."""
+    return float(np.median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2, axis=1).min())
 
 
-def wide(beats: int) -> int:
-    """How many columns of `waves` one line has."""
+def column_count(beats: int) -> int:
+    """Return the number of columns of `waves` per line."""
     return WIDE * (1 + beats)
 
 
-def waves(cycles: Array, share: Array, beats: int = BEATS) -> Array:
-    """(n, w k) cosine and sine of k lines where a share (n,) of the time is over, w columns of each: see `wide`.
+def waves(cycles: Array, fraction: Array, beats: int = BEATS) -> Array:
+    """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
-    Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less:
-    what shakes in the room is felt so by a sensor that makes a turn. Or of up to so many more and less as the line
-    `beats` in a turn: see `rig.observation.motion.revolution.Revolution`.
+    Each line has two more columns that grow steadily, for one that comes or goes, and sidebands at one cycle more and
+    one less: so a sensor that makes a turn reads a vibration in the room. With `beats` b they reach up to b cycles: see
+    `rig.observation.motion.revolution.Revolution`.
     """
-    line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, share)) for cycles_each in (cycles, range(1, beats + 1)))
-    beside = [line * way for once in turn for way in (once.conj(), once)]
-    each = [part for wave in (line, line * (2 * share - 1), *beside) for part in (wave.real, wave.imag)]
-    return np.stack(each, axis=1).reshape(wide(beats) * len(cycles), len(share)).T
+    line, turn = (np.exp(2j * np.pi * np.outer(cycles_each, fraction)) for cycles_each in (cycles, range(1, beats + 1)))
+    sidebands = [line * shift for once in turn for shift in (once.conj(), once)]
+    columns = [part for wave in (line, line * (2 * fraction - 1), *sidebands) for part in (wave.real, wave.imag)]
+    return np.stack(columns, axis=1).reshape(column_count(beats) * len(cycles), len(fraction)).T
 
 
-def turning(turned_rad: Array, most: int) -> Array:
-    """(n, 2 most) cosine and sine of what comes once, twice, up to `most` times in a turn, at its angles (n,)."""
-    each = [wave(times * turned_rad) for times in range(1, most + 1) for wave in (np.cos, np.sin)]
-    return np.reshape(each, (2 * most, len(turned_rad))).T
+def harmonics(angle_rad: Array, most: int) -> Array:
+    """Return columns (n, 2 most) of cosine and sine of what comes once, twice, up to `most` times in a turn."""
+    columns = [wave(times * angle_rad) for times in range(1, most + 1) for wave in (np.cos, np.sin)]
+    return np.reshape(columns, (2 * most, len(angle_rad))).T
 
 
 def unit_columns(columns: Array) -> Array:
-    """Return columns (n, k), of whatever units, with a length of one each; those that are rounding alone are zero.
+    """Return columns (n, k), of any units, scaled to unit length; those that are rounding alone become zero.
 
     Scaled up, rounding would make columns of noise that differ from one processor to another.
     """
@@ -105,81 +105,80 @@ def unit_columns(columns: Array) -> Array:
     return columns / np.where(sizes > ROUNDING * sizes.max(initial=0.0), sizes, np.inf)
 
 
-def fitted(columns: Array, values: Array) -> Array:
-    """(k, m) least squares of values (n, m) by such columns (n, k), some of which may be nearly alike.
+def fit_columns(columns: Array, values: Array) -> Array:
+    """Return the least-squares coefficients (k, m) of values (n, m) by columns (n, k), some of them nearly alike.
 
-    By the normal equations, in which what `ALIKE` leaves is told apart well enough: of many values they take a third
-    of the time.
+    By the normal equations, in a third of the time: what `ALIKE` keeps apart is well enough separated.
     """
     return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=ALIKE**2)[0], dtype=np.float64)
 
 
-def swings(residuals: Array, columns: Array, lines_hz: Array) -> Array:
-    """(3,) mean square, over (rad/s)² s², by which the angle of all lines differs between two moments.
+def line_swing(residuals: Array, columns: Array, lines_hz: Array) -> Array:
+    """Return the mean square (3,), (rad/s)² s², by which the angle of all lines differs between two moments.
 
     The lines are those of columns (n, w k) in residuals (n, 3): one of the mean square P and the frequency f swings by
     √(2 P) / (2π f) either way, and so its angle differs between two moments by P / (2 π² f²) in the mean square.
     """
-    own = columns.shape[1] // max(len(lines_hz), 1)
-    sizes = fitted(columns, residuals).reshape(len(lines_hz), own, residuals.shape[1])
-    each = np.einsum("nlw,lwm->lnm", columns.reshape(len(residuals), len(lines_hz), own), sizes)
-    found: Array = np.sum(np.mean(each**2, axis=1) / (2 * np.pi**2 * lines_hz[:, None] ** 2), axis=0)
-    return found
+    width = columns.shape[1] // max(len(lines_hz), 1)
+    sizes = fit_columns(columns, residuals).reshape(len(lines_hz), width, residuals.shape[1])
+    waveforms = np.einsum("nlw,lwm->lnm", columns.reshape(len(residuals), len(lines_hz), width), sizes)
+    mean_squares: Array = np.sum(np.mean(waveforms**2, axis=1) / (2 * np.pi**2 * lines_hz[:, None] ** 2), axis=0)
+    return mean_squares
 
 
-def _step(share: Array) -> float:
-    """The share of the time between samples that follow each other, some of which may be missing."""
-    steps = np.diff(share)
+def _sampling_step(fraction: Array) -> float:
+    """Return the fraction of the time between neighbouring samples, some of which may be missing."""
+    steps = np.diff(fraction)
     return float(steps[steps < LEAST_GAP * np.median(steps)].mean())
 
 
-def _strongest(left: Array, known: Array, share: Array, search: LineSearch) -> float | None:
-    """Cycles of the line in readings (n, axes) that stands out most; None where there is none beside those known."""
+def _find_strongest(residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float | None:
+    """Return the cycles of the strongest line in residuals (n, axes) besides the `previous`, or None without one."""
     from scipy.ndimage import median_filter
 
-    powers = np.abs(np.fft.rfft(shaped(left).T)) ** 2
+    powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
     powers[:, :MAIN_LOBE] = powers[:, MAIN_LOBE, None]
-    around = np.array([median_filter(axis, AROUND) for axis in powers])  # in one dimension it takes a tenth
+    around = np.array([median_filter(axis, AROUND) for axis in powers])  # in one dimension: a tenth of the time
     powers /= np.maximum(around, search.floor) + np.finfo(np.float64).tiny  # noise may have a colour
     bins, last = np.arange(powers.shape[1]), powers.shape[1] - 1
-    cycles = bins / len(share) / _step(share)
-    free = (cycles >= search.slowest) & (bins < last) & (np.abs(cycles - known[:, None]) > APART).all(axis=0)
+    cycles = bins / len(fraction) / _sampling_step(fraction)
+    free = (cycles >= search.slowest) & (bins < last) & (np.abs(cycles - previous[:, None]) > APART).all(axis=0)
     best = int(np.argmax(np.where(free, powers.max(axis=0), 0.0)))
     axis = int(np.argmax(powers[:, best]))
     if not (free[best] and powers[axis, best] > search.stands_out):
         return None
-    below, here, above = np.log(powers[axis, best - 1 : best + 2])
-    bend = below - 2 * here + above
+    below, centre, above = np.log(powers[axis, best - 1 : best + 2])
+    bend = below - 2 * centre + above
     peak = best + (float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0 else 0.0)
     peak *= float(cycles[1])
-    return _middle(peak, left, known, share, search) if search.beats else peak
+    return _choose_middle(peak, residuals, previous, fraction, search) if search.beats else peak
 
 
-def _middle(peak: float, left: Array, known: Array, share: Array, search: LineSearch) -> float:
-    """Return the line of which a peak is the middle or a beat: that which explains most of what is left (n, axes).
+def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Array, search: LineSearch) -> float:
+    """Return the line of which a peak is the middle or a sideband: the one that explains most of the residuals.
 
-    What shakes in the room a sensor may feel across the axis alone, beside the line and not at it.
+    A sensor may read a vibration in the room across its axis alone, in the sidebands and not in the line itself.
     """
-    whitened = left / (left.std(axis=0) + np.finfo(np.float64).tiny)
-    beside = [peak + way for way in (-1.0, 1.0) if search.slowest <= peak + way]
-    beside = [each for each in beside if not (np.abs(each - known) <= SAME).any()]
+    whitened = residuals / (residuals.std(axis=0) + np.finfo(np.float64).tiny)
+    sidebands = [peak + shift for shift in (-1.0, 1.0) if search.slowest <= peak + shift]
+    sidebands = [cycles for cycles in sidebands if not (np.abs(cycles - previous) <= SAME).any()]
     explained = []
-    for each in (peak, *beside):
-        columns = waves(np.array([each]), share, search.beats)
-        explained.append(float(np.sum((columns @ fitted(columns, whitened)) ** 2)))
+    for cycles in (peak, *sidebands):
+        columns = waves(np.array([cycles]), fraction, search.beats)
+        explained.append(float(np.sum((columns @ fit_columns(columns, whitened)) ** 2)))
     best = int(np.argmax(explained))
-    return (peak, *beside)[best] if explained[best] > NEARER * explained[0] else peak
+    return (peak, *sidebands)[best] if explained[best] > NEARER * explained[0] else peak
 
 
-def _refined(cycles: Array, residuals: Array, held: int, share: Array, beats: int) -> Array:
-    """Lines refined by what grows of each a quarter of a cycle behind it: its phase. The first so many are held.
+def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, beats: int) -> Array:
+    """Return the lines refined by their phase: by the growing columns a quarter of a cycle behind. `fixed` ones stay.
 
-    A line of which the beats alone are felt has no phase, and stays where it is.
+    A line that shows in its sidebands alone has no phase, and stays as it is.
     """
     for _ in range(PASSES):
-        sizes = fitted(waves(cycles, share, beats), residuals).reshape(len(cycles), wide(beats), -1)
+        sizes = fit_columns(waves(cycles, fraction, beats), residuals).reshape(len(cycles), column_count(beats), -1)
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
         power = np.sum(sizes[:, :2] ** 2, axis=(1, 2)) + np.sum(sizes[:, WIDE:] ** 2, axis=(1, 2))
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / (power + np.finfo(np.float64).tiny)
-        cycles = cycles + np.where(np.arange(len(cycles)) < held, 0.0, np.clip(late / np.pi, -0.5, 0.5))
+        cycles = cycles + np.where(np.arange(len(cycles)) < fixed, 0.0, np.clip(late / np.pi, -0.5, 0.5))
     return cycles

@@ -21,7 +21,7 @@ from rig.estimation.reference.attitude_error import AttitudeError
 from rig.estimation.reference.triaxial import TriaxialSolution
 from rig.estimation.residuals import attitude_residual_std
 from rig.observation.reference.acceleration import DwellReading
-from rig.observation.statistics.mean import Held
+from rig.observation.statistics.mean import StaticReading
 from rig.report.entries.budget import budget_entry
 from rig.report.entries.error import error_entry
 from rig.report.entry import EntryT, entry
@@ -52,7 +52,7 @@ def triad_entry(
 
     `left` (N, 3) each is what the model leaves of the dwells, and what it is expected to leave.
     """
-    budget, dwells = result.budget, tuple[DwellReading | Held, ...](result.dwells)
+    budget, dwells = result.budget, tuple[DwellReading | StaticReading, ...](result.dwells)
     return entry(
         models.sensor, result, sensor, result.triad, result.solution,
         covariance_combined=budget.covariance,
@@ -89,7 +89,9 @@ def _beside_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
     return entry(models.beside, other, scale=scale_of(other.matrix), **{models.quantity.named("bias"): other.bias})
 
 
-def _dwell_entry(models: Models[Any], dwell: DwellReading | Held, residual: Array, residual_std: Array) -> Entry:
+def _dwell_entry(
+    models: Models[Any], dwell: DwellReading | StaticReading, residual: Array, residual_std: Array
+) -> Entry:
     """A dwell: `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave."""
     quantity, read = models.quantity, dwell.reading
     return entry(

@@ -13,7 +13,7 @@ from rig.estimation.reference.imu import solve_imu
 from rig.estimation.reference.imu_fit import covariance_bound
 from rig.estimation.reference.reference_model import BIAS, REFERENCE
 from rig.estimation.reference.sweep_harmonics import FirstHarmonic, first_harmonic
-from rig.observation.statistics.beside_lines import colour_left, swinging
+from rig.observation.statistics.beside_lines import fit_inflation, line_columns
 from support.motions.arm_attitudes import crooked_arm
 from support.motions.arm_sweeps import (
     MICRO_G,
@@ -47,7 +47,7 @@ def reduced(samples: Samples) -> FirstHarmonic:
 
 def reduced_with(samples: Samples, readings_m_s2: Array, coloured: Callable[[Array], float]) -> FirstHarmonic:
     return first_harmonic(
-        samples.time_s, readings_m_s2, samples.angle_rad, samples.speed_rad_s, coloured=coloured, swings=swinging
+        samples.time_s, readings_m_s2, samples.angle_rad, samples.speed_rad_s, coloured=coloured, swings=line_columns
     )
 
 
@@ -138,7 +138,7 @@ def test_a_vibration_in_one_direction_says_nothing_of_the_noise_across_it() -> N
         samples = revolution(seed, 23.0)
         wave = 2400 * MICRO_G * np.sin(2 * np.pi * (14.0 * samples.time_s + rng.uniform()))
         shaken = samples.readings_m_s2 + wave[:, None] * np.array([0.65, 0.0, -0.76])
-        found = reduced_with(samples, shaken, colour_left)
+        found = reduced_with(samples, shaken, fit_inflation)
         off = (found.harmonic_m_s2 - still).ravel()
         squares.append(off @ np.linalg.solve(found.covariance_m2_s4, off) / 9)
         np.testing.assert_allclose(found.noise_m_s2, sampling(23.0).noise_m_s2, rtol=0.15)

@@ -7,9 +7,9 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.coloured_noise import left_of
+from rig.observation.statistics.coloured_noise import fit_autoregression
 from rig.observation.statistics.mean import mean_at_rest
-from rig.observation.statistics.tapered_weights import freedom_at_zero, noise_at_zero, vibrates
+from rig.observation.statistics.tapered_weights import dof_at_zero, noise_at_zero, vibrates
 from rig.observation.windows import Window
 
 RATE_HZ = 238.0
@@ -43,7 +43,7 @@ def test_the_freedom_of_a_variance_is_what_its_scatter_shows(
 ) -> None:
     rng = np.random.default_rng(1)
     draws = [made(rng, 1428) for _ in range(DRAWS)]
-    found = [left_of(each - each.mean()) for each in draws]
+    found = [fit_autoregression(each - each.mean()) for each in draws]
     scatter = shown([left.factor * float(np.var(each)) for left, each in zip(found, draws, strict=True)])
     assert 1 / within < np.median([left.freedom for left in found]) / scatter < within
 
@@ -51,7 +51,7 @@ def test_the_freedom_of_a_variance_is_what_its_scatter_shows(
 def test_a_rest_in_which_the_arm_vibrates_tells_its_noise_from_few_frequencies() -> None:
     rng = np.random.default_rng(2)
     variances = [noise_at_zero(rng.normal(size=(714, 1)))[0] for _ in range(DRAWS)]
-    assert freedom_at_zero(714) == pytest.approx(shown(variances), rel=0.3)
+    assert dof_at_zero(714) == pytest.approx(shown(variances), rel=0.3)
 
 
 def test_white_readings_have_one_less_than_there_are_and_a_vibration_costs_most_of_them() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.observation.statistics.lines import LineSearch, find_lines, fitted, waves
+from rig.observation.statistics.lines import LineSearch, find_lines, fit_columns, waves
 
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
 STRICT = LineSearch(stands_out=30.0)
@@ -31,7 +31,7 @@ def test_of_a_vibration_hardly_more_is_left_than_the_noise(turns: float) -> None
         seen = residuals(seed, float(hertz), 0.004, turns)
         cycles = find_lines(seen, STRICT)
         columns = waves(cycles, share)
-        left = seen - columns @ fitted(columns, seen)
+        left = seen - columns @ fit_columns(columns, seen)
         assert turns or np.abs(cycles - hertz * COUNT / RATE_HZ).min() < 0.05
         assert left.std(axis=0).max() < 1.5 * NOISE  # of nine times the noise
 
@@ -42,7 +42,7 @@ def test_two_vibrations_that_are_near_each_other_are_told_apart() -> None:
     for seed, apart_hz in enumerate(np.linspace(0.27, 0.47, 12)):
         seen = residuals(seed, 23.0, 0.001, 1.0, quiet) + residuals(100 + seed, 23.0 + float(apart_hz), 0.001, 0.0, 0.0)
         columns = waves(find_lines(seen, STRICT), share)
-        left = seen - columns @ fitted(columns, seen)
+        left = seen - columns @ fit_columns(columns, seen)
         assert left.std(axis=0).max() < 1.3 * quiet
 
 

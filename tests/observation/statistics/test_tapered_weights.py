@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps
-from rig.observation.statistics.mean import tapered_mean
+from rig.observation.statistics.mean import average_tapered
 from rig.observation.statistics.tapered_weights import flank_s, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
@@ -33,7 +33,7 @@ def test_nothing_is_left_of_a_vibration_and_the_variance_is_that_of_the_noise(vi
         duration_s = 9.6 + 0.01 * seed
         time_s, rates = readings(duration_s, vibration_hz, seed)
         assert vibrates(rates)
-        found = tapered_mean(rates, time_s, Window(0.0, duration_s), Steps(1e-12))
+        found = average_tapered(rates, time_s, Window(0.0, duration_s), Steps(1e-12))
         off.append(found.mean)
         stated.append(found.variance)
         plain.append(rates.mean(axis=0))

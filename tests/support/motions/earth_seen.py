@@ -19,7 +19,7 @@ from rig.estimation.gyroscope.vector_fit import Seen
 from rig.estimation.statistics.rounding import Steps
 from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
 from rig.motion.steps import Sweep
-from rig.observation.statistics.mean import tapered_mean
+from rig.observation.statistics.mean import average_tapered
 from rig.observation.statistics.tapered_weights import flank_s
 from rig.observation.windows import Window
 from rig.study.rate_table import GYRO_BIAS_RAD_S, GYRO_MATRIX
@@ -198,7 +198,7 @@ def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Ge
             noises.append(readings.mean(axis=0))
             variances.append(np.full(3, session.part.density**2 / (end - start)))
         else:
-            found = tapered_mean(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
+            found = average_tapered(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), Steps(1e-12))
             noises.append(found.mean)
             variances.append(found.variance)
             windows[place] += np.array([0.5, -0.5]) * flank_s(end - start)
