@@ -1,1 +1,1 @@
-"""The rig's side of the board: is it what the configuration says, and what it has stored."""
+"""The host's side of the board: identification, and calibrations stored on it."""

@@ -1,17 +1,16 @@
-"""Whether the board's clock follows its crystal, by its own word."""
+"""Whether the board's clock is locked to its crystal."""
 
 import time
 
 from firmware_host.client import Board
 
-STARTS_S = 2.0  # so long after its reset a crystal of 32768 Hz may take to swing (DS11451, LSE oscillator, t_SU)
+STARTS_S = 2.0  # start-up time of a 32768 Hz crystal, t_SU(LSE) in the data sheet DS11451
 ASK_AGAIN_S = 0.1
 
 
 def follows_crystal(board: Board) -> bool:
-    """Asks until it does, or has had power for long enough to know that it never will.
-
-    Raises as `Board.status` does.
+    """Ask the board until its clock is locked to the crystal or the crystal's start-up time is over; return the last
+    status. Raise as `Board.status` does.
     """
     while True:
         status = board.status()

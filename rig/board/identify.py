@@ -1,4 +1,4 @@
-"""Whether the board and the sensors on it are what the configuration and this program expect."""
+"""Checks that the board and its sensors are the ones that the configuration and this program expect."""
 
 from functools import partial
 from math import isclose
@@ -10,15 +10,17 @@ from rig.config.models import BoardSection, SensorsConfig
 from rig.config.sensors.sensor_sections import ConfiguredSensor, SensorSection
 from rig.errors import Fault, Refused, raised_as
 
-NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
+UNDRIVEN = (0x00, 0xFF, 0x0000, 0xFFFF)  # an SPI bus reads this if no part drives it
 
 
 refusing = partial(raised_as, Refused)  # before anything has moved
-changing = partial(raised_as, Fault)  # while the board is being changed: no refusal any more
+changing = partial(raised_as, Fault)  # while the board is being changed, a refusal is too late
 
 
 def configured_board(config: SensorsConfig) -> BoardSection:
-    """Raises Refused `no_board_section` where every sensor has a port of its own."""
+    """Return the configuration's section board. Raise Refused `no_board_section` if every sensor has a port of its
+    own.
+    """
     if config.board is None:
         raise Refused(
             "no_board_section",
@@ -29,7 +31,7 @@ def configured_board(config: SensorsConfig) -> BoardSection:
 
 
 def refuse_other_firmware(identity: BoardIdentity) -> None:
-    """Raises Refused `firmware_version` unless the board runs the image that comes with this program."""
+    """Raise Refused `firmware_version` unless the board runs the firmware that comes with this program."""
     if identity.firmware != FIRMWARE_VERSION:
         raise Refused(
             "firmware_version",
@@ -40,7 +42,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
 
 
 def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
-    """The board's entry for a configured sensor, whatever answers in its place. Raises Refused `sensor_missing`."""
+    """Return the board's entry for a configured sensor, whichever part answers. Raise Refused `sensor_missing`."""
     for info in identity.sensors:
         if configured_part(info.part) == section.part:
             return info
@@ -48,11 +50,13 @@ def sensor_entry(identity: BoardIdentity, name: str, section: ConfiguredSensor) 
 
 
 def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -> SensorInfo:
-    """The board's entry for a configured sensor that answers. Raises Refused `sensor_missing` or `sensor_mismatch`."""
+    """Return the board's entry for a configured sensor that answers. Raise Refused `sensor_missing`,
+    `sensor_mismatch`.
+    """
     info = sensor_entry(identity, name, section)
     if info.present:
         return info
-    if info.who_am_i in NOBODY:
+    if info.who_am_i in UNDRIVEN:
         raise _missing(name, section, f"nothing answers: its identity reads 0x{info.who_am_i:02x}")
     raise Refused(
         "sensor_mismatch",
@@ -62,18 +66,18 @@ def find_sensor(identity: BoardIdentity, name: str, section: ConfiguredSensor) -
     )
 
 
-def _missing(name: str, section: ConfiguredSensor, seen: str) -> Refused:
+def _missing(name: str, section: ConfiguredSensor, finding: str) -> Refused:
     return Refused(
         "sensor_missing",
-        f"sensors.{name}: the board finds no {section.part} ({seen})",
+        f"sensors.{name}: the board finds no {section.part} ({finding})",
         "Check the sensor's supply and SPI wires, and sensors.*.part in the configuration",
     )
 
 
 def stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
-    """What the board has stored to correct a configured sensor's readings by.
+    """Read the calibration by which the board corrects a configured sensor's readings.
 
-    Raises Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor`.
+    Raise Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor` do.
     """
     stored = board.read_calibration(find_sensor(board.identity, name, section).index)
     if stored is None:
@@ -95,9 +99,10 @@ def stored_calibration(board: Board, name: str, section: SensorSection) -> Store
 def refuse_other_sensor(
     calibration: str, part: str, serial_number: str, range_deg_s: float, section: SensorSection
 ) -> None:
-    """Raises Refused `another_sensor`, `another_range` unless a calibration is of the configured sensor and range.
+    """Raise Refused `another_sensor`, `another_range` unless a calibration fits the configured sensor and its range.
 
-    `calibration` says which calibration it is; `part`, `serial_number` and `range_deg_s` what it was made for.
+    `calibration` names the calibration in the message; `part`, `serial_number` and `range_deg_s` are those it was made
+    for.
     """
     if (part, serial_number) != (section.part, section.serial_number):
         raise Refused(
@@ -115,6 +120,6 @@ def refuse_other_sensor(
 
 
 def configured_part(part: str) -> str:
-    """A part as the configuration spells it; the board names parts as their makers do."""
-    spelt = {on_board.name: name for name, on_board in BOARD_PARTS.items()}
-    return spelt.get(part, part.lower())
+    """Return a part's name in the configuration's spelling; the board spells it as its maker does."""
+    names = {part_on_board.name: name for name, part_on_board in BOARD_PARTS.items()}
+    return names.get(part, part.lower())

@@ -1,4 +1,4 @@
-"""A calibration from `result.json` into the board's flash, and seen to be there."""
+"""Storing of calibrations in the board's flash, each confirmed by reading it back."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -16,7 +16,7 @@ from rig.estimation.arrays import Array
 
 
 class Solved(Protocol):
-    """A sensor's solution, g = M (m + b), just found or read from `result.json`."""
+    """A sensor's solution, g = M (m + b), from the analysis or from `result.json`."""
 
     @property
     def serial_number(self) -> str: ...
@@ -33,9 +33,9 @@ class Solved(Protocol):
 
 
 def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[tuple[str, StoredCalibration]]:
-    """Store the solution of every sensor to calibrate that is on the board; yields its name with its record.
+    """Store the solution of every sensor on the board that is to be calibrated; yield its name and its record.
 
-    Raises BoardError as the board refuses, `not_stored` when it reads back otherwise; Refused as `find_sensor`.
+    Raise BoardError if the board refuses, `not_stored` if it reads back another record; Refused as `find_sensor` does.
     """
     if not config.on_board:
         return
@@ -45,14 +45,14 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
             if name not in config.to_calibrate:
                 continue
             index = find_sensor(board.identity, name, sensor).index
-            board.configure(index, sensor.rate_hz, sensor.range_deg_s)  # the record says for which range it holds
+            board.configure(index, sensor.rate_hz, sensor.range_deg_s)  # a record is valid for one range
             yield name, store(board, index, calibration_of(results[name]))
 
 
 def calibration_of(solved: Solved, entry: OverTemperatureEntry | None = None) -> Calibration:
-    """A sensor's solution as the board keeps it, dated now, with the polynomials of one over temperature.
+    """Return a sensor's solution as a record for the board, dated now, with polynomials if `entry` is over temperature.
 
-    Raises Refused `not_in_result` without a temperature.
+    Raise Refused `not_in_result` if the temperature is missing.
     """
     if solved.temperature_c is None:
         raise Refused(
@@ -70,19 +70,19 @@ def calibration_of(solved: Solved, entry: OverTemperatureEntry | None = None) ->
         temperature_c=solved.temperature_c if entry is None else entry.reference_c,
         matrix=(x, y, z),
         bias_rad_s=(bx, by, bz),
-        polynomials=None if entry is None else _polynomials(entry),
+        polynomials=None if entry is None else _make_polynomials(entry),
     )
 
 
-def _polynomials(entry: OverTemperatureEntry) -> StoredPolynomials:
-    shares = np.array(entry.scale[1:]) / np.array(entry.scale[0])
-    one, two, three = ((x, y, z) for x, y, z in shares.tolist())
+def _make_polynomials(entry: OverTemperatureEntry) -> StoredPolynomials:
+    coefficients = np.array(entry.scale[1:]) / np.array(entry.scale[0])
+    one, two, three = ((x, y, z) for x, y, z in coefficients.tolist())
     first, second, third = entry.bias[1:]
     return StoredPolynomials(entry.range_c, (one, two, three), (first, second, third))
 
 
 def store(board: Board, index: int, calibration: Calibration) -> StoredCalibration:
-    """Write a calibration for a configured sensor and read it back. Raises BoardError, among others `not_stored`."""
+    """Write a calibration of a configured sensor and read it back. Raise BoardError, among others `not_stored`."""
     board.write_calibration(index, calibration)
     stored = board.read_calibration(index)
     if stored is None or stored.calibration != calibration.as_kept():

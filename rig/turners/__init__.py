@@ -1,1 +1,1 @@
-"""Who turns the sensors: the drivers of what moves, each in a room that knows its maker's protocol."""
+"""Drivers of the devices that turn the sensors, one package for each maker's protocol."""

@@ -1,4 +1,4 @@
-"""What is known of a kind of turner: how it is configured, connected, looked at, judged, and spoken of."""
+"""The description of a kind of turner: configuration, connection, pre-flight, identity and wording."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -20,14 +20,19 @@ OnState = Callable[[State], None]
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """How documents and messages speak of a turner.
+    """The wording for a turner in documents and messages.
 
-    `name` is a noun without an article ("robot arm"), `short` what an operator calls it ("arm"), `turned` what a sweep
-    turns of it ("the wrists"); `method` says in a clause how it turns the items, for the
-    certificate; `briefly` the same in a few words, for the digital certificate; in both `{turns}`
-    stands for what sweeps turned through; `directions` whence its axes are known; `beware` is what an operator must be
-    told of it before it moves, `stands` says in a clause how it is left while somebody mounts the item anew; `clock` is
-    what its states are timed by, `told` by whose word its axes are known, `traced` what that means for a certificate.
+    - `name`: a noun without an article ("robot arm").
+    - `short`: the operator's name for it ("arm").
+    - `turned`: the part that sweeps turn ("the wrists").
+    - `method`: a clause for the certificate on how it turns the items; `{turns}` stands for the rotation of the sweeps.
+    - `briefly`: `method` in a few words, for the digital certificate.
+    - `directions`: the source of its axes' directions.
+    - `beware`: a warning for the operator before it moves.
+    - `stands`: a clause on its state while the item is mounted anew.
+    - `clock`: the clock that stamps its states.
+    - `told`: the source of its axes, as a clause.
+    - `traced`: the traceability of its axes, for the certificate.
     """
 
     name: str
@@ -47,17 +52,17 @@ class Words:
 class TurnerKind(Generic[SectionT, ReportT]):
     """A kind of turner, registered by the entry point `name` of the group `rig.turners`.
 
-    - `section`: what `turner:` in the configuration may say with `kind: name`.
-    - `connect`: the turner, for the length of a `with` block that ends with it stopped; every state goes, in order, to
-      the function given; the file is for what a maker's client prints. Raises `Refused` by name.
-    - `look`: what it says of itself; nothing moves and no program is stopped. Raises `Refused` by name.
-    - `stance`: how it stands, in a line of text.
-    - `problems`: all that is known to speak against driving the last of the plans, before anything moves: of the plans
-      by themselves where there is no report. Pure.
-    - `meant`: which one the configuration means: as it is on the drawing, before anything has answered.
-    - `made`: what a recording says of the one that was found. Raises `Refused` where it is not the one that was meant.
-    - `carried`: what it is to be told of its load.
-    - `fields`: what its states tell beyond times and joints, in the order of their `to_record`.
+    - `section`: the model of the section `turner:` with `kind: name`.
+    - `connect`: returns a context manager of the turner, which stops it at its end. Every state goes, in order, to the
+      function passed; the file takes the output of a maker's client. Raises `Refused` by name.
+    - `look`: reads a report of itself; nothing moves and no program is stopped. Raises `Refused` by name.
+    - `stance`: describes its pose in a line of text.
+    - `problems`: lists all reasons not to drive the last of the plans, before anything moves; without a report, those
+      of the plans alone. Pure.
+    - `meant`: returns the configured turner with its nominal geometry, before any connection.
+    - `made`: returns the connected turner for the recording. Raises `Refused` if it is not the configured one.
+    - `carried`: returns the payload to set on the turner.
+    - `fields`: the fields of its states after times and joints, in the order of `to_record`.
     """
 
     name: str

@@ -1,6 +1,6 @@
-"""The kinds of turners by name. A package adds its own through the entry-point group `rig.turners`.
+"""Kinds of turners by name. A package adds its own through the entry-point group `rig.turners`.
 
-Nothing in the rig knows a turner except through its `TurnerKind`.
+The rest of the rig knows a turner only through its `TurnerKind`.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ GROUP = "rig.turners"
 
 @cache
 def installed() -> Mapping[str, AnyTurner]:
-    """The kinds of turners in stock, and of the packages installed here. Raises Refused `turner_not_loaded`."""
+    """Return the kinds of turners in stock and in installed packages, by name. Raise Refused `turner_not_loaded`."""
     stock = (EntryPoint(name, f"rig.turners.{name}.kind:{name.upper()}", GROUP) for name in STOCK_TURNERS)
     return {kind.name: kind for _, kind in added(GROUP, _not_loaded, stock)}
 
@@ -28,12 +28,12 @@ def _not_loaded(what: str, remedy: str) -> Refused:
 
 
 def sections() -> Mapping[str, type[TurnerSection]]:
-    """What the `turner:` section of a configuration may be, by its `kind`."""
+    """Return the models of the configuration's section `turner:`, by its `kind`."""
     return {name: kind.section for name, kind in installed().items()}
 
 
 def kind_of(section: TurnerSection) -> AnyTurner:
-    """The kind of turner that is configured so. Raises Refused `turner_not_installed`."""
+    """Return the kind of turner of a section. Raise Refused `turner_not_installed`."""
     for kind in installed().values():
         if type(section) is kind.section:
             return kind
@@ -45,10 +45,10 @@ def kind_of(section: TurnerSection) -> AnyTurner:
 
 
 def words_of(name: str) -> Words:
-    """How to speak of a kind of turner: in general terms of one that is not installed here."""
-    known = installed().get(name)
-    if known is not None:
-        return known.words
+    """Return the wording for a kind of turner, in general terms if it is not installed."""
+    kind = installed().get(name)
+    if kind is not None:
+        return kind.words
     return Words(
         name=f"turner of the kind {name}",
         short="turner",

@@ -1,4 +1,4 @@
-"""A stop that is made once, in a thread of its own: what every turner's stop has, however it is made."""
+"""A stop that runs once, in a thread of its own: the part that the stops of all turners share."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class StopOutcome:
-    """Whether the turner was seen at rest, in words; `remedy` is empty where nothing is left to do."""
+    """The end of a stop: whether a state confirmed rest, in words; `remedy` is empty if nothing remains to be done."""
 
     at_rest: bool
     what: str
@@ -16,10 +16,10 @@ class StopOutcome:
 
 
 class StopOnce:
-    """Makes a stop when `begin` is first called; later calls change nothing.
+    """A stop that starts at the first call of `begin`; later calls change nothing.
 
-    `stopped` makes it and says what came of it, in less than 1 s, in a thread called `name`. No interrupt of the caller
-    breaks it off. `not_ended` is the outcome should it fail itself.
+    `stopped` stops the turner and returns the outcome in less than 1 s, in a thread called `name`. An interrupt of the
+    caller does not abort it. `not_ended` is the outcome if `stopped` itself fails.
     """
 
     def __init__(self, name: str, stopped: Callable[[], StopOutcome], not_ended: StopOutcome) -> None:
@@ -31,7 +31,7 @@ class StopOnce:
 
     @property
     def begun(self) -> bool:
-        """Whether a stop has been asked for."""
+        """Whether a stop has been requested."""
         return self._thread.ident is not None
 
     def begin(self) -> None:
@@ -41,9 +41,9 @@ class StopOnce:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop if that has not begun, and wait for the result; less than 1 s.
+        """Stop unless that has begun, and wait for the outcome, less than 1 s.
 
-        An interrupt meanwhile is raised when the result is there. (An event, because `join`, once interrupted, takes
+        Raise an interrupt of the meantime once the outcome is there. (An event, because after an interrupt `join` takes
         the thread for ended in Python 3.11.)
         """
         self.begin()
@@ -66,7 +66,7 @@ class StopOnce:
 
 @contextmanager
 def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
-    """Stop before whatever ends the block early goes on to the caller."""
+    """Stop before an exception of the block goes on to the caller."""
     try:
         yield
     except BaseException:
@@ -75,7 +75,7 @@ def stopping_on_error(stop: Callable[[], StopOutcome]) -> Iterator[None]:
 
 
 def tell_of_stop(error: BaseException, stop: Callable[[], StopOutcome]) -> None:
-    """Stop, and add to the error on whose account how that ended."""
+    """Stop, and add the outcome as a note to the error that caused the stop."""
     try:
         outcome = stop()
     except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now

@@ -1,4 +1,4 @@
-"""What turns the sensors, as far as a run needs it; each kind (`rig.turners.kind`) has a driver in its own room."""
+"""The protocol of a turner as a run uses it; each kind (`rig.turners.kind`) has a driver in its own package."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -9,12 +9,12 @@ from rig.motion.steps import Motion
 
 
 class Turner(Protocol):
-    """Connected, and standing where it was found, until `take_control`; stopped again whenever it is let go.
+    """A connected turner, at rest in its initial pose until `take_control`, and stopped again at the end of its `with`
+    block.
 
-    Its time is that of its states, and the reference of a recording. Whatever fails in it stops it before anybody is
-    told: then every method raises `Fault` by name, or `Refused` while nothing has moved. `watch`, of `move` and `rest`,
-    is called at least every 20 ms, and what it raises stops the turner and goes on to the caller. Whoever connects one
-    hands every state, in order, to the recording, and leaves it by a `with` block that ends with it stopped.
+    The time of its states is the reference of a recording, which gets every state in order. A failure stops the turner
+    first; then every method raises `Fault` by name, or `Refused` while nothing has moved. `move` and `rest` call
+    `watch` at least every 20 ms; an exception of it stops the turner and goes on to the caller.
     """
 
     @property
@@ -24,19 +24,19 @@ class Turner(Protocol):
 
     @property
     def missed_states(self) -> int:
-        """Gaps in its states, counted in states."""
+        """The number of states missing from the stream."""
         ...
 
     def report(self) -> Report:
-        """What it says about itself, for pre-flight; nothing moves."""
+        """Return the turner's report of itself, for pre-flight; nothing moves."""
         ...
 
     def check(self) -> None:
-        """Raise what has gone wrong meanwhile."""
+        """Raise the problem that has occurred meanwhile, if any."""
         ...
 
     def take_control(self, carried: Carried) -> None:
-        """Make it ready to move what it carries. Raises `Refused` by name."""
+        """Make it ready to move its payload. Raise `Refused` by name."""
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:
@@ -44,5 +44,5 @@ class Turner(Protocol):
         ...
 
     def rest(self, duration_s: float, watch: Callable[[], None] = ...) -> None:
-        """Stand still for a time of its own clock."""
+        """Stand still for `duration_s` of its own clock."""
         ...

@@ -19,7 +19,7 @@ from rig.motion.steps import Dwell, Motion, Plan, Rest, Transfer
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import plan_static_attitudes
 from rig.turners.ur.condition import program_interruption, readiness
-from rig.turners.ur.preflight import arm_problems, kinematics_problems, made, preflight_problems
+from rig.turners.ur.preflight import arm_problems, kinematics_problems, make_recorded, preflight_problems
 from rig.turners.ur.report import ArmReport
 from support.wires.ur10e import plan_problems
 
@@ -199,15 +199,15 @@ def test_paused_and_stopped_programs_are_told_apart() -> None:
 def test_the_controllers_account_of_its_arm_is_used_unless_the_file_wants_the_nominal_one() -> None:
     measured = replace(NOMINAL, theta_rad=(0.0, -0.7, 0.3, 0.4, 1e-3, 0.0))
     told = replace(REPORT, kinematics=measured)
-    assert made(ARM, told).kinematics == measured
+    assert make_recorded(ARM, told).kinematics == measured
     nominal = ARM.model_copy(update={"kinematics": "nominal"})
-    assert made(nominal, told).kinematics == made(nominal, REPORT).kinematics == NOMINAL
+    assert make_recorded(nominal, told).kinematics == make_recorded(nominal, REPORT).kinematics == NOMINAL
 
 
 def test_an_arm_that_does_not_say_how_it_is_made_is_refused() -> None:
     assert names(kinematics_problems(ARM, REPORT)) == ["no_kinematics"]
     with pytest.raises(Refused, match="no_kinematics"):
-        made(ARM, REPORT)
+        make_recorded(ARM, REPORT)
 
 
 @pytest.mark.parametrize(("off_deg", "found"), [(0.9, []), (1.1, ["kinematics_disagree"])])

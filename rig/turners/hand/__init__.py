@@ -1,1 +1,1 @@
-"""An operator's hand as what turns the sensors."""
+"""An operator's hand as the turner."""

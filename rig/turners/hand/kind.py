@@ -1,6 +1,6 @@
-"""The hand of an operator, as a kind of turner: without joints, without states, with nothing that could move by itself.
+"""An operator's hand as a kind of turner: without joints, states or motion of its own.
 
-What it did is read from the sensors themselves; the time of a recording is the board's.
+Its motion is read from the sensors themselves; the time of a recording is the board's.
 """
 
 import time
@@ -19,40 +19,40 @@ from rig.turners.kind import OnState, TurnerKind, Words
 from rig.turners.turner import Turner
 
 GEOMETRY = DenavitHartenberg((), (), (), ())
-NOBODY = "none, turned by hand"
+NO_DEVICE = "none, turned by hand"
 LOOK_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class HandState:
-    """A `State` of no joints; its time is the computer's, by which nothing is solved."""
+    """A `State` without joints; its time is the computer's and enters no solution."""
 
     time_s: float
     host_time_s: float
 
     @property
     def q_rad(self) -> Joints:
-        """No angles."""
+        """The joint angles: none."""
         return ()
 
     @property
     def qd_rad_s(self) -> Joints:
-        """No speeds."""
+        """The joint rates: none."""
         return ()
 
     def to_record(self) -> Row:
-        """The times."""
+        """Return the times."""
         return self.time_s, self.host_time_s
 
 
 @dataclass(frozen=True, slots=True)
 class HandReport:
-    """A `Report` of what cannot be asked."""
+    """A `Report` of a turner that cannot be queried."""
 
     state: HandState
     host: str = "this table"
-    serial_number: str = NOBODY
-    software: str = NOBODY
+    serial_number: str = NO_DEVICE
+    software: str = NO_DEVICE
     model: str | None = None
     kinematics: DenavitHartenberg | None = GEOMETRY
     joints: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class HandReport:
 
 
 class Hand:
-    """A `Turner` that is told nothing: who drives the operator is the runner (`rig.runner.by_hand.session`)."""
+    """A `Turner` without control: the runner guides the operator (`rig.runner.by_hand.session`)."""
 
     missed_states = 0
 
@@ -75,17 +75,17 @@ class Hand:
         return HandState(now_s, now_s)
 
     def report(self) -> HandReport:
-        """A report that says no more than that a hand turns."""
+        """Return a report that names a hand as the turner."""
         return HandReport(self.latest)
 
     def check(self) -> None:
-        """A hand has nothing that can go wrong."""
+        """Return at once: a hand has no faults to raise."""
 
     def take_control(self, carried: Carried) -> None:
-        """There is nothing to take."""
+        """Return at once: a hand needs no preparation."""
 
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
-        """A hand makes no planned motion. Raises Fault `unplanned_motion`."""
+        """Raise Fault `unplanned_motion`: a hand makes no motion of joints."""
         raise Fault(
             "unplanned_motion",
             "a script orders a motion of joints, and a hand turns the item",
@@ -93,11 +93,11 @@ class Hand:
         )
 
     def rest(self, duration_s: float, watch: Callable[[], None] = lambda: None) -> None:
-        """Wait for so long by the computer's clock."""
+        """Wait for `duration_s` of the computer's clock."""
         end_s = time.monotonic() + duration_s
-        while (left_s := end_s - time.monotonic()) > 0:
+        while (remaining_s := end_s - time.monotonic()) > 0:
             watch()
-            time.sleep(min(LOOK_S, left_s))
+            time.sleep(min(LOOK_S, remaining_s))
 
 
 @contextmanager
@@ -114,7 +114,7 @@ def _stance(report: HandReport) -> str:
 
 
 def _problems(plans: Sequence[Plan], section: HandSection, report: HandReport | None) -> list[Problem]:
-    """A plan with motions is none for a hand."""
+    """Return a problem if a plan has motions of joints."""
     if not any(plan.motions for plan in plans):
         return []
     return [

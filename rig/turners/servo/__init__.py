@@ -1,1 +1,1 @@
-"""The Dynamixel X servo as a turner: one shaft, driven through the maker's own `dynamixel-sdk`."""
+"""The Dynamixel X servo as a turner: one shaft, driven through the maker's `dynamixel-sdk`."""

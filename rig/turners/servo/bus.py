@@ -1,4 +1,4 @@
-"""The maker's packet handler as this driver uses it: a reply, or an exception that says what was wrong with it."""
+"""The maker's packet handler with exceptions: every call returns a valid reply or raises the reason."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,34 +11,34 @@ from rig.turners.servo.latency import lower_latency
 from rig.turners.servo.port import Port
 from rig.turners.servo.registers import RETURN_LEVEL, Register
 
-# What a port that is pulled out raises: pyserial's own error is an OSError, and closed meanwhile it says TypeError.
+# The errors of an unplugged port: pyserial's own is an OSError; a port closed meanwhile raises TypeError.
 FAILURES: tuple[type[Exception], ...] = (OSError, TypeError)
 with suppress(ImportError):  # on Windows
     import termios
 
     FAILURES = (*FAILURES, termios.error)
 SLACK_S = 0.020  # return delay (0.5 ms as delivered), latency of the adapter, and a busy host
-SETTLE_MOST_S = 0.1  # a line that never falls silent is not waited for any longer
-ATTEMPTS = 4  # a write whose acknowledgement is lost is looked up, and sent again if it is not there
+SETTLE_MOST_S = 0.1  # the longest wait for a line to fall silent
+ATTEMPTS = 4  # a write without acknowledgement is read back, and repeated if it did not take effect
 ALERT = 0x80  # in the error byte: Hardware Error Status is not zero. A flag, no failure of the instruction
 SUCCESS, NOT_SENT = 0, (-1000, -1001, -2000)  # results of the packet handler: port busy, not sent, wrong instruction
 DAMAGED = -3002
 
 
 class BusError(Exception):
-    """Something between this computer and the servo."""
+    """An error between this computer and the servo."""
 
 
-class Lost(BusError):
-    """No usable reply; `damaged` when something came that was none."""
+class ReplyLost(BusError):
+    """A missing reply, or a `damaged` one."""
 
     def __init__(self, damaged: bool) -> None:
         super().__init__("a damaged reply" if damaged else "no reply")
         self.damaged = damaged
 
 
-class Denied(BusError):
-    """The servo's no to an instruction, by the error number of protocol 2.0."""
+class InstructionDenied(BusError):
+    """The servo's refusal of an instruction, with the error number of protocol 2.0."""
 
     def __init__(self, number: int, register: Register) -> None:
         super().__init__(f"error {number} at {register.name}")
@@ -46,14 +46,14 @@ class Denied(BusError):
 
 
 class PortGone(BusError):
-    """A port that has failed. It stays so: another `Bus` may try it again."""
+    """A failed port. It remains failed; another `Bus` may open it again."""
 
 
 class Bus:
-    """The line to one servo. Only one thread at a time may use it."""
+    """The line to one servo, for one thread at a time."""
 
     def __init__(self, path: str, baud: int, servo_id: int, clock: Clock = HOST) -> None:
-        """Opens and locks the port. Raises Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
+        """Open and lock the port. Raise Refused `missing_extra`, `servo_port_in_use`, `no_servo_port`, …."""
         try:
             from dynamixel_sdk import PacketHandler
         except ImportError as error:
@@ -73,19 +73,19 @@ class Bus:
             raise
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self._gone = True
         self._port.close()
 
     def ping(self) -> int:
-        """The model number. Raises Lost, PortGone."""
+        """Return the model number. Raise Lost, PortGone."""
         with self._failing():
             number, result, error = self._packets.ping(self._port, self._id)
         self._judge(result, error, RETURN_LEVEL)
         return int(number)
 
     def more_came(self, wait_s: float) -> bool:
-        """Whether anything follows within `wait_s` that nobody asked for."""
+        """Return whether an unrequested byte follows within `wait_s`."""
         with self._failing():
             for _ in range(max(1, round(wait_s / 0.002))):
                 if self._port.readPort(1):
@@ -93,32 +93,31 @@ class Bus:
         return False
 
     def read(self, register: Register) -> tuple[int, ...]:
-        """A register's values. Raises Lost, Denied, PortGone."""
+        """Read a register's values. Raise Lost, Denied, PortGone."""
         return register.unpack(self.read_bytes(register))
 
     def read_bytes(self, register: Register) -> bytes:
-        """A register's bytes. Raises Lost, Denied, PortGone."""
+        """Read a register's bytes. Raise Lost, Denied, PortGone."""
         with self._failing():
             data, result, error = self._packets.readTxRx(self._port, self._id, register.address, register.size)
         self._judge(result, error, register)
         if len(data) != register.size:  # the late reply to another question
-            raise Lost(damaged=True)
+            raise ReplyLost(damaged=True)
         return bytes(data)
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """What a register holds, asked again where a reply is lost. Raises Lost, Denied, PortGone."""
+        """Read a register's values, and repeat after a lost reply. Raise Lost, Denied, PortGone."""
         for _ in range(ATTEMPTS - 1):
             try:
                 return self.read(register)
-            except Lost:
+            except ReplyLost:
                 self.settle()
         return self.read(register)
 
     def write(self, register: Register, *values: int) -> None:
-        """Write values, all of them absolute, so that it does no harm to write them twice.
+        """Write absolute values, so that a repeated write does no harm.
 
-        When no acknowledgement comes, the register is read: an instruction that was lost is sent again. Raises Lost,
-        Denied, PortGone.
+        Without an acknowledgement, read the register, and repeat a lost instruction. Raise Lost, Denied, PortGone.
         """
         data = register.pack(*values)
         for attempt in range(ATTEMPTS):
@@ -129,26 +128,26 @@ class Bus:
                     )
                 self._judge(result, error, register)
                 return
-            except Lost:
+            except ReplyLost:
                 self.settle()
                 if attempt == ATTEMPTS - 1:
                     raise
                 try:
                     if self.read_bytes(register) == data:
                         return
-                except Lost:
+                except ReplyLost:
                     self.settle()
 
     def write_unheard(self, register: Register, *values: int) -> None:
-        """Write values to a servo that does not acknowledge. Raises PortGone."""
+        """Write values without waiting for an acknowledgement. Raise PortGone."""
         with self._failing():
             data = list(register.pack(*values))
             self._packets.writeTxOnly(self._port, self._id, register.address, register.size, data)
 
     def settle(self) -> None:
-        """Wait until nothing has come for `SLACK_S`, so that a late reply is not taken for the next. Raises PortGone.
+        """Wait until the line was silent for `SLACK_S`, so that a late reply is not taken for the next. Raise PortGone.
 
-        Replies do not say which instruction they answer.
+        Replies do not name the instruction that they answer.
         """
         with self._failing():
             now_s = self.clock.now_s()
@@ -161,21 +160,21 @@ class Bus:
         if result in NOT_SENT:
             raise PortGone(f"the packet handler gives {result}")
         if result != SUCCESS:
-            raise Lost(damaged=result == DAMAGED)
+            raise ReplyLost(damaged=result == DAMAGED)
         self.alert = bool(error & ALERT)
         if error & ~ALERT:
-            raise Denied(error & ~ALERT, register)
+            raise InstructionDenied(error & ~ALERT, register)
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
-        """What the packet handler may raise, by its names here."""
+        """Translate the exceptions of the packet handler into Lost and PortGone."""
         if self._gone:
             raise PortGone("it has been closed")
         try:
             yield
         except IndexError as error:  # it reads on in a reply that is too short
             self._port.is_using = False
-            raise Lost(damaged=True) from error
+            raise ReplyLost(damaged=True) from error
         except FAILURES as error:
             self._gone = True
             raise PortGone(str(error)) from error

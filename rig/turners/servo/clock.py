@@ -1,4 +1,4 @@
-"""The time that a servo's driver goes by: its time-outs, its pauses, and when a position was measured."""
+"""The clock of a servo's driver: for time-outs, pauses, and the time of each position."""
 
 import threading
 import time
@@ -7,25 +7,26 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """A clock that never goes back, and what waits by it; whoever simulates the servo may bring another."""
+    """A monotonic clock and waiting by it; a simulated servo may bring another."""
 
     def now_s(self) -> float:
-        """Return the time that time-outs are measured by, s."""
+        """Return the time for time-outs, s."""
 
     def reference_s(self) -> float:
-        """Return the time that states are stamped with, s."""
+        """Return the time for the stamps of states, s."""
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
         """Wait for an event; return whether it came in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, looking whenever `changed` (which is held) is notified; return what it said last."""
+        """Wait until `done`, evaluated whenever `changed` (which is locked) is notified; return its last value."""
 
 
 class HostClock:
-    """The host's. States have one that nobody slews or sets, on a system that has such a one.
+    """The host's clock. Its stamps come from the raw monotonic clock, which is never slewed or set, if the system has
+    one.
 
-    The servo's own (Realtime Tick) is none: it counts milliseconds, by an oscillator that may be a per cent out.
+    The servo's clock (Realtime Tick) does not serve: it counts milliseconds of an oscillator with 1 % tolerance.
     """
 
     def now_s(self) -> float:
@@ -38,11 +39,11 @@ class HostClock:
         return time.monotonic() if raw is None else time.clock_gettime(raw)
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
-        """Wait for an event, as of `Clock`."""
+        """Wait for an event by the host's clock; return whether it came in time."""
         return event.wait(timeout_s)
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done`, as of `Clock`."""
+        """Wait until `done` by the host's clock; return its last value."""
         return changed.wait_for(done, timeout_s)
 
 

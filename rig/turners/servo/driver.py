@@ -1,4 +1,4 @@
-"""The servo as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
+"""The driver of a servo: supervised moves and rests, a stream of states, and a stop at any time."""
 
 import threading
 from collections import deque
@@ -12,41 +12,42 @@ from rig.errors import Fault, Problem, Refused, RigError, refuse
 from rig.motion.carried import Carried
 from rig.motion.steps import Motion
 from rig.turners.servo import problems
-from rig.turners.servo.bus import Bus, BusError, Denied
+from rig.turners.servo.bus import Bus, BusError, InstructionDenied
 from rig.turners.servo.clock import HOST, Clock
 from rig.turners.servo.instructions import disarm, go, make_ready
-from rig.turners.servo.link import Job, Link
+from rig.turners.servo.link import Job, ServoLink
 from rig.turners.servo.looking import look_at
 from rig.turners.servo.models import PULSE_RAD
 from rig.turners.servo.moves import move_of, move_problems
 from rig.turners.servo.preflight import servo_problems
 from rig.turners.servo.registers import TRIPPED, WATCHDOG, WATCHDOG_MOST, WATCHDOG_S
 from rig.turners.servo.state import ServoReport, ServoState, stands
-from rig.turners.servo.stopping import SURE, Stop
+from rig.turners.servo.stopping import SURE, ShaftStop
 from rig.turners.stop_once import StopOnce, StopOutcome, stopping_on_error, tell_of_stop
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
-ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: where a servo without an integral gain comes to rest beside its goal
-SLOWNESS, SLOWNESS_S = 1.1, 1.0  # a move may take so much longer than planned: "t4" of the manual, and standing still
+ARRIVAL_RAD = 15 * PULSE_RAD  # 1.3°: the position error at rest of a servo without an integral gain
+SLOWNESS, SLOWNESS_S = 1.1, 1.0  # tolerance on a move's planned duration: "t4" of the manual, and settling
 FIRST_STATE_S = 5.0
-STANDING_S = 3.0  # it must have been seen at rest within this, before it is taken under control
-UNWATCHED_S = 2.0  # a move that nobody looks at for so long is stopped
-HUNG_S = 1.0  # the thread that has the line comes round at least this often
-KEPT_S = 1.0  # of states, to tell rest from motion
-NOT_HELD = StopOutcome(True, "the servo was not under control")
+STANDING_S = 3.0  # states must show rest within this time before control is taken
+UNWATCHED_S = 2.0  # a move without supervision for this time is stopped
+HUNG_S = 1.0  # the link's thread repeats its loop at least this often
+KEPT_S = 1.0  # length of the buffer of states that tells rest from motion
+NOT_CONTROLLED = StopOutcome(True, "the servo was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", f"Look at the shaft: {SURE}")
 
 
 def _nothing() -> None:
-    """Watch nothing but the servo."""
+    """Supervise nothing beyond the servo itself."""
 
 
 class Servo:
-    """The servo `servo_id` at `port`; a context manager that starts receiving on entry and leaves the shaft standing.
+    """The servo `servo_id` at `port`, a context manager that receives states from its entry and leaves the shaft at
+    rest.
 
-    `model` is the one that is meant (`rig.turners.servo.models`). `on_state` gets every state in order, from a thread
-    of this class, and must not wait: a servo that nobody speaks to for `watchdog_s` stops. All methods raise `Fault` by
-    name when the servo or its line fails: the shaft is then stopped already. `Refused` means that nothing has moved.
+    `model` is the configured one (`rig.turners.servo.models`). `on_state` gets every state in order, from a thread of
+    this class, and must not wait: a servo without traffic for `watchdog_s` stops. After a failure of the servo or its
+    line all methods raise `Fault` by name, with the shaft already stopped. `Refused` means that nothing has moved.
     """
 
     def __init__(
@@ -68,27 +69,27 @@ class Servo:
         self._states: deque[ServoState] = deque(maxlen=round(KEPT_S * rate_hz))
         self._problem: Problem | None = None
         self._doing = "the preparation"
-        self._holds = False  # torque may be on by our doing, so a stop is ours to make
+        self._holds = False  # this driver may have switched torque on, so it has to stop the shaft
         self._moving = False
-        self._looked_s = 0.0  # when `move` last looked at the states
+        self._looked_s = 0.0  # time of the last supervision by `move`
         self.missed_states = 0  # polls without a state
         self._bus: Bus
-        self._link: Link | None = None
+        self._link: ServoLink | None = None
         self._stopper: StopOnce
         self._report: ServoReport
 
     # Looking ----------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Open the port, look, and receive; moves nothing. Raises `Refused` when no servo answers."""
+        """Open the port, read a report, and start to receive; nothing moves. Raise `Refused` if no servo answers."""
         self._bus = Bus(self._port, self._baud, self._id, self._clock)
         try:
             self._report = look_at(self._bus, self._port, self._id)
         except BaseException:
             self._bus.close()
             raise
-        self._link = Link(self._bus, self._report.servo, self._period_s, self._take_state, self._fail)
-        stop = Stop(self._link, self._clock, self._watchdog * WATCHDOG_S, self._seen_at_rest, self._lets_go)
+        self._link = ServoLink(self._bus, self._report.servo, self._period_s, self._take_state, self._fail)
+        stop = ShaftStop(self._link, self._clock, self._watchdog * WATCHDOG_S, self._await_rest, self._lets_go)
         self._stopper = StopOnce("servo stop", stop.carry_out, NOT_ENDED)
         self._link.start()
         ends_s = self._clock.now_s() + FIRST_STATE_S
@@ -106,19 +107,19 @@ class Servo:
         return self._states[-1]
 
     def report(self) -> ServoReport:
-        """What the servo says about itself, for pre-flight, as it was when the port was opened."""
+        """Return the servo's report of itself from the opening of the port, for pre-flight."""
         self.check()
         return self._report
 
     def problems(self, carried: Carried, motions: Iterable[Motion] = ()) -> list[Problem]:
-        """Everything that stands in the way of carrying this, and of moving so."""
+        """Return every reason against this payload and these motions."""
         return [
             *servo_problems(self._report, self._wanted_model, carried, self._period_s),
             *move_problems(motions, self._report.velocity_limit_rad_s),
         ]
 
     def check(self) -> None:
-        """Raise what a supervising thread has met. The shaft is stopped by then, if it was ours to stop."""
+        """Raise a supervising thread's problem. The shaft is stopped by then if this driver controls it."""
         if self._link is not None and (problem := self._thread_problem(self._link)) is not None:
             self._fail(problem)
         if self._problem is None and not (self._link is not None and self._stopper.begun):
@@ -135,7 +136,7 @@ class Servo:
     # Moving -----------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: Carried) -> None:
-        """Have the shaft held where it is, with the watchdog armed. Raises `Refused` by name."""
+        """Have the shaft held at its position, with the watchdog armed. Raise `Refused` by name."""
         self.check()
         refuse(self.problems(carried))
         ends_s = self._clock.now_s() + STANDING_S
@@ -150,8 +151,8 @@ class Servo:
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
         """Make one movement and return when the shaft has arrived and stands still.
 
-        `watch` is called before and then at least every 20 ms; what it raises stops the shaft and goes on to the
-        caller. What the servo is really asked for is `moves.move_of(motion)`.
+        `watch` is called first and then at least every 20 ms; its exception stops the shaft and goes on to the caller.
+        The servo executes `moves.move_of(motion)`.
         """
         with stopping_on_error(self.stop):
             watch()
@@ -168,34 +169,34 @@ class Servo:
                 began_s = self.latest.time_s
                 goal_rad = move.goal * PULSE_RAD
 
-                def arrived() -> bool:
+                def is_at_goal() -> bool:
                     recent = [state for state in list(self._states) if state.time_s > began_s]
                     return stands(recent) and abs(recent[-1].q_rad[0] - goal_rad) < ARRIVAL_RAD
 
-                self._wait(lambda: arrived() or self.latest.time_s > began_s + takes_s, watch)
-                if not arrived():
+                self._wait(lambda: is_at_goal() or self.latest.time_s > began_s + takes_s, watch)
+                if not is_at_goal():
                     self._fail(problems.slower_than_planned(motion, takes_s))
                 self.check()
             finally:
                 self._moving = False
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
-        """Stand still for a time of the states' clock; `watch` as in `move`."""
+        """Stand still for `duration_s` of the states' clock; `watch` as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
 
     def stop(self) -> StopOutcome:
-        """Stop the shaft and tell what is known about it; takes less than 1 s.
+        """Stop the shaft and return its state; takes less than 1 s.
 
-        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it and is raised when
-        it has ended. Afterwards this object moves the shaft no more.
+        Safe at any time, repeatedly, from any thread; a second Ctrl-C does not undo it and is raised when it has ended.
+        Afterwards this object moves the shaft no more.
         """
-        return self._stopper.outcome() if self._holds else NOT_HELD
+        return self._stopper.outcome() if self._holds else NOT_CONTROLLED
 
     def close(self) -> None:
-        """Stop the shaft if it was under control, and give the port back; torque stays on."""
+        """Stop the shaft if it is under control, and close the port; torque stays on."""
         if self._link is None:
             return
         try:
@@ -219,40 +220,42 @@ class Servo:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        told = self._problem is not None and isinstance(error, RigError)  # the servo's own problems tell of the stop
-        if error is not None and not told:
+        is_reported = self._problem is not None and isinstance(
+            error, RigError
+        )  # the servo's own problems include the stop's outcome
+        if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
         self.close()
 
     # Inside -----------------------------------------------------------------------------------------------------
 
     @property
-    def _linked(self) -> Link:
+    def _linked(self) -> ServoLink:
         if self._link is None:
             raise RuntimeError("start() comes first")
         return self._link
 
     def _call(self, job: Job) -> None:
-        """Have the servo told something; what goes wrong with it is a problem of the servo's."""
+        """Send an instruction; turn its errors into problems of the servo."""
         try:
             self._linked.call(job)
         except Refused as error:
             self._fail(error.problem)
-        except Denied as error:
+        except InstructionDenied as error:
             self._fail(self._why_denied(error))
         except BusError as error:
             self._fail(problems.does_not_hear(error))
         self.check()
 
-    def _why_denied(self, error: Denied) -> Problem:
-        """The reason of a no: mostly that the watchdog has stopped the servo."""
+    def _why_denied(self, error: InstructionDenied) -> Problem:
+        """Return the reason of a refusal: mostly a stop by the watchdog."""
         with suppress(BusError):
             if self._linked.call(lambda bus: bus.look_up(WATCHDOG), also_stopped=True) == (TRIPPED,):
-                return problems.tripped()
+                return problems.watchdog_tripped()
         return problems.refuses(error)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
-        """Block until `done`, looking at the servo's faults and the caller's watch all the time."""
+        """Block until `done`, while the servo's faults and the caller's watch are checked."""
         finished = False
         while not finished:
             with self._changed:
@@ -262,15 +265,15 @@ class Servo:
             self.check()
             watch()
 
-    def _thread_problem(self, link: Link) -> Problem | None:
-        """What keeps the thread that has the line from coming round."""
+    def _thread_problem(self, link: ServoLink) -> Problem | None:
+        """Return the problem of a link's thread that no longer runs its loop."""
         silent_s = self._clock.now_s() - link.turned_s
         if not link.alive or silent_s < HUNG_S * silence.crowding():
             return None
         return problems.driver_hung(silent_s)
 
     def _take_state(self, state: ServoState) -> None:
-        """Take a state as it comes, on the link's thread."""
+        """Record a state as it comes, on the link's thread."""
         if self._states:
             self.missed_states += max(0, round((state.time_s - self.latest.time_s) / self._period_s) - 1)
         self._states.append(state)
@@ -281,12 +284,12 @@ class Servo:
         except Exception as error:
             self._fail(problems.state_not_taken(error))
         if self._moving and self._clock.now_s() - self._looked_s > UNWATCHED_S * silence.crowding():
-            self._fail(problems.unwatched(UNWATCHED_S, self._doing))
+            self._fail(problems.move_unsupervised(UNWATCHED_S, self._doing))
         with self._changed:
             self._changed.notify_all()
 
     def _fail(self, problem: Problem) -> None:
-        """Keep the first problem and stop the shaft; nothing is a problem after a stop on request."""
+        """Record the first problem and stop the shaft; ignore problems after a requested stop."""
         with self._changed:
             if self._problem is not None or (self._link is not None and self._stopper.begun):
                 return
@@ -298,13 +301,13 @@ class Servo:
             self._stopper.begin()
 
     def _lets_go(self) -> bool:
-        """Whether the servo's motor is off: by a shutdown, or because somebody has switched torque off."""
+        """Return whether the servo's motor is off: by a shutdown, or because torque was switched off elsewhere."""
         return self._linked.torque_off or bool(self.latest.hardware_error & self._report.shutdown)
 
-    def _seen_at_rest(self, since_s: float, timeout_s: float) -> bool:
-        def at_rest() -> bool:
+    def _await_rest(self, since_s: float, timeout_s: float) -> bool:
+        def is_at_rest() -> bool:
             return stands([state for state in list(self._states) if state.time_s > since_s])
 
         with self._changed:
-            self._clock.wait_for(self._changed, at_rest, timeout_s)
-            return at_rest()
+            self._clock.wait_for(self._changed, is_at_rest, timeout_s)
+            return is_at_rest()

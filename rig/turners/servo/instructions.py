@@ -1,8 +1,8 @@
-"""What the servo is told, each a few writes on its line: to make ready, to go, to brake, to be left alone."""
+"""The instructions to the servo, each a few writes: prepare, move, brake, disarm."""
 
 from rig.errors import Problem, Refused
 from rig.turners.servo.bus import Bus
-from rig.turners.servo.moves import Move
+from rig.turners.servo.moves import ProfileMove
 from rig.turners.servo.registers import (
     DRIVE_MODE,
     EXTENDED_POSITION,
@@ -20,35 +20,35 @@ BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
 
 
 def make_ready(bus: Bus, watchdog: int) -> None:
-    """Have the servo hold its shaft where it is, watched by its watchdog. Raises Refused by name, BusError.
+    """Have the servo hold its shaft at its position, with its watchdog armed. Raise Refused by name, BusError.
 
-    `watchdog` is in the register's units. Operating mode and drive mode lie in the EEPROM and are written when they are
-    others; writing the mode sets the profile to zero, which is as fast as it can, so the profile comes after it and the
-    goal after the profile, both before the torque.
+    `watchdog` is in the register's units. Operating mode and drive mode lie in the EEPROM and are written only if they
+    differ. Writing the mode sets the profile to zero, the fastest motion; so the profile comes after it and the goal
+    after the profile, both before the torque.
     """
     for register, wanted in ((DRIVE_MODE, TIME_BASED), (OPERATING_MODE, EXTENDED_POSITION)):
         if bus.look_up(register) != (wanted,):
             bus.write(register, wanted)
             _read_back(bus, register, wanted)
-    bus.write(WATCHDOG, 0)  # also clears a stop of before, in which goals are refused
+    bus.write(WATCHDOG, 0)  # also clears an earlier stop, in which goals are refused
     _stay(bus)
     bus.write(TORQUE, 1)
     bus.write(WATCHDOG, watchdog)
-    if (found := bus.look_up(WATCHDOG)) != (watchdog,):
+    if (readback := bus.look_up(WATCHDOG)) != (watchdog,):
         raise Refused.of(
             Problem(
                 "servo_watchdog_not_armed",
-                f"the servo's watchdog was set to {watchdog} and reads {found[0]}",
+                f"the servo's watchdog was set to {watchdog} and reads {readback[0]}",
                 "Switch the servo off and on; update its firmware if it stays",
             )
         )
 
 
-def go(bus: Bus, move: Move) -> None:
-    """Begin a move. Raises Refused `servo_setting_not_kept`, BusError.
+def go(bus: Bus, move: ProfileMove) -> None:
+    """Begin a move. Raise Refused `servo_setting_not_kept`, BusError.
 
     The profile is written and read back before every goal: after a stop of the watchdog it is zero, and a goal would be
-    a jump. The goal is absolute, so that a second one, after a lost reply, asks for nothing more.
+    a jump. The goal is absolute, so that repeating it after a lost reply has no effect.
     """
     bus.write(PROFILE, move.ramp_ms, move.total_ms)
     _read_back(bus, PROFILE, move.ramp_ms, move.total_ms)
@@ -56,12 +56,12 @@ def go(bus: Bus, move: Move) -> None:
 
 
 def brake(bus: Bus) -> None:
-    """Stop where the shaft is, with a short ramp, and hold it there. Raises BusError."""
+    """Stop at the present position with a short ramp, and hold it. Raise BusError."""
     _stay(bus)
 
 
 def disarm(bus: Bus) -> None:
-    """Let the servo hold its shaft without anybody speaking to it. Raises BusError."""
+    """Let the servo hold its shaft without supervision by its watchdog. Raise BusError."""
     bus.write(WATCHDOG, 0)
 
 
@@ -71,16 +71,16 @@ def _stay(bus: Bus) -> None:
 
 
 def _read_back(bus: Bus, register: Register, *wanted: int) -> None:
-    found = bus.look_up(register)
-    if found != wanted:
+    readback = bus.look_up(register)
+    if readback != wanted:
         raise Refused.of(
             Problem(
                 "servo_setting_not_kept",
-                f"{register.name} of the servo was set to {_listed(wanted)} and reads {_listed(found)}",
+                f"{register.name} of the servo was set to {_join(wanted)} and reads {_join(readback)}",
                 "End other programs that use the servo; switch it off and on, then start again",
             )
         )
 
 
-def _listed(values: tuple[int, ...]) -> str:
+def _join(values: tuple[int, ...]) -> str:
     return ", ".join(map(str, values))

@@ -13,13 +13,13 @@ from rig.motion.preflight import step_problems
 from rig.motion.state import Made
 from rig.motion.steps import Plan
 from rig.turners.kind import OnState, TurnerKind, Words
-from rig.turners.servo.models import MAKER, named
+from rig.turners.servo.models import MAKER, find_model
 from rig.turners.servo.moves import move_problems
 from rig.turners.servo.preflight import servo_problems
 from rig.turners.servo.state import SERVO_FIELDS, ServoReport
 from rig.turners.turner import Turner
 
-# The shaft is z of its own frame and of the housing's, and where it is screwed on both have one origin.
+# The shaft is the z axis of its own frame and of the housing's; both have their origin at the mounting face.
 SHAFT = DenavitHartenberg(theta_rad=(0.0,), a_m=(0.0,), d_m=(0.0,), alpha_rad=(0.0,))
 # One reading of its encoder: steps of 0.088° and a noise of 0.06° (AS5045, data sheet: "transition noise").
 READING_STD_RAD = radians(0.065)
@@ -60,42 +60,42 @@ def _stance(report: ServoReport) -> str:
 
 def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport | None) -> list[Problem]:
     problems = list(dict.fromkeys(problem for plan in plans for problem in step_problems(plan)))
-    motions = [motion for plan in plans for motion in plan.motions]  # of which one of each kind is told
+    motions = [motion for plan in plans for motion in plan.motions]  # one problem of each kind is reported
     if report is None:
-        return [*problems, *move_problems(motions, named(section.model).no_load_rad_s)]
+        return [*problems, *move_problems(motions, find_model(section.model).no_load_rad_s)]
     return [
         *problems,
-        *servo_problems(report, section.model, _carried(section), 1 / section.state_rate_hz),
+        *servo_problems(report, section.model, _read_payload(section), 1 / section.state_rate_hz),
         *move_problems(motions, min(report.velocity_limit_rad_s, report.servo.no_load_rad_s)),
-        *_wound(plans, report),
+        *_wind_up_problems(plans, report),
     ]
 
 
-def _wound(plans: Sequence[Plan], report: ServoReport) -> list[Problem]:
-    """A shaft that has been turned by more than a turn from home: the cable may be, and goes back with it."""
+def _wind_up_problems(plans: Sequence[Plan], report: ServoReport) -> list[Problem]:
+    """Return a problem if the shaft is more than a revolution from home: the cable may be wound up with it."""
     (angle_rad,) = report.state.q_rad
-    away_rad = max((abs(angle_rad - plan.home_q_rad[0]) for plan in plans), default=0.0)
-    if away_rad <= FARTHEST_RAD:
+    distance_rad = max((abs(angle_rad - plan.home_q_rad[0]) for plan in plans), default=0.0)
+    if distance_rad <= FARTHEST_RAD:
         return []
     return [
         Problem(
             "servo_wound_up",
-            f"the servo counts {degrees(angle_rad):.0f}°, which is {away_rad / FARTHEST_RAD:.1f} turns from home",
+            f"the servo counts {degrees(angle_rad):.0f}°, which is {distance_rad / FARTHEST_RAD:.1f} turns from home",
             "Unwind the cable by hand, with the supply off, and switch it on: the servo forgets its turns then",
         )
     ]
 
 
-def _meant(section: ServoSection) -> Made:
-    return Made(MAKER, named(section.model).title, SHAFT, reading_std_rad=READING_STD_RAD)
+def _make_nominal(section: ServoSection) -> Made:
+    return Made(MAKER, find_model(section.model).title, SHAFT, reading_std_rad=READING_STD_RAD)
 
 
-def _made(section: ServoSection, report: ServoReport) -> Made:
+def _make_recorded(section: ServoSection, report: ServoReport) -> Made:
     return Made(MAKER, report.model, SHAFT, reading_std_rad=READING_STD_RAD)
 
 
-def _carried(section: ServoSection) -> Carried:
-    x, y, z = (each / 1000 for each in section.payload_centre_mm)
+def _read_payload(section: ServoSection) -> Carried:
+    x, y, z = (coordinate_mm / 1000 for coordinate_mm in section.payload_centre_mm)
     return Carried(section.payload_kg, (x, y, z))
 
 
@@ -106,9 +106,9 @@ SERVO = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
-    meant=_meant,
-    made=_made,
-    carried=_carried,
+    meant=_make_nominal,
+    made=_make_recorded,
+    carried=_read_payload,
     words=Words(
         name="servo",
         short="servo",

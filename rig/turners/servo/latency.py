@@ -1,8 +1,8 @@
-"""The latency timer of FTDI converters, which keep what has come for 16 ms unless they are told otherwise.
+"""The latency timer of FTDI converters, which hold received bytes for 16 ms by default.
 
-Adapters for these servos (U2D2 and its like) have such a chip. Linux shows its timer in
-/sys/bus/usb-serial/devices/ttyUSB*/latency_timer; asked for low latency (TIOCSSERIAL, which pyserial does and needs no
-rights) the driver sets it to 1 ms. Other ports have no such file and nothing to set.
+Adapters for these servos (U2D2 and similar) have such a chip. Linux shows its timer in
+/sys/bus/usb-serial/devices/ttyUSB*/latency_timer; a request for low latency (TIOCSSERIAL, by pyserial, without special
+rights) sets it to 1 ms. Other ports have no such file and nothing to set.
 """
 
 from contextlib import suppress
@@ -19,19 +19,19 @@ BEARABLE_MS = 2
 
 
 def lower_latency(port: "serial.Serial", path: str, devices: Path = DEVICES) -> None:
-    """Have what comes handed on at once. Raises Refused `servo_adapter_slow` where the timer stays long."""
+    """Have received bytes handed on at once. Raise Refused `servo_adapter_slow` if the timer stays long."""
     timer = devices / Path(path).resolve().name / "latency_timer"
     with suppress(ValueError, OSError, AttributeError, NotImplementedError):  # a port that has no such thing
         port.set_low_latency_mode(True)
-    found_ms = _read_ms(timer)
-    if found_ms is not None and found_ms > BEARABLE_MS:
+    timer_ms = _read_ms(timer)
+    if timer_ms is not None and timer_ms > BEARABLE_MS:
         with suppress(OSError):
             timer.write_text("1")
-        found_ms = _read_ms(timer)
-    if found_ms is not None and found_ms > BEARABLE_MS:
+        timer_ms = _read_ms(timer)
+    if timer_ms is not None and timer_ms > BEARABLE_MS:
         raise Refused(
             "servo_adapter_slow",
-            f"the adapter at {path} passes data on only every {found_ms} ms, and that cannot be changed",
+            f"the adapter at {path} passes data on only every {timer_ms} ms, and that cannot be changed",
             f"Write 1 into {timer} as root, or add a udev rule: "
             'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"',
         )

@@ -1,4 +1,4 @@
-"""The thread that has the servo's line: it polls states, does what it is asked between two, and notices faults."""
+"""The thread that owns the servo's line: it polls states, runs jobs between two polls, and detects faults."""
 
 import threading
 import time
@@ -9,28 +9,28 @@ from typing import Any
 from rig.data.processes import silence
 from rig.errors import Problem
 from rig.turners.servo import problems
-from rig.turners.servo.bus import Bus, BusError, Denied, Lost, PortGone
+from rig.turners.servo.bus import Bus, BusError, InstructionDenied, PortGone, ReplyLost
 from rig.turners.servo.models import TICKS, ServoModel
 from rig.turners.servo.preflight import hardware_problem
 from rig.turners.servo.registers import HARDWARE_ERROR, STATE, TORQUE, TRIPPED, WATCHDOG
 from rig.turners.servo.state import ServoState, decode
 
-LOST_MOST, SILENCE_S = 5, 0.4  # so many states in a row may be lost, and so long none may come
-LOOK_S = 0.1  # between two looks at what the block of states does not hold: torque and watchdog, by turns
-HELD_UP_S = 0.05  # a transaction that took longer says nothing about when the position was measured
-TICK_S, TICK_SHARE = 0.005, 0.02  # the servo's clock agrees with ours to this, or the reply is a late one
-UNLIKE_MOST = 4  # … and after so many in a row it is the servo's clock that began anew
-JOB_S = 5.0  # somebody who asks for something waits so long
+LOST_MOST, SILENCE_S = 5, 0.4  # tolerated: states lost in a row, and time without a state
+LOOK_S = 0.1  # period of reading what the block of states lacks: torque and watchdog, alternately
+HELD_UP_S = 0.05  # a longer transaction leaves the time of the position unknown
+TICK_S, TICK_FRACTION = 0.005, 0.02  # agreement of the servo's clock with ours; else the reply is late
+UNLIKE_MOST = 4  # after more such replies in a row the servo's clock has restarted
+JOB_S = 5.0  # a caller's longest wait for a job
 
 Job = Callable[[Bus], Any]
 
 
-class Stopped(BusError):
-    """An instruction that is not sent any more."""
+class JobCancelled(BusError):
+    """An instruction that is no longer sent, after a stop."""
 
 
-class Link:
-    """Polls `bus` every `period_s`. `on_state` and `on_problem` run on its thread; after a problem it goes on."""
+class ServoLink:
+    """A poller of `bus` every `period_s`. `on_state` and `on_problem` run on its thread; after a problem it goes on."""
 
     def __init__(
         self,
@@ -55,14 +55,14 @@ class Link:
         self._stopping = False
         self.torque_off = False  # and not by the rig
         self.supervising = False  # torque is on and the watchdog armed: anything else is a problem
-        self.turned_s = self._clock.now_s()  # when the thread last came round
+        self.turned_s = self._clock.now_s()  # time of the last loop
 
     def start(self) -> None:
         """Begin to poll."""
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread, unless the system holds it up; the bus stays open."""
+        """End the thread, unless the system delays it; the bus stays open."""
         self._closing.set()
         self._woken.set()
         if self._thread.ident is not None:
@@ -70,23 +70,23 @@ class Link:
 
     @property
     def alive(self) -> bool:
-        """Whether it still polls."""
+        """Whether the thread still polls."""
         return self._thread.is_alive()
 
     def stop(self, work: Callable[[Bus], None]) -> None:
-        """Have a stop done before anything else; what was asked for and has not begun is not done any more."""
+        """Run a stop before anything else, and cancel jobs that have not begun."""
         self._stopping = True
         self._jobs.appendleft(lambda: work(self._bus))
         self._woken.set()
 
     def keep_quiet(self, duration_s: float) -> None:
-        """Send nothing for so long, so that the servo's watchdog stops it."""
+        """Send nothing for `duration_s`, so that the servo's watchdog stops it."""
         self._quiet_until_s = self._clock.now_s() + duration_s
 
     def call(self, job: Job, *, also_stopped: bool = False) -> Any:
-        """Have something done between two states; what it returns, or raises.
+        """Run a job between two polls; return its value or raise its error.
 
-        Raises PortGone when nobody does it, and Stopped after a stop, unless it is to be done `also_stopped`.
+        Raise PortGone if the thread does not run it, and Stopped after a stop unless `also_stopped`.
         """
         done = threading.Event()
         outcome: dict[str, Any] = {}
@@ -94,7 +94,7 @@ class Link:
         def carry_out() -> None:
             try:
                 if self._stopping and not also_stopped:
-                    raise Stopped("a stop came first")
+                    raise JobCancelled("a stop came first")
                 outcome["value"] = job(self._bus)
             except Exception as error:
                 outcome["error"] = error
@@ -139,8 +139,8 @@ class Link:
             if self._bus.alert or self._error_bits:
                 self.torque_off = True
                 (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
-        except (Lost, Denied) as error:
-            self._count_lost(damaged=not isinstance(error, Lost) or error.damaged)
+        except (ReplyLost, InstructionDenied) as error:
+            self._count_lost(damaged=not isinstance(error, ReplyLost) or error.damaged)
             return
         except PortGone as error:
             self._fail(problems.port_lost(error))
@@ -155,7 +155,7 @@ class Link:
             self._fail(hardware_problem(self._error_bits))
 
     def _fresh(self, state: ServoState) -> bool:
-        """Whether the reply is of now, by the servo's own clock."""
+        """Return whether a reply is current, by the servo's own clock."""
         before = self._latest
         if state.took_s > HELD_UP_S:
             return False
@@ -165,7 +165,7 @@ class Link:
         counted_s = 1e-3 * ((state.tick - before.tick) % TICKS)
         wrap_s = 1e-3 * TICKS
         unlike_s = abs((counted_s - since_s + wrap_s / 2) % wrap_s - wrap_s / 2)
-        if unlike_s < TICK_S + TICK_SHARE * since_s + state.took_s + before.took_s:
+        if unlike_s < TICK_S + TICK_FRACTION * since_s + state.took_s + before.took_s:
             self._unlike = 0
             return True
         self._unlike += 1
@@ -173,12 +173,12 @@ class Link:
         if self._unlike > UNLIKE_MOST:
             self._unlike = 0
             if self.supervising:
-                self._fail(problems.restarted())
+                self._fail(problems.servo_restarted())
             return True
         return False
 
     def _look(self) -> None:
-        """Look at what the block does not hold."""
+        """Check torque and watchdog, which the block of states lacks."""
         if not self.supervising:
             return
         self._looks += 1
@@ -188,15 +188,15 @@ class Link:
             if register is TORQUE and not value:  # mostly a shutdown, whose reason may not have been read yet
                 self.torque_off = True
                 (self._error_bits,) = self._bus.read(HARDWARE_ERROR)
-        except (Lost, Denied):
-            return  # the states count what is lost
+        except (ReplyLost, InstructionDenied):
+            return  # `_poll` counts lost replies
         except PortGone as error:
             self._fail(problems.port_lost(error))
             return
         if register is TORQUE and not value:
             self._fail(hardware_problem(self._error_bits) if self._error_bits else problems.torque_lost())
         elif register is WATCHDOG and value == TRIPPED:
-            self._fail(problems.tripped())
+            self._fail(problems.watchdog_tripped())
 
     def _count_lost(self, damaged: bool) -> None:
         self._lost += 1

@@ -1,9 +1,9 @@
-"""The first look at a servo: who answers, and how it is set up. Nothing moves, and nothing outlasts its supply."""
+"""The first contact with a servo: identity and settings. Nothing moves, and no change outlasts its supply."""
 
 import time
 
 from rig.errors import Refused
-from rig.turners.servo.bus import Bus, BusError, Lost
+from rig.turners.servo.bus import Bus, BusError, ReplyLost
 from rig.turners.servo.models import SPEED_RAD_S, model_of
 from rig.turners.servo.registers import (
     DRIVE_MODE,
@@ -28,14 +28,14 @@ from rig.turners.servo.state import ServoReport, decode
 PINGS = 4
 LISTEN_S = 0.012  # after each ping, for another's answer
 ROUND_TRIPS = 15
-ANSWER_ALL = 2  # of Status Return Level: every write is acknowledged
+ANSWER_ALL = 2  # value of Status Return Level: every write is acknowledged
 
 
 def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """What the servo says about itself. Raises Refused `no_servo`, `servo_not_alone`, `other_servo`."""
+    """Return the servo's report of itself. Raise Refused `no_servo`, `servo_not_alone`, `other_servo`."""
     try:
         _ping(bus, port, servo_id)
-        _have_all_answered(bus)
+        _request_acknowledgements(bus)
         return _report(bus, port, servo_id)
     except BusError as error:
         raise Refused(
@@ -46,14 +46,14 @@ def look_at(bus: Bus, port: str, servo_id: int) -> ServoReport:
 
 
 def _ping(bus: Bus, port: str, servo_id: int) -> None:
-    """See that a ping brings one answer and no more; one odd answer in four may be a late one."""
-    found = odd = 0
+    """Confirm that a ping brings exactly one answer; one odd answer in four may be a late one."""
+    answers = odd = 0
     for _ in range(PINGS):
         try:
             bus.ping()
-            found += 1
+            answers += 1
             odd += bus.more_came(LISTEN_S)
-        except Lost as lost:
+        except ReplyLost as lost:
             odd += lost.damaged
             bus.settle()
     if odd > 1:
@@ -62,7 +62,7 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
             f"a ping of ID {servo_id} at {port} has more than one answer",
             "Give every servo on the line an ID of its own, or unplug the others",
         )
-    if found == 0:
+    if answers == 0:
         raise Refused(
             "no_servo",
             f"no servo with ID {servo_id} answers at {port}",
@@ -70,11 +70,11 @@ def _ping(bus: Bus, port: str, servo_id: int) -> None:
         )
 
 
-def _have_all_answered(bus: Bus) -> None:
-    """Have writes acknowledged (a setting of the RAM): else nobody knows whether a goal has arrived."""
+def _request_acknowledgements(bus: Bus) -> None:
+    """Have writes acknowledged (a setting in RAM): without it the arrival of a goal is unconfirmed."""
     try:
         (level,) = bus.read(RETURN_LEVEL)
-    except Lost:
+    except ReplyLost:
         bus.settle()
         level = 0
     if level != ANSWER_ALL:
@@ -100,11 +100,11 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
         try:
             data = bus.read_bytes(STATE)
             states.append(decode(data, model, (began_s, bus.clock.reference_s()), time.monotonic(), hardware_error))
-        except Lost:
+        except ReplyLost:
             bus.settle()
         round_trips.append(bus.clock.reference_s() - began_s)
     if not states:
-        raise Lost(damaged=True)
+        raise ReplyLost(damaged=True)
     return ServoReport(
         port=port,
         servo_id=servo_id,
@@ -120,6 +120,6 @@ def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
         startup=bus.look_up(STARTUP)[0] if firmware >= STARTUP_FIRMWARE else None,
         shutdown=bus.look_up(SHUTDOWN)[0],
         torque_on=bool(bus.look_up(TORQUE)[0]),
-        round_trip_s=sorted(round_trips)[1],  # the line's: this computer may be busy in the others
+        round_trip_s=sorted(round_trips)[1],  # near the least: the others include delays of this computer
         state=states[-1],
     )

@@ -1,4 +1,4 @@
-"""The servos this driver knows, a row each, and the units of their registers.
+"""The supported servos, a row each, and the units of their registers.
 
 Source: ROBOTIS e-Manual, pages of the models: "Specifications" (stall torque, no-load speed, both at 12 V) and "Control
 Table" (numbers, units).
@@ -8,23 +8,22 @@ import math
 from dataclasses import dataclass
 
 MAKER = "ROBOTIS"
-PULSES = 4096  # a turn; 12 bits, 0.088°
+PULSES = 4096  # per revolution; 12 bits, 0.088°
 PULSE_RAD = 2 * math.pi / PULSES
-FARTHEST = 1_048_575  # pulses either way in extended position mode: 256 turns
+FARTHEST = 1_048_575  # pulses in either direction in extended position mode: 256 revolutions
 SPEED_RAD_S = 0.229 * 2 * math.pi / 60  # Present Velocity, Velocity Limit: 0.229 rev/min
 LONGEST_MS = 32_737  # of a time-based profile
 TICKS = 32_768  # Realtime Tick counts milliseconds and begins anew
 
-# A servo that is to carry what it turns smoothly may be asked for a fifth of what stalls it: the maker's performance
+# Smooth motion allows a fifth of the stall torque: the maker's performance
 # graphs are measured with a rising load and end there ("note on performance graph").
-LOAD_SHARE = 0.2
+LOAD_FRACTION = 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """One model: its name in a configuration, its model number, what stalls it at 12 V, and how it tells its load.
-
-    `load_unit`: one count of register 126, in A where the servo senses its current, else as a share of full load.
+    """One model: configuration name, model number, stall torque at 12 V, no-load speed, and quantity of its load
+    register.
     """
 
     name: str
@@ -35,12 +34,12 @@ class ServoModel:
 
     @property
     def title(self) -> str:
-        """The name in the maker's writing."""
+        """The name in the maker's spelling."""
         return self.name.upper().replace("_", "-")
 
     @property
     def load_unit(self) -> float:
-        """One count of register 126."""
+        """The unit of register 126: A if the servo senses its current, else a fraction of full load."""
         return 2.69e-3 if self.senses_current else 1e-3
 
 
@@ -52,10 +51,10 @@ MODELS = (
 
 
 def model_of(number: int) -> ServoModel | None:
-    """The model with that number in its register 0."""
+    """Return the model with that number in its register 0, or None."""
     return next((model for model in MODELS if model.number == number), None)
 
 
-def named(name: str) -> ServoModel:
-    """The model of that name. Raises StopIteration where there is none."""
+def find_model(name: str) -> ServoModel:
+    """Return the model of that name. Raise StopIteration if there is none."""
     return next(model for model in MODELS if model.name == name)

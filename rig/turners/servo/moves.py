@@ -1,8 +1,7 @@
-"""A movement as the servo is told of it: a goal in pulses, and a profile in milliseconds. Pure.
+"""Movements in the servo's terms: a goal in pulses, and a profile in milliseconds. Pure.
 
-Only the time-based profile is used (firmware 42 and later). The velocity-based one knows speeds in steps of 1.37° a
-second and accelerations in steps of 21° a second²: a sweep of 60° a second could not be asked for. A time of the whole
-move in milliseconds asks for the same sweep to 2e-4.
+Only the time-based profile is used (firmware 42 and later). The velocity-based one has steps of 1.37 °/s and of 21
+°/s², too coarse for a sweep at 60 °/s. The duration of the whole move in milliseconds sets its speed to 2e-4.
 """
 
 from collections.abc import Iterable
@@ -12,33 +11,33 @@ from rig.errors import Problem
 from rig.motion.steps import Motion
 from rig.turners.servo.models import FARTHEST, LONGEST_MS, PULSE_RAD
 
-SHORTEST_MS = 20  # of a profile: a few of the servo's control steps; 0 would be as fast as it can
+SHORTEST_MS = 20  # shortest profile: a few of the servo's control steps; 0 would mean the fastest motion
 
 
-class Move(NamedTuple):
-    """A goal, and the times of the whole move and of each of its ramps."""
+class ProfileMove(NamedTuple):
+    """A goal in pulses, and the durations of the whole move and of each ramp."""
 
     goal: int
     total_ms: int
     ramp_ms: int
 
 
-def move_of(motion: Motion) -> Move:
-    """The nearest that the servo can be asked for: ramps by acceleration, both ramps within the whole time."""
+def move_of(motion: Motion) -> ProfileMove:
+    """Return the servo's nearest equivalent of a motion: ramps by acceleration, both within the total duration."""
     total_ms = max(SHORTEST_MS, round(1000 * motion.duration_s))
     ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
-    return Move(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
+    return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)
 
 
-def cruise_rad_s(from_rad: float, move: Move) -> float:
-    """The speed between the ramps, rad/s: the way of a trapezoid by its times."""
-    way_rad = abs(move.goal * PULSE_RAD - from_rad)
-    return way_rad / (1e-3 * (move.total_ms - move.ramp_ms))
+def cruise_rad_s(from_rad: float, move: ProfileMove) -> float:
+    """Return the speed between the ramps, rad/s, of the trapezoidal profile from `from_rad`."""
+    distance_rad = abs(move.goal * PULSE_RAD - from_rad)
+    return distance_rad / (1e-3 * (move.total_ms - move.ramp_ms))
 
 
 def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> list[Problem]:
-    """What of these movements the servo cannot do; one of each kind."""
-    found: dict[str, Problem] = {}
+    """Return the problems of motions that exceed the servo's limits, one of each kind."""
+    problems: dict[str, Problem] = {}
     for motion in motions:
         move = move_of(motion)
         speed_rad_s = cruise_rad_s(motion.start_q_rad[0], move)
@@ -64,5 +63,5 @@ def move_problems(motions: Iterable[Motion], velocity_limit_rad_s: float) -> lis
             )
         else:
             continue
-        found.setdefault(problem.name, problem)
-    return list(found.values())
+        problems.setdefault(problem.name, problem)
+    return list(problems.values())

@@ -1,10 +1,9 @@
-"""The serial port under the maker's packet handler, with the maker's own names for what a port does.
+"""The serial port under the maker's packet handler, with the method names that the handler calls.
 
-The handler builds and reads the packets; which port it works on is its user's choice. The maker's own `PortHandler`
-waits in a loop that takes a whole processor, measures its time-outs by the wall clock, which may be set meanwhile, has
-one time-out for every adapter, shares the port with whoever opens it next, and is busy for ever after an exception.
-Here the system waits, the clock is monotonic, the time-out is the line's, the port is locked, and a port that has
-failed is never used again.
+The handler builds and reads the packets; the caller chooses the port. The maker's own `PortHandler` polls with a full
+processor core, measures its time-outs by the wall clock, which may be set meanwhile, has one time-out for every
+adapter, shares the port with other programs, and stays busy after an exception. Here the system waits, the clock is
+monotonic, the time-out is the line's, the port is locked, and a failed port is never used again.
 """
 
 from collections.abc import Sequence
@@ -14,17 +13,17 @@ import serial
 
 from rig.turners.servo.clock import Clock
 
-WAIT_S = 0.002  # a read waits so long at most for the bytes it asks for; then the time-out is looked at
-WRITE_S = 1.0  # a write that takes longer has nobody at its far end; pyserial counts what holds this program up, too
-BITS = 10  # of a byte on the line: start, eight, stop
+WAIT_S = 0.002  # longest wait of a read for its bytes; then the time-out is checked
+WRITE_S = 1.0  # a longer write has no receiver; pyserial's count includes delays of this program
+BITS = 10  # per byte on the line: start, eight, stop
 
 
 class Port:
-    """The port at a path or at socket://host:port. Raises `serial.SerialException` where it cannot be had.
+    """The port at a path or at socket://host:port. Raises `serial.SerialException` if it cannot be opened.
 
-    That at a path is locked for this process; at the other end of a socket whoever listens takes one at a time.
-    The lock is seen by programs that ask for one. TIOCEXCL would be seen by all, but it outlasts a program that is
-    killed wherever something else holds the port open. `slack_s`: how much later than its bytes need a reply may come.
+    A path is locked for this process, against programs that ask for a lock; the server behind a socket takes one client
+    at a time. TIOCEXCL would bind all programs, but outlasts a killed program while another holds the port open.
+    `slack_s`: the delay of a reply beyond the time of its bytes.
     """
 
     def __init__(self, path: str, baud: int, slack_s: float, clock: Clock) -> None:
@@ -35,8 +34,8 @@ class Port:
         self._deadline_s = 0.0
 
     def close(self) -> None:
-        """Give the port back; one that is gone already is no problem."""
-        sock = getattr(self.serial, "_socket", None)  # which pyserial leaves open where the far end has closed it first
+        """Close the port; one that is gone already is no problem."""
+        sock = getattr(self.serial, "_socket", None)  # pyserial leaves it open if the far end has closed it first
         with suppress(OSError):
             self.serial.close()
         if sock is not None:
@@ -44,35 +43,35 @@ class Port:
 
     @property
     def byte_s(self) -> float:
-        """How long a byte takes."""
+        """The duration of a byte, s."""
         return BITS / self._baud
 
-    # What the packet handler calls ------------------------------------------------------------------------------
+    # Called by the packet handler ------------------------------------------------------------------------------
     def getBaudRate(self) -> int:  # noqa: N802
-        """The baud rate."""
+        """Return the baud rate."""
         return self._baud
 
     def clearPort(self) -> None:  # noqa: N802
-        """Forget what has come."""
+        """Discard received bytes."""
         self.serial.reset_input_buffer()
 
     def writePort(self, packet: Sequence[int]) -> int:  # noqa: N802
-        """Send a packet; the number of bytes sent."""
+        """Send a packet; return the number of bytes sent."""
         return self.serial.write(bytes(packet)) or 0
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
-        """The next `length` bytes at most, as soon as they are there."""
+        """Return the next bytes, at most `length`, as soon as they are there."""
         data: bytes = self.serial.read(length)
         return data
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
-        """A reply of so many bytes is due from now on."""
+        """Start the time-out of a reply of `packet_length` bytes."""
         self._deadline_s = self._clock.now_s() + packet_length * self.byte_s + self._slack_s
 
     def setPacketTimeoutMillis(self, msec: float) -> None:  # noqa: N802
-        """A reply is due within `msec`."""
+        """Start a time-out of `msec`."""
         self._deadline_s = self._clock.now_s() + msec / 1000
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
-        """Whether it is late."""
+        """Return whether the reply is late."""
         return self._clock.now_s() > self._deadline_s

@@ -1,10 +1,10 @@
-"""What stands in a servo's way before anything moves, read from a report of it: pure."""
+"""Problems of a servo that its report shows before anything moves. Pure."""
 
 import math
 
 from rig.errors import Problem
 from rig.motion.carried import Carried
-from rig.turners.servo.models import LOAD_SHARE
+from rig.turners.servo.models import LOAD_FRACTION
 from rig.turners.servo.registers import (
     BY_HEAT,
     BY_LOAD,
@@ -18,11 +18,11 @@ from rig.turners.servo.registers import (
 from rig.turners.servo.state import ServoReport
 
 GRAVITY_M_S2 = 9.81
-HEADROOM_C = 10.0  # below its limit: a servo that is to hold and turn for minutes grows warmer
+HEADROOM_C = 10.0  # margin below its limit: a servo that holds and turns for minutes grows warmer
 
 
 def servo_problems(report: ServoReport, wanted_model: str, carried: Carried, period_s: float) -> list[Problem]:
-    """Every reason why this servo cannot be driven as it is; a position is wanted each `period_s`."""
+    """Return every reason why this servo cannot be driven as it is; `period_s` is the period of its states."""
     problems = [
         *_identity(report, wanted_model),
         *_settings(report),
@@ -137,10 +137,10 @@ def _condition(report: ServoReport) -> list[Problem]:
 
 
 def _load(report: ServoReport, carried: Carried) -> list[Problem]:
-    """The torque of what it carries, as if the shaft were horizontal: which way it points nobody says."""
+    """Return a problem if the payload's torque is too high, for a horizontal shaft: its true direction is unknown."""
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m
-    most_nm = LOAD_SHARE * report.servo.stall_torque_nm
+    most_nm = LOAD_FRACTION * report.servo.stall_torque_nm
     if torque_nm <= most_nm:
         return []
     return [
@@ -154,7 +154,7 @@ def _load(report: ServoReport, carried: Carried) -> list[Problem]:
 
 
 def hardware_problem(bits: int) -> Problem:
-    """A servo that reports a hardware error, by its worst bit."""
+    """Return the problem of a hardware error, by its worst bit."""
     what = f"the servo reports {error_words(bits)}"
     if bits & BY_LOAD:
         remedy = "Look for what held the shaft; hold the board, and switch the servo off and on"

@@ -1,12 +1,12 @@
-"""What goes wrong with a servo under way, as it is told: name, what, what to do."""
+"""The problems of a servo in motion, as messages: name, what, remedy."""
 
 from rig.errors import Problem
 from rig.motion.steps import Motion
-from rig.turners.servo.bus import BusError, Denied, PortGone
+from rig.turners.servo.bus import BusError, InstructionDenied, PortGone
 
 
 def port_lost(error: PortGone) -> Problem:
-    """A port that has failed."""
+    """Describe a port that has failed."""
     return Problem(
         "servo_port_lost",
         f"the servo's port has failed ({error})",
@@ -15,7 +15,7 @@ def port_lost(error: PortGone) -> Problem:
 
 
 def silent(silent_s: float, mostly_damaged: bool) -> Problem:
-    """A servo from which no usable reply has come for so long."""
+    """Describe a servo without a valid reply for `silent_s`."""
     if mostly_damaged:
         return Problem(
             "servo_replies_damaged",
@@ -29,8 +29,8 @@ def silent(silent_s: float, mostly_damaged: bool) -> Problem:
     )
 
 
-def restarted() -> Problem:
-    """A servo that was without power meanwhile."""
+def servo_restarted() -> Problem:
+    """Describe a servo that lost its supply meanwhile."""
     return Problem(
         "servo_restarted",
         "the servo's clock began anew: it was switched off, or started again, and has forgotten its goal and its turns",
@@ -39,7 +39,7 @@ def restarted() -> Problem:
 
 
 def torque_lost() -> Problem:
-    """Torque that somebody else has switched off."""
+    """Describe torque that another program has switched off."""
     return Problem(
         "servo_torque_lost",
         "the servo's torque is off, and the rig did not switch it off",
@@ -47,8 +47,8 @@ def torque_lost() -> Problem:
     )
 
 
-def tripped() -> Problem:
-    """A servo that its watchdog has stopped."""
+def watchdog_tripped() -> Problem:
+    """Describe a servo that its watchdog has stopped."""
     return Problem(
         "servo_watchdog_tripped",
         "the servo's watchdog has stopped it: no instruction came in time",
@@ -57,12 +57,12 @@ def tripped() -> Problem:
 
 
 def driver_died(error: Exception) -> Problem:
-    """A thread that has failed."""
+    """Describe a link's thread that has failed."""
     return Problem("servo_driver_died", f"the servo's driver has failed ({error!r})", "Report it, with the log")
 
 
 def driver_hung(silent_s: float) -> Problem:
-    """A thread that does not come round."""
+    """Describe a link's thread that no longer runs its loop."""
     return Problem(
         "servo_driver_hung",
         f"the thread that has the servo's line has not come round for {silent_s:.1f} s",
@@ -71,12 +71,12 @@ def driver_hung(silent_s: float) -> Problem:
 
 
 def state_not_taken(error: Exception) -> Problem:
-    """A state that whoever records them did not take."""
+    """Describe a state that could not be recorded."""
     return Problem("servo_state_not_taken", f"a state could not be passed on ({error})", "See the log")
 
 
-def unwatched(for_s: float, doing: str) -> Problem:
-    """A move that nobody has looked at for so long."""
+def move_unsupervised(for_s: float, doing: str) -> Problem:
+    """Describe a move without supervision for `for_s`."""
     return Problem(
         "servo_unwatched",
         f"nobody has looked at the servo for {for_s:.0f} s during {doing}",
@@ -85,7 +85,7 @@ def unwatched(for_s: float, doing: str) -> Problem:
 
 
 def slower_than_planned(motion: Motion, within_s: float) -> Problem:
-    """A move that has not ended in time."""
+    """Describe a move that has not ended in time."""
     return Problem(
         "servo_slower_than_planned",
         f"{motion.name} did not end within {within_s:.1f} s, planned were {motion.duration_s:.1f} s",
@@ -94,7 +94,7 @@ def slower_than_planned(motion: Motion, within_s: float) -> Problem:
 
 
 def does_not_hear(error: BusError) -> Problem:
-    """An instruction that is not acknowledged."""
+    """Describe an instruction without an acknowledgement."""
     return Problem(
         "servo_does_not_hear",
         f"the servo did not acknowledge an instruction ({error})",
@@ -102,8 +102,8 @@ def does_not_hear(error: BusError) -> Problem:
     )
 
 
-def refuses(error: Denied) -> Problem:
-    """An instruction that the servo says no to."""
+def refuses(error: InstructionDenied) -> Problem:
+    """Describe an instruction that the servo refuses."""
     return Problem(
         "servo_refuses",
         f"the servo refuses an instruction: {error}",

@@ -1,11 +1,11 @@
-"""The registers this driver uses (ROBOTIS e-Manual, "Control Table"), and what their values mean."""
+"""The registers in use (ROBOTIS e-Manual, "Control Table"), and the meaning of their values."""
 
 import struct
 from typing import NamedTuple
 
 
 class Register(NamedTuple):
-    """Where a value stands, little-endian, and as what: a format of `struct`."""
+    """An address with the `struct` format of its values, little-endian."""
 
     address: int
     form: str
@@ -13,15 +13,15 @@ class Register(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """The size in bytes."""
         return struct.calcsize(self.form)
 
     def pack(self, *values: int) -> bytes:
-        """Values as bytes."""
+        """Return values as bytes."""
         return struct.pack(self.form, *values)
 
     def unpack(self, data: bytes) -> tuple[int, ...]:
-        """Bytes as values, with their signs."""
+        """Return bytes as values, with their signs."""
         return struct.unpack(self.form, data)
 
 
@@ -48,8 +48,8 @@ POSITION = Register(132, "<i", "Present Position")
 STATE = Register(120, "<HBBhhiiiiHB", "Realtime Tick … Present Temperature")
 
 WATCHDOG_FIRMWARE, TIMED_FIRMWARE, STARTUP_FIRMWARE = 38, 42, 45  # the first with Bus Watchdog, timed profile, …
-EXTENDED_POSITION = 4  # of Operating Mode: whole turns, ±256
-TIME_BASED = 4  # of Drive Mode: bit 2 and no other, so ccw counts up and nothing but Torque Enable switches torque on
+EXTENDED_POSITION = 4  # Operating Mode: ±256 revolutions
+TIME_BASED = 4  # Drive Mode: bit 2 alone; ccw counts up, and only Torque Enable switches torque on
 NO_SECONDARY_ID = 253  # … and above
 WATCHDOG_S, WATCHDOG_MOST, TRIPPED = 0.020, 127, 255
 BY_VOLTAGE, BY_HEAT, BY_ENCODER, BY_SHOCK, BY_LOAD = 0x01, 0x04, 0x08, 0x10, 0x20  # Shutdown, Hardware Error Status
@@ -63,6 +63,6 @@ ERROR_WORDS = {
 
 
 def error_words(bits: int) -> str:
-    """Hardware Error Status in words, with its number: the manual's pages do not agree on one of the bits."""
-    found = [word for bit, word in ERROR_WORDS.items() if bits & bit] or ["unknown"]
-    return f"{', '.join(found)} (0x{bits:02x})"
+    """Return Hardware Error Status in words, with its number: the manual's pages disagree on one of the bits."""
+    words = [word for bit, word in ERROR_WORDS.items() if bits & bit] or ["unknown"]
+    return f"{', '.join(words)} (0x{bits:02x})"

@@ -1,4 +1,4 @@
-"""What a servo says about itself: one state per reply, and the report a look at it gives."""
+"""A servo's reports of itself: one state per reply, and the report for pre-flight."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -21,19 +21,22 @@ SERVO_FIELDS = (
 )
 SERVO_STATE_DTYPE = state_dtype(1, SERVO_FIELDS)
 JOINTS = ("shaft",)
-STILL_S, STILL_STATES = 0.15, 5  # so long, and in so many states, a shaft must stand to stand still
-STILL_RAD = 6.5 * PULSE_RAD  # … within this: a shaft at rest is seen to dither by ±3 pulses (forum.robotis.com 7582)
+STILL_S, STILL_STATES = 0.15, 5  # duration and number of states of a shaft at rest
+STILL_RAD = 6.5 * PULSE_RAD  # range of its angles: a shaft at rest dithers by ±3 pulses (forum.robotis.com 7582)
 
 
 @dataclass(frozen=True, slots=True)
 class ServoState:
-    """One reply of the servo.
+    """One reply of the servo. The field names are those of `SERVO_STATE_DTYPE`.
 
-    `time_s` is the reference time (`clock.Clock`) at half the transaction, `host_time_s` is `time.monotonic()` when the
-    reply was read, `took_s` how long the transaction took: the position was measured within it. `q_rad` (1,) is the
-    shaft's angle as the encoder reads it, turns counted, ccw positive, `qd_rad_s` (1,) the servo's own and coarse rate,
-    in steps of 1.4° a second. `load` is a current in A, or a share of full load (`ServoModel.load_unit`).
-    `hardware_error` is Hardware Error Status. The field names are those of `SERVO_STATE_DTYPE`.
+    - `time_s`: the reference time (`clock.Clock`) in the middle of the transaction.
+    - `host_time_s`: `time.monotonic()` when the reply was read.
+    - `q_rad` (1,): the shaft's angle by its encoder, revolutions included, ccw positive.
+    - `qd_rad_s` (1,): the servo's own coarse rate, in steps of 1.4 °/s.
+    - `took_s`: the duration of the transaction; the position was measured within it.
+    - `tick`: the servo's clock, ms.
+    - `load`: a current in A, or a fraction of full load (`ServoModel.load_unit`).
+    - `moving`, `moving_status`, `hardware_error`, `voltage_v`, `temperature_c`: the registers of these names.
     """
 
     time_s: float
@@ -50,17 +53,17 @@ class ServoState:
     temperature_c: float
 
     def to_record(self) -> Row:
-        """The values in the order of `SERVO_STATE_DTYPE`."""
+        """Return the values in the order of `SERVO_STATE_DTYPE`."""
         return _IN_ORDER(self)
 
 
-_IN_ORDER: Callable[[ServoState], Row] = attrgetter(*(each.name for each in fields(ServoState)))
+_IN_ORDER: Callable[[ServoState], Row] = attrgetter(*(field.name for field in fields(ServoState)))
 
 
 def decode(
     data: bytes, model: ServoModel, transaction_s: tuple[float, float], host_time_s: float, hardware_error: int
 ) -> ServoState:
-    """The state in a reply's 27 bytes; `transaction_s` are the times before and after."""
+    """Decode the state in a reply's 27 bytes; `transaction_s` are the times before and after."""
     began_s, ended_s = transaction_s
     tick, moving, status, _, load, velocity, position, _, _, voltage, temperature = STATE.unpack(data)
     return ServoState(
@@ -80,7 +83,9 @@ def decode(
 
 
 def stands(states: Sequence[ServoState]) -> bool:
-    """Whether the shaft stands still in the newest of `states`, which are in order; where they come rarely, in more."""
+    """Return whether the shaft stands still in the newest of `states`, in order; at a low rate, in `STILL_STATES` of
+    them.
+    """
     if len(states) < STILL_STATES:
         return False
     newest = states[-1]
@@ -93,9 +98,10 @@ def stands(states: Sequence[ServoState]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """What a look at the servo shows, for pre-flight; None where its firmware has no such register. A `Report`.
+    """The servo's settings and state for pre-flight, a `Report`; `startup` is None if its firmware has no such
+    register.
 
-    `round_trip_s` is how long a state takes on the line.
+    `round_trip_s` is the duration of reading a state.
     """
 
     port: str
@@ -122,7 +128,7 @@ class ServoReport:
 
     @property
     def serial_number(self) -> str:
-        """What stands for one: such a servo has none that it could tell."""
+        """A substitute for the serial number, which these servos do not have."""
         return f"with ID {self.servo_id}"
 
     @property
@@ -132,12 +138,12 @@ class ServoReport:
 
     @property
     def model(self) -> str | None:
-        """The model, in the maker's writing."""
+        """The model, in the maker's spelling."""
         return self.servo.title
 
     @property
     def kinematics(self) -> DenavitHartenberg | None:
-        """No geometry: a servo tells none."""
+        """The geometry: None, which a servo does not report."""
         return None
 
     @property
@@ -147,5 +153,5 @@ class ServoReport:
 
     @property
     def words(self) -> str:
-        """The servo as a line of text names it."""
+        """The servo in a line of text."""
         return f"{MAKER} {self.servo.title}, ID {self.servo_id}, firmware {self.firmware}"

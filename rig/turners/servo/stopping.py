@@ -1,10 +1,10 @@
-"""Stopping the shaft for good.
+"""The stop of the shaft.
 
 1. Goal Position becomes Present Position, with a short profile: the shaft brakes and is held. Torque stays on: without
-   it an unbalanced board would fall, and no gear of these servos locks.
-2. Where that is not acknowledged, a last word sets its watchdog to the shortest time there is, and nobody speaks to
-   the servo any more: so it stops at once if it hears, and by the time it was given before if not.
-3. A *state* newer than the stop tells whether the shaft stands.
+   it an unbalanced board would fall, and these servos' gears do not lock.
+2. Without an acknowledgement, a last write sets its watchdog to the shortest time, and the line falls silent: the servo
+   stops at once if it receives the write, else after its armed watchdog time.
+3. A *state* newer than the stop confirms that the shaft stands.
 
 None of this is a safety function. Only the switch of the servo's supply is sure.
 """
@@ -13,66 +13,66 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.turners.servo.bus import Bus, BusError, Denied
+from rig.turners.servo.bus import Bus, BusError, InstructionDenied
 from rig.turners.servo.clock import Clock
 from rig.turners.servo.instructions import brake
-from rig.turners.servo.link import Link
+from rig.turners.servo.link import ServoLink
 from rig.turners.servo.registers import TRIPPED, WATCHDOG
 from rig.turners.stop_once import StopOutcome
 
 STOP_S = 0.95  # a stop is confirmed within this, or not at all
-TOLD_S = 0.25  # the servo has so long to acknowledge
+ACKNOWLEDGE_S = 0.25  # the longest wait for an acknowledgement
 SURE = "only the switch of its supply is sure"
 
 
-class Stop:
-    """How the shaft is stopped.
+class ShaftStop:
+    """The stop of a shaft by its link.
 
-    `seen_at_rest(since_s, timeout_s)` waits for states newer than `since_s` (reference time) that show the shaft at
-    rest; `lets_go()` tells whether the servo has switched its motor off.
+    `await_rest(since_s, timeout_s)` waits for states newer than `since_s` (reference time) and returns whether they
+    show rest; `lets_go()` returns whether the servo has switched its motor off.
     """
 
     def __init__(
         self,
-        link: Link,
+        link: ServoLink,
         clock: Clock,
         watchdog_s: float,
-        seen_at_rest: Callable[[float, float], bool],
+        await_rest: Callable[[float, float], bool],
         lets_go: Callable[[], bool],
     ) -> None:
         self._link, self._clock, self._watchdog_s = link, clock, watchdog_s
-        self._seen_at_rest, self._lets_go = seen_at_rest, lets_go
+        self._await_rest, self._lets_go = await_rest, lets_go
 
     def carry_out(self) -> StopOutcome:
-        """Stop the shaft, and say what is known of it; less than 1 s."""
+        """Stop the shaft and return its state; less than 1 s."""
         clock = self._clock
         since_s, ends_s = clock.reference_s(), clock.now_s() + STOP_S
-        told = threading.Event()
+        acknowledged = threading.Event()
         answer, refused = "the servo did not acknowledge the stop", False
 
-        def tell(bus: Bus) -> None:
+        def send_stop(bus: Bus) -> None:
             nonlocal answer, refused
             try:
-                if not _stopped_itself(bus):
+                if not _has_tripped(bus):
                     brake(bus)
                 answer = "the servo has taken the stop"
-                told.set()
+                acknowledged.set()
             except BusError as error:
-                if isinstance(error, Denied):
+                if isinstance(error, InstructionDenied):
                     answer, refused = f"the servo refused the stop ({error})", True
                 with suppress(BusError):
                     bus.write_unheard(WATCHDOG, 1)
                 self._link.keep_quiet(2 * self._watchdog_s)
 
-        self._link.stop(tell)
-        if not clock.wait(told, TOLD_S):
+        self._link.stop(send_stop)
+        if not clock.wait(acknowledged, ACKNOWLEDGE_S):
             self._link.keep_quiet(2 * self._watchdog_s)
-        seen = self._seen_at_rest(since_s, ends_s - clock.now_s())
+        stands = self._await_rest(since_s, ends_s - clock.now_s())
         refusal = f" ({answer})" if refused else ""
-        if seen and self._lets_go():
+        if stands and self._lets_go():
             remedy = "Hold the board: nothing else may"
             return StopOutcome(True, f"the shaft stands, but its motor is off{refusal}", remedy)
-        if seen:
+        if stands:
             return StopOutcome(True, f"the shaft stands, and the servo holds it{refusal}")
         return StopOutcome(
             False,
@@ -81,6 +81,6 @@ class Stop:
         )
 
 
-def _stopped_itself(bus: Bus) -> bool:
-    """Whether the watchdog has stopped the servo, which takes no goal then."""
+def _has_tripped(bus: Bus) -> bool:
+    """Return whether the watchdog has stopped the servo, which then refuses goals."""
     return bus.read(WATCHDOG) == (TRIPPED,)

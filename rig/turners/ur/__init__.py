@@ -1,1 +1,1 @@
-"""An arm of Universal Robots: the real `ur_rtde` client in a supervised child process, pre-flight, the stop."""
+"""An arm of Universal Robots: the `ur_rtde` client in a supervised child process, pre-flight, and the stop."""

@@ -1,4 +1,4 @@
-"""What stands in the arm's way, read from one state: pure, shared by pre-flight and by the watch over a move."""
+"""Problems of an arm that one state shows. Pure, for pre-flight and for supervision of a move."""
 
 from rig.errors import Problem
 from rig.motion.carried import Carried
@@ -6,7 +6,7 @@ from rig.motion.state import ArmState, RobotMode, RuntimeState, SafetyMode
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999
-MAKERS_SIMULATOR = ("127.0.0.1", "localhost")  # where the client does not ask for remote control
+MAKERS_SIMULATOR = ("127.0.0.1", "localhost")  # hosts at which the client skips the check of remote control
 
 LIMITED_REMEDY = (
     "Widen that limit in the arm's safety settings (speed of tool, elbow or joint, momentum, power, a safety plane), "
@@ -18,7 +18,7 @@ _SWITCH_ON = "Switch the arm on and release its brakes on the pendant"
 _WAIT = (
     "Wait until the pendant shows the arm ready, which takes some minutes where firmware is updated; then switch it on"
 )
-# What a mode asks for beside switching the arm on.
+# Modes that need more than switching the arm on.
 _MODE_REMEDIES: dict[int, str] = {
     RobotMode.NO_CONTROLLER: "Look at the pendant: the controller's own software does not run. Restart the control box",
     RobotMode.DISCONNECTED: "Look at the cable between control box and arm, then restart the control box",
@@ -29,7 +29,7 @@ _MODE_REMEDIES: dict[int, str] = {
 }
 _RELEASE = "Make the cell safe, release the emergency stop, switch the arm on again, then start again"
 
-# Bits of `safety_status_bits` that mean the same as a safety mode; the bits may come one packet before the mode.
+# Bits of `safety_status_bits` equivalent to a safety mode; they may come one packet before the mode.
 _SAFETY_BITS: dict[int, int] = {
     2: SafetyMode.PROTECTIVE_STOP,
     3: SafetyMode.RECOVERY,
@@ -67,7 +67,7 @@ _SAFETY_PROBLEMS: dict[int, Problem] = {
 
 
 def readiness(state: ArmState) -> Problem | None:
-    """The first reason why the arm cannot move as planned, or None."""
+    """Return the first reason why the arm cannot move as planned, or None."""
     if safety := _safety_problem(state):
         return safety
     if state.robot_mode != RobotMode.RUNNING:
@@ -85,8 +85,8 @@ def readiness(state: ArmState) -> Problem | None:
     return None
 
 
-def switched_to_local_control(host: str, how: str) -> Problem:
-    """The pendant has taken control back while the arm was under the rig's."""
+def local_control_during_run(host: str, how: str) -> Problem:
+    """Describe a pendant that was switched to local control while the rig controls the arm."""
     return Problem(
         "switched_to_local_control",
         f"of the arm at {host} {how}, in which it takes no stop but the client's",
@@ -96,7 +96,7 @@ def switched_to_local_control(host: str, how: str) -> Problem:
 
 
 def local_control(host: str) -> Problem:
-    """The pendant has not handed control over."""
+    """Describe a pendant in local control."""
     return Problem(
         "not_in_remote_control",
         f"the arm at {host} is in local control",
@@ -105,7 +105,7 @@ def local_control(host: str) -> Problem:
 
 
 def speed_limited(state: ArmState) -> Problem:
-    """A limit of the safety settings slows the arm down, with the slider at 100 %."""
+    """Describe an arm slowed by a limit of the safety settings, with the slider at 100 %."""
     return Problem(
         "speed_limited",
         f"the controller runs its program at {100 * state.speed_scaling:.0f} % of the programmed speed, with the speed "
@@ -115,7 +115,7 @@ def speed_limited(state: ArmState) -> Problem:
 
 
 def payload_refused(carried: Carried) -> Problem:
-    """The controller has ended the program over the payload that it was given."""
+    """Describe a program that the controller has ended because of its payload."""
     return Problem(
         "payload_not_set",
         f"the controller does not take a payload of {carried.payload_kg:g} kg",
@@ -124,7 +124,7 @@ def payload_refused(carried: Carried) -> Problem:
 
 
 def program_interruption(state: ArmState) -> Problem | None:
-    """Why the control program no longer runs, or None while it does."""
+    """Return why the control program no longer runs, or None while it does."""
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
         return Problem("arm_paused", "the program was paused at the pendant", "Start the procedure again when ready")
     if state.runtime_state != RuntimeState.PLAYING:
@@ -139,14 +139,14 @@ def program_interruption(state: ArmState) -> Problem | None:
 def _safety_problem(state: ArmState) -> Problem | None:
     mode = state.safety_mode
     if mode == SafetyMode.NORMAL:
-        mode = next((named for bit, named in _SAFETY_BITS.items() if state.safety_status_bits >> bit & 1), mode)
+        mode = next((bit_mode for bit, bit_mode in _SAFETY_BITS.items() if state.safety_status_bits >> bit & 1), mode)
     if mode == SafetyMode.NORMAL:
         return None
-    unknown = Problem(
+    other_mode = Problem(
         "safety_not_normal", f"the arm's safety mode is {mode}, not NORMAL", "See the pendant's safety display"
     )
-    return _SAFETY_PROBLEMS.get(mode, unknown)
+    return _SAFETY_PROBLEMS.get(mode, other_mode)
 
 
 def _mode_name(mode: int) -> str:
-    return next((known.name for known in RobotMode if known == mode), str(mode))
+    return next((robot_mode.name for robot_mode in RobotMode if robot_mode == mode), str(mode))

@@ -1,9 +1,9 @@
-"""Watches, while the arm is under control, that the rig could still stop it without its client.
+"""The supervision, while the arm is under control, of the rig's ability to stop it without its client.
 
-Local control takes every independent stop away, and neither the states nor the client tell of it. What tells: the
-dashboard, which is asked (from 5.6 on); the Robot API of a PolyScope X (from 10.12 on); and the primary interface,
-whose connections the controller closes in that moment (the maker's client library, and issue 459 of his ROS driver). A
-controller of the CB3 series does not know local control.
+Local control disables every independent stop, and neither the states nor the client report it. Sources that do: the
+dashboard, which is polled (from 5.6 on); the Robot API of a PolyScope X (from 10.12 on); and the primary interface,
+whose connections the controller closes at that moment (the maker's client library, and issue 459 of his ROS driver). A
+controller of the CB3 series has no local control.
 """
 
 import socket
@@ -14,27 +14,27 @@ from contextlib import suppress
 from typing import Literal
 
 from rig.errors import Problem
-from rig.turners.ur.condition import switched_to_local_control
-from rig.turners.ur.controller.controller_words import ProgramException, ProgramStopped, words_in
+from rig.turners.ur.condition import local_control_during_run
+from rig.turners.ur.controller.controller_words import ProgramException, ProgramStopped, decode_message
 from rig.turners.ur.controller.dashboard import Dashboard
 from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, packages
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import is_polyscope_x
 
-ASK_S = 0.5  # the control mode is asked so often
-LOOK_S = 0.1  # the thread ends within this when it is no longer wanted
+ASK_S = 0.5  # period of polling the control mode
+LOOK_S = 0.1  # the thread ends within this after `close`
 ANSWER_S = 0.8
-GONE_S, CLOSED_S = 1.0, 0.25  # with states that go on for so long beside it, a port that is gone is gone by itself
+GONE_S, CLOSED_S = 1.0, 0.25  # states that continue this long show that the port alone is gone
 
-Remote = bool | None  # None: the controller does not tell
+Remote = bool | None  # None: unknown to the controller
 ControlMode = Remote | Literal["gone"]
 
 
 class ControlWatch:
-    """A thread that calls `on_problem` once, when the arm at `host` can no longer be stopped by its ports.
+    """A thread that calls `on_problem` once, if the arm at `host` can no longer be stopped by its ports.
 
-    `newest_s()` tells when the newest state came (monotonic time): with a link that is lost the ports are lost too,
-    and it is the link's affair to say so.
+    `newest_s()` returns the time of the newest state (monotonic time): a lost link loses the ports too, and is reported
+    as such elsewhere.
     """
 
     def __init__(
@@ -52,9 +52,9 @@ class ControlWatch:
         self._dashboard: Dashboard | None = None
         self._primary: socket.socket | None = None
         self._buffer = bytearray()
-        self._closed_s: float | None = None  # when the primary interface last closed its connection
-        self._gone_since_s: float | None = None  # since when no port answers
-        self.exception: str | None = None  # why the controller ended a program, the last time that it said so
+        self._closed_s: float | None = None  # time at which the primary interface last closed its connection
+        self._gone_since_s: float | None = None  # time from which on no port answers
+        self.exception: str | None = None  # the controller's latest reason for ending a program
         self.stopped_programs: set[str] = set()  # by their names
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="arm control watch", daemon=True)
@@ -83,14 +83,14 @@ class ControlWatch:
                     connection.close()
 
     def _problem(self, remote: ControlMode) -> Problem | None:
-        """What the last look means."""
+        """Return the problem that the control mode shows, or None."""
         if remote is False:
-            return switched_to_local_control(self._host, "its pendant was switched to local control")
-        if self._is_x and remote is None and self._closed_beside_states():
+            return local_control_during_run(self._host, "its pendant was switched to local control")
+        if self._is_x and remote is None and self._has_lost_primary_alone():
             how = (
                 "the controller closed its primary interface, as it does when the pendant is switched to local control"
             )
-            return switched_to_local_control(self._host, how)
+            return local_control_during_run(self._host, how)
         if self._primary is not None or not (self._is_x or remote == "gone"):
             self._gone_since_s = None
             return None
@@ -99,22 +99,22 @@ class ControlWatch:
             return None
         return _no_port_to_stop(self._host, "primary interface" if self._is_x else "dashboard and primary interface")
 
-    def _closed_beside_states(self) -> bool:
-        """Whether the primary interface alone has closed its connection: the link has not."""
+    def _has_lost_primary_alone(self) -> bool:
+        """Return whether the primary interface has closed its connection while states continue."""
         return self._closed_s is not None and self._lasts(self._closed_s, CLOSED_S)
 
     def _lasts(self, since_s: float, duration_s: float) -> bool:
-        """Whether states have come for so long since then."""
+        """Return whether states have continued for `duration_s` since `since_s`."""
         return self._newest_s() - since_s >= duration_s
 
     def _ask(self) -> ControlMode:
-        """Whether the pendant has handed control over, and goes on to."""
+        """Return whether the pendant is in remote control, None if unknown, "gone" if the dashboard does not answer."""
         if self._is_x:
-            return self._api.in_remote_control()
-        for _ in range(2):  # one that closes the connection, as some do with local control, is asked again
+            return self._api.is_in_remote_control()
+        for _ in range(2):  # some close the connection with local control; ask once more
             try:
                 self._dashboard = self._dashboard or Dashboard(self._host, ANSWER_S)
-                return self._dashboard.in_remote_control()
+                return self._dashboard.is_in_remote_control()
             except OSError:
                 if self._dashboard is not None:
                     self._dashboard.close()
@@ -122,9 +122,9 @@ class ControlWatch:
         return "gone"
 
     def _listen(self, remote: ControlMode) -> None:
-        """Hear what the primary interface says until it is time to ask again; returns at once when it closes."""
+        """Read messages of the primary interface for `ASK_S`; return at once if it closes."""
         ends_s = time.monotonic() + ASK_S
-        # One that does not tell the control mode takes a connection in local control too, and tells that of nobody.
+        # One that hides its control mode accepts connections in local control too, so a new one proves nothing.
         may_open = not (self._is_x and remote is None and self._closed_s is not None)
         if self._primary is None and may_open:
             with suppress(OSError):
@@ -144,13 +144,13 @@ class ControlWatch:
             self._ending.wait(ASK_S)
 
     def _hear(self, primary: socket.socket) -> None:
-        """Keep what is said of programs that were ended. Raises `OSError` when the connection has closed."""
+        """Record messages on ended programs. Raise `OSError` if the connection has closed."""
         data = primary.recv(65536)
         if not data:
             raise ConnectionError("the primary interface closed the connection")
         self._buffer += data
         for kind, payload in packages(self._buffer):
-            match words_in(payload) if kind == ROBOT_MESSAGE else None:
+            match decode_message(payload) if kind == ROBOT_MESSAGE else None:
                 case ProgramException(text):
                     self.exception = text
                 case ProgramStopped(program):

@@ -1,4 +1,4 @@
-"""The arm as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
+"""The driver of an arm: supervised moves and rests, a stream of states, and a stop at any time."""
 
 import threading
 import time
@@ -18,52 +18,52 @@ from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, payload_re
 from rig.turners.ur.control_watch import ControlWatch
 from rig.turners.ur.controller.robot_api import PORT as ROBOT_API_PORT
 from rig.turners.ur.controller.robot_api import RobotApi
-from rig.turners.ur.controller_answers import ANSWER_S, in_local_control, reported, stop_problem
+from rig.turners.ur.controller_answers import ANSWER_S, read_report, reports_local_control, stop_problem
 from rig.turners.ur.identity import is_polyscope_x
 from rig.turners.ur.messages import (
     Braked,
+    ChildHeartbeat,
     Connected,
     ControlTaken,
     Disturbed,
-    Failed,
-    Heartbeat,
     Message,
-    Move,
     MoveFinished,
+    MoveRequest,
+    RequestFailed,
     ScriptStarted,
     TakeControl,
 )
 from rig.turners.ur.report import ArmReport
-from rig.turners.ur.stopping.stop import Order, Stop
+from rig.turners.ur.stopping.stop import ArmStop, StopOrder
 from rig.turners.ur.stopping.stop_paths import StopPath, stop_paths
 from rig.turners.ur.stopping.stop_trial import stop_trial
-from rig.turners.ur.supervision import Stage, Supervision, stopped_at_start
+from rig.turners.ur.supervision import ControlStage, Supervision, describe_early_end
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
 START_S = 5.0  # a move begins within this (wall time), or not at all
-LAST_STOP_S = 0.8  # the controller is told to stop for so long once more when no state has confirmed the stop
+LAST_STOP_S = 0.8  # time for one more stop order if no state has confirmed the stop
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
-REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
-SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client, whatever it does afterwards
-REASON_S = 0.2  # what fails waits so long (wall time) for what explains it
-OUR_PROGRAM = "rtde_control"  # as the client calls it
-NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # why the client has started no program
-NOT_HELD = StopOutcome(True, "the arm was not under control")
+REPORT_S = 5.0  # … and to report it, in wall time, once the arm stands at its target
+SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
+REASON_S = 0.2  # a failure waits this long (wall time) for its explanation
+OUR_PROGRAM = "rtde_control"  # the client's name for it
+NOT_BEGUN = ("not_in_remote_control", "registers_in_use")  # reasons that kept the client from starting a program
+NOT_CONTROLLED = StopOutcome(True, "the arm was not under control")
 NOT_ENDED = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
 
 def _nothing() -> None:
-    """Watch nothing but the arm."""
+    """Supervise nothing beyond the arm itself."""
 
 
 class Arm:
-    """The arm at `host`; a context manager that starts receiving on entry and leaves the arm stopped.
+    """The arm at `host`, a context manager that receives states from its entry and leaves the arm stopped.
 
     `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
-    `client_log` takes what the `ur_rtde` client itself prints; a PolyScope X is asked at `robot_api_port` too. All
-    methods raise `Fault` by name when the arm or its driver fails: the arm is then stopped already. `Refused` means
+    `client_log` takes the output of the `ur_rtde` client; a PolyScope X is asked at `robot_api_port` too. After a
+    failure of the arm or its driver all methods raise `Fault` by name, with the arm already stopped. `Refused` means
     that nothing has moved.
     """
 
@@ -83,7 +83,7 @@ class Arm:
         self._link = ChildLink(
             host, state_rate_hz, self._take, self._fail, robot_api_port=robot_api_port, log=client_log
         )
-        self._arm_stop = Stop(self._paths, self._link.send, lambda: self._braked, self._seen_at_rest)
+        self._arm_stop = ArmStop(self._paths, self._link.send, lambda: self._braked, self._await_rest)
         self._stopper = StopOnce("arm stop", self._arm_stop.carry_out, NOT_ENDED)
         self._changed = threading.Condition()  # notified when anything below changes
         self._latest: ArmState | None = None
@@ -91,24 +91,24 @@ class Arm:
         self._answer: Message | None = None
         self._braked: Braked | None = None
         self._carried = Carried(0.0)
-        self._sets_payload = False  # our program runs, and is told what the arm carries
+        self._sets_payload = False  # our program runs, and sets the payload
         self._problem: Problem | None = None
         self._doing = "the preparation"
-        self._holds_arm = False  # a program of ours may run, so a stop is ours to make
-        self._passes_on = True  # states to whoever connected; not what came after one that cannot be true
+        self._holds_arm = False  # a program of ours may run, so this driver has to stop the arm
+        self._forwards_states = True  # whether states go to `on_state`; not after an impossible one
         self._supervision = Supervision()
         self._watch: ControlWatch | None = None
-        self._silent_s = 0.0  # the longest silence of the controller since the last move ended
+        self._silent_s = 0.0  # the controller's longest silence since the last move ended
         self.missed_states = 0  # gaps in the stream, counted in states
 
     # Looking ------------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Connect and receive; moves nothing and stops no program. Raises `Refused` when no arm answers."""
+        """Connect and receive; nothing moves and no program is stopped. Raise `Refused` if no arm answers."""
         with self._link.patience():
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
-        if isinstance(self._answer, Failed):
+        if isinstance(self._answer, RequestFailed):
             raise Refused.of(self._answer.problem)
         if problem := stop_problem(self._host, self._controller.version):
             raise Refused.of(problem)
@@ -121,28 +121,28 @@ class Arm:
         return self._latest
 
     def report(self) -> ArmReport:
-        """What the arm says about itself, for pre-flight."""
+        """Return the arm's report of itself, for pre-flight."""
         self.check()
-        return reported(self._host, self._controller, self.latest, self._robot_api_port)
+        return read_report(self._host, self._controller, self.latest, self._robot_api_port)
 
     def check(self) -> None:
-        """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
+        """Raise a supervising thread's problem. The arm is stopped by then if this driver controls it."""
         if self._problem is None and not self._stopper.begun:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
         if not self._holds_arm:
             raise Refused.of(problem)
         outcome = self.stop()
-        problem = self._explained(problem)
+        problem = self._explain(problem)
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
-        # Before it is taken nothing has moved.
-        kind = Fault if self._supervision.stage is Stage.TAKEN else Refused
+        # Before control is taken nothing has moved.
+        kind = Fault if self._supervision.stage is ControlStage.CONTROLLED else Refused
         raise kind.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -------------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: Carried) -> None:
-        """Upload the control script and set the payload. Raises `Refused` by name.
+        """Upload the control script and set the payload. Raise `Refused` by name.
 
         The client would end a program that runs, so a running program is refused here.
         """
@@ -150,7 +150,7 @@ class Arm:
         problem = readiness(self.latest)
         if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
-        if problem is None and in_local_control(self._host, self._controller.version):
+        if problem is None and reports_local_control(self._host, self._controller.version):
             problem = local_control(self._host)
         if problem is not None:
             raise Refused.of(problem)
@@ -161,24 +161,24 @@ class Arm:
                 if is_polyscope_x(self._controller.version):
                     self._prove_the_stop()
                 self._watch_control()
-                self._supervision.stage, self._carried = Stage.PREPARING, carried
+                self._supervision.stage, self._carried = ControlStage.PREPARING, carried
                 self._request(TakeControl(carried))
                 self._await(ScriptStarted)
             self._await(ControlTaken)
             self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
-            self._supervision.stage = Stage.TAKEN
-        self._silent_s = 0.0  # there was no client yet to lose
+            self._supervision.stage = ControlStage.CONTROLLED
+        self._silent_s = 0.0  # before this there was no client to lose
 
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.
 
-        `watch` is called before and then at least every 20 ms; what it raises stops the arm and goes on to the caller.
+        `watch` is called first and then at least every 20 ms; its exception stops the arm and goes on to the caller.
         """
         with stopping_on_error(self.stop):
             watch()
             self._doing = motion.name
             self._supervision.moving = True
-            self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
+            self._request(MoveRequest(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
             asked_s = time.monotonic()
             self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
             if self._answer is None:
@@ -186,13 +186,15 @@ class Arm:
             takes_s = motion.duration_s * SLOWNESS + SLOWNESS_S
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
-            def late() -> bool:
-                """Whether it is late by the controller's clock; that it has arrived travels by this machine's."""
-                arrived = self._stands_at(motion) and time.monotonic() < reported_s
-                return self.latest.time_s > deadline_s and not arrived
+            def is_late() -> bool:
+                """Return whether it is late by the controller's clock; this machine's clock limits the report of its
+                arrival.
+                """
+                has_arrived = self._stands_at(motion) and time.monotonic() < reported_s
+                return self.latest.time_s > deadline_s and not has_arrived
 
-            self._wait(lambda: self._has_ended(motion) or late(), watch)
-            if isinstance(self._answer, Failed):
+            self._wait(lambda: self._has_ended(motion) or is_late(), watch)
+            if isinstance(self._answer, RequestFailed):
                 self._wait_for_reason()
                 self._fail(self._unbegun(self._answer.problem))
             elif not self._has_ended(motion):
@@ -208,28 +210,28 @@ class Arm:
             self._silent_s = 0.0
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
-        """Stand still for a time of the controller's clock; `watch` as in `move`."""
+        """Stand still for `duration_s` of the controller's clock; `watch` as in `move`."""
         with stopping_on_error(self.stop):
             self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
 
     def stop(self) -> StopOutcome:
-        """Stop the arm and tell what is known about it; takes less than 1 s.
+        """Stop the arm and return its state; takes less than 1 s.
 
-        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it and is raised when
-        it has ended. Afterwards the control script has ended and this object moves the arm no more.
+        Safe at any time, repeatedly, from any thread; a second Ctrl-C does not undo it and is raised when it has ended.
+        Afterwards the control script has ended and this object moves the arm no more.
         """
         if not self._holds_arm:
-            return NOT_HELD
+            return NOT_CONTROLLED
         return self._stopper.outcome()
 
     def close(self) -> None:
-        """Stop the arm if it was under control, and end the child process."""
+        """Stop the arm if it is under control, and end the child process."""
         self._close()
 
     def _close(self) -> str | None:
-        """Stop and end as `close` does; return why a program may still run that a client left there, if one may."""
+        """Stop and end as `close` does; return a warning if a client's program may still run there, else None."""
         try:
             outcome = self.stop()
         finally:
@@ -239,9 +241,9 @@ class Arm:
             self._arm_stop.descriptors.release()
         if not self._holds_arm or (self._problem is None and outcome.at_rest):
             return None
-        # A client that had lost the arm and found it again may have started its program anew, behind that stop.
-        order = Order(self._paths(), LAST_STOP_S)
-        if order.program_ended():
+        # A client that lost the arm and reconnected may have restarted its program after that stop.
+        order = StopOrder(self._paths(), LAST_STOP_S)
+        if order.await_program_end():
             return None
         return f"the last stop is not confirmed either: {order.words}. Look at the arm: its program may still run"
 
@@ -256,12 +258,14 @@ class Arm:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        told = self._problem is not None and isinstance(error, RigError)  # the arm's own problems tell of the stop
-        if error is not None and not told:
+        is_reported = self._problem is not None and isinstance(
+            error, RigError
+        )  # the arm's own problems include the stop's outcome
+        if error is not None and not is_reported:
             tell_of_stop(error, self.stop)
-        left = self._close()
-        if error is not None and left is not None:
-            error.add_note(left)
+        warning = self._close()
+        if error is not None and warning is not None:
+            error.add_note(warning)
 
     # Inside -------------------------------------------------------------------------------------------------------
 
@@ -281,33 +285,33 @@ class Arm:
             self._watch.start()
 
     def _prove_the_stop(self) -> None:
-        """Raises `Refused` where the arm could not be stopped without the client."""
+        """Raise `Refused` if the arm could not be stopped without the client."""
         problem = stop_trial(self._host, RobotApi(self._host, self._robot_api_port, ANSWER_S), self._shows)
         if problem is not None:
             self._holds_arm = False
             raise Refused.of(readiness(self.latest) or problem)
 
     def _shows(self, runtime_state: RuntimeState, timeout_s: float) -> bool:
-        """Whether the arm's states show its program so within that time."""
+        """Return whether the arm's states show this state of its program within `timeout_s`."""
         with self._changed:
             return self._changed.wait_for(lambda: self.latest.runtime_state == runtime_state, timeout_s)
 
     def _await(self, kind: type[ScriptStarted] | type[ControlTaken]) -> None:
-        """Wait for the next step of the preparation, or name what has kept it from being made."""
-        self._wait(lambda: isinstance(self._answer, kind | Failed | ControlTaken))
-        if not isinstance(self._answer, Failed):
+        """Wait for the next step of the preparation, or raise what prevented it."""
+        self._wait(lambda: isinstance(self._answer, kind | RequestFailed | ControlTaken))
+        if not isinstance(self._answer, RequestFailed):
             return
         problem = self._answer.problem
         if problem.name in NOT_BEGUN:
             self._holds_arm = False
             raise Refused.of(problem)
         if problem.name == "control_not_taken" and self._watch and OUR_PROGRAM in self._watch.stopped_programs:
-            problem = stopped_at_start(problem)  # so soon that no state showed it run
+            problem = describe_early_end(problem)  # too soon for a state to show it running
         self._fail(self._supervision.interruption or problem)
         self.check()
 
-    def _explained(self, problem: Problem) -> Problem:
-        """A program that ended, with what the controller says of it: it refuses a payload so, too."""
+    def _explain(self, problem: Problem) -> Problem:
+        """Return the problem of an ended program with the controller's reason, such as a refused payload."""
         watch = self._watch
         if watch is None or problem.name != "program_stopped":
             return problem
@@ -315,17 +319,17 @@ class Arm:
             self._changed.wait_for(lambda: watch.exception is not None, REASON_S)
         if watch.exception is None:
             return problem
-        if self._sets_payload and self._supervision.stage is Stage.PREPARING:
+        if self._sets_payload and self._supervision.stage is ControlStage.PREPARING:
             problem = payload_refused(self._carried)
         return problem._replace(what=f'{problem.what}; the controller says: "{watch.exception}"')
 
-    def _request(self, request: TakeControl | Move) -> None:
+    def _request(self, request: TakeControl | MoveRequest) -> None:
         self.check()
         self._answer = None
         self._link.send(request)
 
     def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
-        """Block until `done`, looking at the arm's faults and the caller's watch all the time."""
+        """Block until `done`, while the arm's faults and the caller's watch are checked."""
         finished = False
         while not finished:
             with self._changed:
@@ -339,26 +343,26 @@ class Arm:
             self._changed.wait_for(lambda: self._problem is not None, REASON_S)
 
     def _unbegun(self, problem: Problem) -> Problem:
-        """Why a move was not begun: the controller refused it, or had lost the client in a silence."""
+        """Return why a move was not begun: the controller refused it, or had lost the client in a silence."""
         if self._silent_s <= SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
         return link_lost(what)
 
     def _has_ended(self, motion: Motion) -> bool:
-        if isinstance(self._answer, Failed):
+        if isinstance(self._answer, RequestFailed):
             return True
         return isinstance(self._answer, MoveFinished) and self._stands_at(motion)
 
     def _stands_at(self, motion: Motion) -> bool:
-        """Whether the arm is at rest where the motion ends."""
-        away_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
-        return self.latest.at_rest and away_rad < ARRIVAL_RAD
+        """Return whether the arm is at rest at the end of the motion."""
+        distance_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
+        return self.latest.at_rest and distance_rad < ARRIVAL_RAD
 
     def _take(self, message: Message) -> None:
-        """Take a message of the child, each as it comes, on the link's reader thread."""
+        """Handle a message of the child as it comes, on the link's reader thread."""
         match message:
-            case Heartbeat():
+            case ChildHeartbeat():
                 self._silent_s = max(self._silent_s, message.silent_s)
                 for state in message.states:
                     self._take_state(state)
@@ -368,7 +372,7 @@ class Arm:
                 self._braked = message
             case Disturbed():
                 self._fail_meanwhile(message.problem)
-                self._passes_on = False
+                self._forwards_states = False
             case _:
                 self._sets_payload = self._sets_payload or isinstance(message, ScriptStarted)
                 self._answer = message
@@ -377,7 +381,7 @@ class Arm:
 
     def _take_state(self, state: ArmState) -> None:
         before, self._latest = self._latest, state
-        if not self._passes_on:
+        if not self._forwards_states:
             return
         if before is not None:
             self.missed_states += max(0, round((state.time_s - before.time_s) / self._period_s) - 1)
@@ -394,7 +398,7 @@ class Arm:
         self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
 
     def _fail(self, problem: Problem) -> None:
-        """Keep the first problem and stop the arm; nothing is a problem after a stop on request."""
+        """Record the first problem and stop the arm; ignore problems after a requested stop."""
         with self._changed:
             if self._problem is not None or self._stopper.begun:
                 return
@@ -403,14 +407,14 @@ class Arm:
         if self._holds_arm:
             self._stopper.begin()
 
-    def _seen_at_rest(self, since_s: float, timeout_s: float) -> bool:
-        def at_rest() -> bool:
+    def _await_rest(self, since_s: float, timeout_s: float) -> bool:
+        def is_at_rest() -> bool:
             state = self.latest
             return state.host_time_s > since_s and state.at_rest and state.runtime_state == RuntimeState.STOPPED
 
         with self._changed:
-            self._changed.wait_for(lambda: at_rest() or self._link.ended, timeout_s)
-            return at_rest()
+            self._changed.wait_for(lambda: is_at_rest() or self._link.ended, timeout_s)
+            return is_at_rest()
 
 
 def _not_started(motion: Motion) -> Problem:
@@ -422,6 +426,6 @@ def _not_started(motion: Motion) -> Problem:
 
 
 def look(host: str, robot_api_port: int = ROBOT_API_PORT) -> ArmReport:
-    """Look at the arm: receive and ask only; nothing moves and no program is stopped. Raises `Refused` by name."""
+    """Look at the arm: receive and query only; nothing moves and no program is stopped. Raise `Refused` by name."""
     with Arm(host, robot_api_port=robot_api_port) as arm:
         return arm.report()

@@ -39,14 +39,14 @@ def _problems(plans: Sequence[Plan], section: ArmSection, report: ArmReport | No
     return preflight.preflight_problems(plans, section, report)
 
 
-def _meant(section: ArmSection) -> Made:
+def _make_nominal(section: ArmSection) -> Made:
     model = model_of(section)
     return Made(model.maker, model.name, model.drawing)
 
 
-def _made(section: ArmSection, report: ArmReport) -> Made:
+def _make_recorded(section: ArmSection, report: ArmReport) -> Made:
     refuse(identity_problems(section, report))
-    return preflight.made(section, report)
+    return preflight.make_recorded(section, report)
 
 
 UR = TurnerKind(
@@ -56,8 +56,8 @@ UR = TurnerKind(
     look=_look,
     stance=_stance,
     problems=_problems,
-    meant=_meant,
-    made=_made,
+    meant=_make_nominal,
+    made=_make_recorded,
     carried=carried_by,
     words=Words(
         name="robot arm",

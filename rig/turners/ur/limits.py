@@ -1,4 +1,4 @@
-"""Limits of position, speed and acceleration, joint by joint: those of the arm, and those of its controller. Pure."""
+"""Limits of position, speed and acceleration, joint by joint: those of the arm's model, and its controller's. Pure."""
 
 import math
 from collections.abc import Iterator
@@ -12,24 +12,26 @@ from rig.motion.steps import Motion, Sweep, travel
 
 OURS, THEIRS = "the limit", "the controller's limit"
 WIDER = ", or widen that limit in the arm's safety settings"
-ROUNDING = 1e-6  # of a limit
+ROUNDING = 1e-6  # relative to a limit
 
 
-def motion_problems(motion: Motion, ours: JointLimits, told: JointLimits | None) -> list[Problem]:
-    """What takes a joint too far or too fast, by the model's limits or by those its controller told: the narrower."""
+def motion_problems(motion: Motion, ours: JointLimits, controller: JointLimits | None) -> list[Problem]:
+    """Return the problems of a motion beyond the model's limits or its controller's, whichever is narrower."""
     return [
-        *_position_problems(motion, ours, told),
-        *_speed_problems(motion, ours.speed_rad_s, None if told is None else told.speed_rad_s),
-        *_acceleration_problems(motion, ours.acceleration_rad_s2, None if told is None else told.acceleration_rad_s2),
+        *_position_problems(motion, ours, controller),
+        *_speed_problems(motion, ours.speed_rad_s, None if controller is None else controller.speed_rad_s),
+        *_acceleration_problems(
+            motion, ours.acceleration_rad_s2, None if controller is None else controller.acceleration_rad_s2
+        ),
     ]
 
 
-def _position_problems(motion: Motion, ours: JointLimits, told: JointLimits | None) -> list[Problem]:
+def _position_problems(motion: Motion, ours: JointLimits, controller: JointLimits | None) -> list[Problem]:
     problems = []
     for joint, name in enumerate(JOINT_NAMES):
         most = ours.greatest_rad[joint]
-        least, _ = _narrower(-ours.least_rad[joint], None if told is None else -told.least_rad[joint])
-        greatest, _ = _narrower(most, None if told is None else told.greatest_rad[joint])
+        least, _ = _narrower(-ours.least_rad[joint], None if controller is None else -controller.least_rad[joint])
+        greatest, _ = _narrower(most, None if controller is None else controller.greatest_rad[joint])
         low, high = sorted((motion.start_q_rad[joint], motion.target_q_rad[joint]))
         if low < -least or high > greatest:
             narrow = min(least, greatest) < most
@@ -46,7 +48,7 @@ def _position_problems(motion: Motion, ours: JointLimits, told: JointLimits | No
 
 
 def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
-    """What brings a movement back inside the range of a joint: where it begins, and where it leads, decide."""
+    """Return the remedy for a motion beyond a joint's range, by its start and its kind."""
     name, (low, high) = JOINT_NAMES[joint], within_rad
     if not low <= motion.start_q_rad[joint] <= high and not isinstance(motion, Sweep):
         return f"Bring {name} back inside its range from the pendant, or correct arm.home_deg"
@@ -63,18 +65,20 @@ def _nearer(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
     )
 
 
-def _speed_problems(motion: Motion, ours_rad_s: Joints, told_rad_s: Joints | None) -> list[Problem]:
+def _speed_problems(motion: Motion, ours_rad_s: Joints, controller_rad_s: Joints | None) -> list[Problem]:
     return [
         Problem(
             "joint_speed",
             f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, {whose} is {math.degrees(limit):.1f}°/s",
             f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
         )
-        for name, speed, limit, whose in _beyond(motion.speed_rad_s * _shares(motion), ours_rad_s, told_rad_s)
+        for name, speed, limit, whose in _find_excess(
+            motion.speed_rad_s * _joint_fractions(motion), ours_rad_s, controller_rad_s
+        )
     ]
 
 
-def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, told_rad_s2: Joints | None) -> list[Problem]:
+def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, controller_rad_s2: Joints | None) -> list[Problem]:
     return [
         Problem(
             "joint_acceleration",
@@ -82,30 +86,30 @@ def _acceleration_problems(motion: Motion, ours_rad_s2: Joints, told_rad_s2: Joi
             f"{whose} is {math.degrees(limit):.0f}°/s²",
             "Lower procedure.acceleration_deg_s2",
         )
-        for name, acceleration, limit, whose in _beyond(
-            motion.acceleration_rad_s2 * _shares(motion), ours_rad_s2, told_rad_s2
+        for name, acceleration, limit, whose in _find_excess(
+            motion.acceleration_rad_s2 * _joint_fractions(motion), ours_rad_s2, controller_rad_s2
         )
     ]
 
 
-def _beyond(values: Array, ours: Joints, told: Joints | None) -> Iterator[tuple[str, float, float, str]]:
-    """The joints whose values (6,) are beyond the narrower limit: name, value, that limit, and whose it is."""
+def _find_excess(values: Array, ours: Joints, controller: Joints | None) -> Iterator[tuple[str, float, float, str]]:
+    """Yield the joints whose `values` (6,) exceed the narrower limit: name, value, that limit, and its owner."""
     for joint, name in enumerate(JOINT_NAMES):
-        limit, whose = _narrower(ours[joint], None if told is None else told[joint])
+        limit, whose = _narrower(ours[joint], None if controller is None else controller[joint])
         if values[joint] > limit:
             yield name, values[joint], limit, whose
 
 
-def _shares(motion: Motion) -> Array:
-    """(6,) how far each joint goes, over the one that goes farthest: by so much it is slower."""
-    way = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
-    shares: Array = way / way.max()
-    return shares
+def _joint_fractions(motion: Motion) -> Array:
+    """Return (6,) the travel of each joint relative to the longest: its speed scales with it."""
+    travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
+    fractions: Array = travel_rad / travel_rad.max()
+    return fractions
 
 
-def _narrower(ours: float, told: float | None) -> tuple[float, str]:
-    """The narrower of the arm's own limit and the one its controller tells, and whose that is.
+def _narrower(ours: float, controller: float | None) -> tuple[float, str]:
+    """Return the narrower of the model's and the controller's limit, and its owner.
 
-    The same number rounded differently is the same.
+    Limits that differ by rounding count as equal.
     """
-    return (ours, OURS) if told is None or told >= ours * (1 - ROUNDING) else (told, THEIRS)
+    return (ours, OURS) if controller is None or controller >= ours * (1 - ROUNDING) else (controller, THEIRS)

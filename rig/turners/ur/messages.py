@@ -1,4 +1,4 @@
-"""What parent and child say to each other over the pipe: small frozen values, pickled."""
+"""The messages between parent and child over the pipe: small frozen values, pickled."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,16 @@ from rig.motion.state import ArmState, Joints
 
 @dataclass(frozen=True, slots=True)
 class TakeControl:
-    """Upload the control script and set the payload. Answered by `ScriptStarted` and `ControlTaken`, or by `Failed`."""
+    """The request to upload the control script and set the payload. Answers: `ScriptStarted` and `ControlTaken`, or
+    `RequestFailed`.
+    """
 
     carried: Carried
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
-    """Start a joint-space movement. Answered by `MoveStarted` and `MoveFinished`, or by `Failed`."""
+class MoveRequest:
+    """The request to start a joint-space movement. Answers: `MoveStarted` and `MoveFinished`, or `RequestFailed`."""
 
     target_q_rad: Joints
     speed_rad_s: float
@@ -26,34 +28,34 @@ class Move:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
-    """Brake at once and end the control script; served while a movement runs. Answered by `Braked`."""
+class BrakeRequest:
+    """The request to brake at once and end the control script, also served during a movement. Answer: `Braked`."""
 
     deceleration_rad_s2: float
 
 
 @dataclass(frozen=True, slots=True)
 class Alive:
-    """The parent still runs; when these stop coming, the child stops the arm itself. Not answered."""
+    """The parent's sign of life; without it the child stops the arm itself. No answer."""
 
 
-Request = TakeControl | Move | Stop | Alive
+Request = TakeControl | MoveRequest | BrakeRequest | Alive
 
 # Child to parent ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Connected:
-    """The controller sends states; `version` is its software's: major, minor, bugfix, build."""
+    """The start of the controller's states; `version` is its software's: major, minor, bugfix, build."""
 
     version: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Heartbeat:
-    """The child lives; `states` are those that came since the last heartbeat, oldest first.
+class ChildHeartbeat:
+    """The child's sign of life; `states` are those since the last one, oldest first.
 
-    For at least `silent_s` nothing at all has come from the controller: see `StateStream`.
+    `silent_s`: the least time without data from the controller (`StateStream`).
     """
 
     states: tuple[ArmState, ...]
@@ -62,44 +64,44 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class ScriptStarted:
-    """The control script runs, and the payload is being set."""
+    """The start of the control script; the payload is being set."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControlTaken:
-    """The control script runs and the payload is set."""
+    """Full control: the control script runs and the payload is set."""
 
 
 @dataclass(frozen=True, slots=True)
 class MoveStarted:
-    """The controller has taken the movement on."""
+    """The controller's acceptance of the movement."""
 
 
 @dataclass(frozen=True, slots=True)
 class MoveFinished:
-    """The controller reports the end of the movement."""
+    """The controller's report of the movement's end."""
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
-    """The request, or the connection, failed."""
+class RequestFailed:
+    """The failure of a request, or of the connection."""
 
     problem: Problem
 
 
 @dataclass(frozen=True, slots=True)
 class Braked:
-    """The client was told to brake; `taken` says whether its script did so."""
+    """The answer to a brake request; `confirmed` says whether the client's script did so."""
 
-    taken: bool
+    confirmed: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbed:
-    """What the states showed, unasked: nothing can go on after it."""
+    """A problem shown by the states, unasked, after which the run cannot continue."""
 
     problem: Problem
 
 
-Answer = ScriptStarted | ControlTaken | MoveStarted | MoveFinished | Failed
-Message = Connected | Heartbeat | Answer | Braked | Disturbed
+Answer = ScriptStarted | ControlTaken | MoveStarted | MoveFinished | RequestFailed
+Message = Connected | ChildHeartbeat | Answer | Braked | Disturbed

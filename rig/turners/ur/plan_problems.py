@@ -1,4 +1,4 @@
-"""What is wrong with a plan by itself for an arm of Universal Robots: by its model, by its controller's limits."""
+"""Problems of a plan by itself for an arm of Universal Robots: by its model, and by its controller's limits."""
 
 from rig.errors import Problem
 from rig.motion.carried import Carried
@@ -17,16 +17,16 @@ def plan_problems(
     model: TurnerModel,
     *,
     arm: DenavitHartenberg | None = None,
-    told: JointLimits | None = None,
+    controller: JointLimits | None = None,
 ) -> list[Problem]:
-    """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
+    """Return the problems of a plan: invalid steps, and limits of position, speed, acceleration, payload and clearance.
 
-    And what brings the flange or what it carries too near the arm. All as the `model` can do it. `told` are the
-    controller's own limits, which count where they are narrower; the lengths are those of `arm`, or else the drawing's.
+    Clearance is that of the flange and its payload from the arm. `controller` are the controller's own limits, which
+    count if they are narrower than the `model`'s; the lengths are those of `arm`, or else the drawing's.
     """
     problems = step_problems(plan)
     moving = [motion for motion in plan.motions if travels(motion)]
-    problems += [problem for motion in moving for problem in motion_problems(motion, model.limits, told)]
+    problems += [problem for motion in moving for problem in motion_problems(motion, model.limits, controller)]
     problems += clearance_problems(plan, carried, model, arm)
     if not 0 <= carried.payload_kg <= model.payload_kg:
         problems.append(

@@ -1,4 +1,6 @@
-"""Pre-flight of this arm: what can be known to go wrong before it moves. Pure: plans and a report in, problems out."""
+"""Pre-flight of the arm: the problems that can be foreseen before it moves. Pure: plans and a report in, problems
+out.
+"""
 
 import math
 from collections.abc import Sequence
@@ -15,21 +17,21 @@ from rig.motion.state import JOINT_NAMES, Made
 from rig.motion.steps import Plan
 from rig.turners.ur.condition import MAKERS_SIMULATOR, local_control, readiness
 from rig.turners.ur.controller.registers import registers_in_use
-from rig.turners.ur.identity import identity_problems, model_found
+from rig.turners.ur.identity import identify_model, identity_problems
 from rig.turners.ur.plan_problems import plan_problems
 from rig.turners.ur.report import MAKER, ArmReport
 
-# How far the first motion may swing the large joints through the room, and the wrists.
+# The longest first motion of the large joints, which sweep through the room, and of the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
 WRISTS = (3, 4, 5)
-MAX_DISAGREEMENT_RAD = math.radians(1)  # what factories find differs from the nominal arm by a few milliradians
-MAX_TOOL_TURN_RAD = 1e-3  # what a pendant rounds is less, what somebody means is more
+MAX_DISAGREEMENT_RAD = math.radians(1)  # a factory's measurement differs from the nominal arm by a few milliradians
+MAX_TOOL_ROTATION_RAD = 1e-3  # above a pendant's rounding, below any intended rotation
 
 
 def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
-    """All that is known to speak against moving: the arm is another, a plan breaks a limit, the arm is not ready.
+    """Return all reasons against moving: another arm, a plan beyond a limit, an arm that is not ready.
 
-    The last of the `plans` is the one that is driven. Of another arm nothing else is said: all else is of this one.
+    The last of the `plans` is the one to drive. For another arm nothing else is reported: the rest is about this one.
     """
     if others := identity_problems(arm, report):
         return others
@@ -43,19 +45,19 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
         carried_by(arm),
         model_of(arm),
         arm=_geometry(arm, report),
-        told=None if report.setup is None else report.setup.limits,
+        controller=None if report.setup is None else report.setup.limits,
     )
 
 
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
-    """What is wrong with the arm as it stands, for this plan: modes, stops, control, the way to the start.
+    """Return the problems of the arm's state for this plan: modes, stops, control, the way to the start.
 
-    The payload is not compared here: `Arm.take_control` sets it and sees that the controller reckons with it.
+    The payload is not compared here: `Arm.take_control` sets it and confirms that the controller uses it.
     """
     problems = []
     if unready := readiness(report.state):
         problems.append(unready)
-    # On the loopback address of the robot's own simulator the client skips this check, and so does the pendant.
+    # The client skips this check at the loopback address of the robot's own simulator, and so does the pendant.
     if report.remote_control is False and report.host not in MAKERS_SIMULATOR:
         problems.append(local_control(report.host))
     if report.program_running:
@@ -85,16 +87,16 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 
 
 def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
-    """A turned tool frame, where attitudes are visited; a controller that does not tell of it is not held up."""
+    """Return the problem of a rotated tool frame, for plans with attitudes and if the controller reports the frame."""
     if not plan.dwells or report.tcp_offset is None:
         return []
-    turn_rad = abs(math.remainder(math.hypot(*report.tcp_offset[3:]), math.tau))
-    if turn_rad <= MAX_TOOL_TURN_RAD:
+    rotation_rad = abs(math.remainder(math.hypot(*report.tcp_offset[3:]), math.tau))
+    if rotation_rad <= MAX_TOOL_ROTATION_RAD:
         return []
     return [
         Problem(
             "tcp_rotated",
-            f"the tool's frame on the pendant is turned by {math.degrees(turn_rad):.2g}° relative to the "
+            f"the tool's frame on the pendant is turned by {math.degrees(rotation_rad):.2g}° relative to the "
             "flange's frame, in which the rig measures: it seems to describe a tool or a mounting",
             "Set the rotation of the TCP to zero on the pendant for this run",
         )
@@ -102,10 +104,10 @@ def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
 
 
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
-    """What is wrong with the controller's account of its arm, where the configuration asks for it.
+    """Return the problems of the controller's account of its arm, if the configuration uses it.
 
-    Wrists that turn about other axes than the drawing's are none, or are not known: the directions are compared in the
-    flange's frame at home.
+    A problem for each wrist whose axis differs from the drawing's, in the flange's frame at home, or if no account is
+    there.
     """
     if arm.kinematics == "nominal":
         return []
@@ -119,8 +121,12 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
             )
         ]
     home, model = home_of(arm), model_of(arm)
-    told, nominal = (flange_axes(home, each)[:, WRISTS] for each in (report.kinematics, model.drawing))
-    angles = np.arctan2(np.linalg.norm(np.cross(told, nominal, axis=0), axis=0), np.sum(told * nominal, axis=0))
+    controller, nominal = (
+        flange_axes(home, arm_geometry)[:, WRISTS] for arm_geometry in (report.kinematics, model.drawing)
+    )
+    angles = np.arctan2(
+        np.linalg.norm(np.cross(controller, nominal, axis=0), axis=0), np.sum(controller * nominal, axis=0)
+    )
     return [
         Problem(
             "kinematics_disagree",
@@ -133,15 +139,15 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
     ]
 
 
-def made(arm: ArmSection, report: ArmReport) -> Made:
-    """The arm as a recording has it, its geometry as the configuration says.
+def make_recorded(arm: ArmSection, report: ArmReport) -> Made:
+    """Return the arm for the recording, with the geometry that the configuration selects.
 
-    Raises Refused `no_kinematics`, `kinematics_disagree`.
+    Raise Refused `no_kinematics`, `kinematics_disagree`.
     """
     refuse(kinematics_problems(arm, report))
-    return Made(MAKER, model_found(report), _geometry(arm, report), report.tcp_offset)
+    return Made(MAKER, identify_model(report), _geometry(arm, report), report.tcp_offset)
 
 
 def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
-    """What is reckoned with: the factory's measure of this arm, or the drawing of its model."""
+    """Return the geometry for all computations: the factory's measurement of this arm, or the drawing of its model."""
     return model_of(arm).drawing if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics

@@ -1,4 +1,4 @@
-"""What a look at an arm of Universal Robots shows, and what its controller says that it is set up for."""
+"""The report of an arm of Universal Robots, and its controller's setup."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ MAKER = "Universal Robots"
 
 @dataclass(frozen=True, slots=True)
 class ArmSetup:
-    """Which arm the controller is set up for: the maker's number of its type, its lengths, its joints' limits."""
+    """The arm that the controller is set up for: the maker's type number, its lengths, its joints' limits."""
 
     robot_type: int
     drawing: DenavitHartenberg
@@ -19,13 +19,18 @@ class ArmSetup:
 
 @dataclass(frozen=True, slots=True)
 class ArmReport:
-    """What a look at the arm shows; None where the controller does not tell.
+    """The arm's report of itself, a `Report`; None for items that the controller does not report.
 
-    `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `kinematics` is
-    its arm's geometry as the factory has measured it, `tcp_offset` where its tool centre point stands in the flange's
-    frame, `setup` the arm it is set up for, `called` that arm's name as the dashboard has it. `model` is which arm all
-    of that means, in the maker's names. `registers_free` says whether the client finds room among the registers by
-    which it speaks with its script. It is a `Report`.
+    - `host`: its address.
+    - `version`, `polyscope`: its software (major, minor, bugfix, build), and the same in its own words.
+    - `serial_number`: the arm's, or "not told".
+    - `remote_control`, `program_running`: the pendant's control mode, and the controller's program.
+    - `state`: the state at that time.
+    - `kinematics`: the arm's geometry as measured in the factory.
+    - `tcp_offset`: the pose of its tool centre point in the flange's frame.
+    - `setup`, `called`: the arm it is set up for, and the dashboard's name for it.
+    - `model`: the maker's name of the arm that these items mean.
+    - `registers_free`: whether a half of the registers is free for the client's script.
     """
 
     host: str
@@ -54,6 +59,6 @@ class ArmReport:
 
     @property
     def words(self) -> str:
-        """The arm as a line of text names it: model, serial number, software."""
-        named = "model not told" if self.model is None else f"{MAKER} {self.model}"
-        return f"{named}, serial number {self.serial_number}, PolyScope {self.polyscope}"
+        """The arm in a line of text: model, serial number, software."""
+        model = "model not told" if self.model is None else f"{MAKER} {self.model}"
+        return f"{model}, serial number {self.serial_number}, PolyScope {self.polyscope}"

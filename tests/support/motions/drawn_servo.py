@@ -24,7 +24,7 @@ from rig.estimation.arrays import Array
 from rig.motion.steps import Plan, Rest, Sweep, Transfer
 from rig.plans.motions.servo_sweeps import plan_servo_six_observation
 from rig.turners.servo.kind import SERVO
-from rig.turners.servo.models import named
+from rig.turners.servo.models import find_model
 from rig.turners.servo.moves import move_of
 from rig.turners.servo.registers import DRIVE_MODE, GOAL, OPERATING_MODE, PROFILE, STATE, TORQUE, Register
 from rig.turners.servo.state import JOINTS, SERVO_STATE_DTYPE, decode
@@ -66,7 +66,7 @@ class Far:
 
     def __init__(self, truth: ServoTruth) -> None:
         self.servo = SimulatedServo(truth, BEGINS_S - 1.0)
-        self.model = named(truth.model.lower().replace("-", "_"))
+        self.model = find_model(truth.model.lower().replace("-", "_"))
 
     def write(self, time_s: float, register: Register, *values: int) -> None:
         data = register.address.to_bytes(2, "little") + register.pack(*values)

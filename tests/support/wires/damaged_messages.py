@@ -112,13 +112,13 @@ def _read_states(host: str) -> str:
 def _ask_dashboard(host: str) -> str:
     with dashboard.Dashboard(host, PATIENCE_S) as there:
         assert isinstance(there.program_running(), bool)
-        assert there.in_remote_control() in (True, False, None)
+        assert there.is_in_remote_control() in (True, False, None)
         assert (there.polyscope() + there.serial_number()).isprintable()
     return "read"
 
 
 def _read_account(host: str) -> str:
-    account = primary.read_account(host, PATIENCE_S)
+    account = primary.read_description(host, PATIENCE_S)
     return "told" if account.complete else "not all told"
 
 

@@ -17,7 +17,7 @@ from rig.errors import Problem, Refused
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm, lengths_m
 from rig.motion.state import JointLimits
 from rig.turners.ur.driver import look
-from rig.turners.ur.identity import identity_problems, model_found
+from rig.turners.ur.identity import identity_problems, identify_model
 from rig.turners.ur.preflight import preflight_problems
 from rig.turners.ur.report import ArmReport, ArmSetup
 from rig.world.ur10e.motion.models import MODELS
@@ -139,7 +139,7 @@ def test_an_arm_that_cannot_be_told_is_not_moved(world: World, seen: ArmReport) 
     closed = look(world({"world": {"arm": {"primary": False}}}).host)
     assert closed.setup is None and closed.kinematics is None
     assert names(BY_NOMINAL, closed) == []  # its dashboard says UR10, its software e-Series: that is a UR10e or UR12e
-    assert model_found(closed) == "UR10e or UR12e"
+    assert identify_model(closed) == "UR10e or UR12e"
     assert names(BY_NOMINAL, replace(closed, called="UR5")) == ["other_arm"]
     assert names(BY_NOMINAL, replace(closed, called="could not understand: 'get robot model'")) == [
         "arm_not_identified"
@@ -153,7 +153,7 @@ def test_the_maker_has_other_sizes_which_are_refused_by_type(seen: ArmReport, ro
     assert seen.setup is not None
     told = replace(seen, setup=replace(seen.setup, robot_type=robot_type))
     assert names(ARM, told) == names(BY_NOMINAL, told) == ["other_arm"]
-    assert model_found(told) == model
+    assert identify_model(told) == model
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from ipaddress import IPv4Address
 
 import pytest
 
-from rig.turners.ur.controller.listener import listener
+from rig.turners.ur.controller.listener import find_listener
 from rig.turners.ur.controller.rtde_packages import PORT
 from support.laboratories.worlds import World, fresh_host
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tell
 @pytest.mark.slow
 def test_a_simulated_controller_is_found(world: World) -> None:
     laboratory = world()
-    assert listener(IPv4Address(laboratory.host), PORT) == laboratory.process.pid
+    assert find_listener(IPv4Address(laboratory.host), PORT) == laboratory.process.pid
 
 
 def test_one_that_listens_at_every_address_is_found() -> None:
@@ -26,7 +26,7 @@ def test_one_that_listens_at_every_address_is_found() -> None:
         [sys.executable, "-c", serving], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None
-        assert listener(IPv4Address("127.0.0.1"), int(process.stdout.readline())) == process.pid
+        assert find_listener(IPv4Address("127.0.0.1"), int(process.stdout.readline())) == process.pid
 
 
 def test_where_nobody_listens_there_is_nobody() -> None:
@@ -34,5 +34,5 @@ def test_where_nobody_listens_there_is_nobody() -> None:
     with socket.create_server((host, 0)) as server:
         port = server.getsockname()[1]
         with socket.create_connection((host, port)):
-            assert listener(IPv4Address(host), port + 1) is None
-    assert listener(IPv4Address(host), port) is None
+            assert find_listener(IPv4Address(host), port + 1) is None
+    assert find_listener(IPv4Address(host), port) is None

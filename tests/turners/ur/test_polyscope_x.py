@@ -12,7 +12,7 @@ from rig.turners.ur.controller.primary import PORT as PRIMARY_PORT
 from rig.turners.ur.controller.primary_stop import MODE_DATA, PrimaryStop
 from rig.turners.ur.controller.robot_api import RobotApi
 from rig.turners.ur.identity import series_problem
-from rig.turners.ur.stopping.stop import Order
+from rig.turners.ur.stopping.stop import StopOrder
 from rig.turners.ur.stopping.stop_paths import stop_paths
 from support.laboratories.worlds import fresh_host
 from support.processes.waiting import PATIENCE_S, wait_for
@@ -69,7 +69,7 @@ def said(body: bytes) -> bytes:
 )
 def test_the_control_mode_is_what_the_robot_api_says_or_not_known(answer: bytes, remote: bool | None) -> None:
     with saying(API_PORT, [answer]) as (host, heard):
-        assert RobotApi(host, API_PORT, 0.5).in_remote_control() is remote
+        assert RobotApi(host, API_PORT, 0.5).is_in_remote_control() is remote
     assert heard[0].startswith(b"GET /universal-robots/robot-api/system/v1/controlmode HTTP/1.1\r\n")
 
 
@@ -82,7 +82,7 @@ def test_a_question_that_has_moved_is_followed_on_the_same_controller_but_not_fo
 
 
 def test_no_robot_api_is_no_answer() -> None:
-    assert RobotApi(fresh_host(), API_PORT, 0.5).in_remote_control() is None
+    assert RobotApi(fresh_host(), API_PORT, 0.5).is_in_remote_control() is None
 
 
 def package(kind: int, payload: bytes) -> bytes:
@@ -110,8 +110,8 @@ def test_a_state_newer_than_the_stop_tells_whether_a_program_runs(states: Sequen
     assert heard == [b"stop program\n"]
 
 
-def order_to(host: str, version: tuple[int, ...], timeout_s: float) -> Order:
-    return Order(stop_paths(host, version, API_PORT), timeout_s)
+def order_to(host: str, version: tuple[int, ...], timeout_s: float) -> StopOrder:
+    return StopOrder(stop_paths(host, version, API_PORT), timeout_s)
 
 
 X_WITHOUT_API, X, SERIES_5 = (10, 10, 0, 0), (10, 12, 0, 0), (5, 14, 0, 0)
@@ -122,7 +122,7 @@ X_WITHOUT_API, X, SERIES_5 = (10, 10, 0, 0), (10, 12, 0, 0), (5, 14, 0, 0)
 def test_a_primary_interface_that_does_not_tell_confirms_no_stop(states: bytes) -> None:
     with saying(PRIMARY_PORT, [states]) as (host, _):
         order = order_to(host, X_WITHOUT_API, 0.5)
-        assert not order.program_ended()
+        assert not order.await_program_end()
     assert order.words == "the primary interface was sent the stop and did not acknowledge it"
 
 
@@ -139,7 +139,7 @@ def test_an_order_is_given_however_late_its_thread_begins() -> None:
 )
 def test_an_order_that_nobody_takes_names_every_way(version: tuple[int, ...], ways: list[str]) -> None:
     order = order_to(fresh_host(), version, 5.0)
-    assert not order.program_ended()
+    assert not order.await_program_end()
     for way in ways:
         assert f"the {way} did not take the stop ([Errno " in order.words
 
@@ -174,8 +174,8 @@ def test_who_refuses_a_stop_is_told_with_his_words(
 ) -> None:
     with saying(port, answers) as (host, _):
         order = order_to(host, version, 0.5)
-        assert order.given()
-        order.program_ended()
+        assert order.await_delivery()
+        order.await_program_end()
     assert (refusal or "") in order.words
     assert bool(order.refusals) == bool(refusal)
 

@@ -13,7 +13,7 @@ import pytest
 
 from rig.motion.geometry import DenavitHartenberg, flange_axes
 from rig.motion.state import JointLimits
-from rig.turners.ur.controller.primary import PORT, Account, read_account
+from rig.turners.ur.controller.primary import PORT, ArmDescription, read_description
 from rig.turners.ur.driver import look
 from rig.turners.ur.report import ArmSetup
 from support.laboratories.worlds import World
@@ -92,33 +92,33 @@ def test_all_are_found_among_other_packages_in_whatever_state_they_come_and_howe
     told = tool + geometry if tool_first else geometry + tool
     stream = package(20, b"a message") + package(16, package(0, b"mode")) + told
     with saying(stream[:30], stream[30:80], stream[80:]):
-        assert read_account(HOST, 5.0) == Account(CALIBRATED, TURNED, UR3E)
+        assert read_description(HOST, 5.0) == ArmDescription(CALIBRATED, TURNED, UR3E)
 
 
 @pytest.mark.slow
 def test_a_controller_that_does_not_tell_is_none() -> None:
     with saying(package(16, package(0, b"mode")), package(16, package(5, b"an older layout"))):
-        assert read_account(HOST, 0.3) == Account()
+        assert read_description(HOST, 0.3) == ArmDescription()
 
 
 @pytest.mark.slow
 def test_what_one_package_tells_holds_without_the_other() -> None:
     with saying(package(16, info(CALIBRATED) + cartesian((0.0,) * 5 + (float("nan"),)))):
-        assert read_account(HOST, 0.3) == Account(CALIBRATED)
+        assert read_description(HOST, 0.3) == ArmDescription(CALIBRATED)
     with saying(package(16, cartesian(TURNED))):
-        assert read_account(HOST, 0.3) == Account(tcp_offset=TURNED)
+        assert read_description(HOST, 0.3) == ArmDescription(tcp_offset=TURNED)
 
 
 @pytest.mark.slow
 def test_an_arm_that_no_number_describes_is_not_told() -> None:
     nowhere = replace(UR3E, limits=replace(UR3E.limits, speed_rad_s=(float("nan"),) * 6))
     with saying(package(16, configuration(nowhere) + configuration(UR3E)[:100])):
-        assert read_account(HOST, 0.3) == Account()
+        assert read_description(HOST, 0.3) == ArmDescription()
 
 
 def test_what_is_no_primary_interface_is_an_error_of_the_link() -> None:
     with saying(b"Connected: Universal Robots Dashboard Server\n"), pytest.raises(ConnectionError):
-        read_account(HOST, 5.0)
+        read_description(HOST, 5.0)
 
 
 @pytest.mark.slow

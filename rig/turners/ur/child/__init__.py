@@ -1,1 +1,1 @@
-"""The supervised process in which the `ur_rtde` client lives, and the program's end of it."""
+"""The supervised process of the `ur_rtde` client, and the parent's end of it."""

@@ -1,9 +1,9 @@
-"""What can go wrong with the client and its connections, by name: what the supervised process tells."""
+"""The problems of the client and its connections, as the supervised process reports them."""
 
 from rig.errors import Problem
 from rig.turners.ur.condition import local_control
 from rig.turners.ur.controller.registers import registers_in_use
-from rig.turners.ur.controller.state_stream import Disbelieved, NotSpoken, Packet
+from rig.turners.ur.controller.state_stream import ImpossibleState, NotSupported, StatePacket
 from rig.turners.ur.controller_answers import no_states
 from rig.turners.ur.identity import series_problem, version_text
 
@@ -11,10 +11,10 @@ LINK_REMEDY = "Look at the arm and its network cable, then start again"
 
 
 def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem:
-    """Why the client's constructor has failed, by what it says."""
+    """Describe why the client's constructor failed, by its message."""
     if "remote control" in reason:
         return local_control(host)
-    if "already in use" in reason:  # since they were looked at
+    if "already in use" in reason:  # taken after the check
         return registers_in_use(host, version)
     return Problem(
         "control_not_taken",
@@ -24,12 +24,12 @@ def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem
 
 
 def move_failure(what: str) -> Problem:
-    """A move that was not begun."""
+    """Describe a move that was not begun."""
     return Problem("move_refused", what, "Read the pendant's log and check the configured speed and acceleration")
 
 
 def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
-    """A payload that the states do not show, and nothing says why."""
+    """Describe a payload that the states do not show, for an unknown reason."""
     return Problem(
         "payload_not_set",
         f"the controller uses a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
@@ -38,29 +38,29 @@ def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
 
 
 def link_lost(what: str) -> Problem:
-    """No state can come any more."""
+    """Describe a connection over which no state can come any more."""
     return Problem("arm_link_lost", what, LINK_REMEDY)
 
 
-def payload_changed(ours: Packet, theirs: Packet) -> Problem:
-    """Somebody has set another payload since ours."""
+def payload_changed(ours: StatePacket, theirs: StatePacket) -> Problem:
+    """Describe a payload that another program has set since ours."""
 
-    def words(packet: Packet) -> str:
-        centre = ", ".join(f"{1e3 * each:.0f}" for each in packet.payload_centre_m)
+    def show(packet: StatePacket) -> str:
+        centre = ", ".join(f"{1e3 * coordinate_m:.0f}" for coordinate_m in packet.payload_centre_m)
         return f"{packet.payload_kg:g} kg at ({centre}) mm"
 
     return Problem(
         "payload_changed",
-        f"the controller reckons with a payload of {words(theirs)} instead of {words(ours)}: somebody has set another",
+        f"the controller reckons with a payload of {show(theirs)} instead of {show(ours)}: somebody has set another",
         "Find what sets it (a URCap of a gripper, another client, the pendant) and end it, then start again",
     )
 
 
 def connection_failure(host: str, error: OSError) -> Problem:
-    """Why no states come from the controller at `host`."""
-    if isinstance(error, Disbelieved):
+    """Describe why no states come from the controller at `host`."""
+    if isinstance(error, ImpossibleState):
         return error.problem
-    if isinstance(error, NotSpoken):
+    if isinstance(error, NotSupported):
         return series_problem(host, error.version) or Problem(
             "controller_too_old",
             f"the controller at {host} does not know {error.what}; its software is {version_text(error.version)}",

@@ -1,4 +1,4 @@
-"""The parent's end of the supervised child: starts it, passes messages on, and notices when it falls silent."""
+"""The parent's end of the supervised child: it starts the child, passes messages on, and detects its silence."""
 
 import multiprocessing
 import os
@@ -14,17 +14,17 @@ from rig.data.processes.silence import Silence
 from rig.errors import Problem
 from rig.turners.ur.child import process as child
 from rig.turners.ur.child.client_problems import LINK_REMEDY
-from rig.turners.ur.controller.listener import address, listener
+from rig.turners.ur.controller.listener import find_listener, resolve_address
 from rig.turners.ur.controller.rtde_packages import PORT
-from rig.turners.ur.messages import Alive, Heartbeat, Message, Request
+from rig.turners.ur.messages import Alive, ChildHeartbeat, Message, Request
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
-SPARED = 4  # … and at most so many times that, when the main thread in question is ready to run and gets no processor
+SPARED = 4  # factor on these limits while the main thread in question is ready to run but gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
-LINK_S = 0.8  # the same of a controller elsewhere, by what has not come: no crowd on this machine holds that one up
-STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
-CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
+LINK_S = 0.8  # silence of a remote controller, whose pace does not depend on the load of this machine
+STALE_TICKS = 2  # a child that ends after 0.1 s without a new state had lost the arm before
+CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # exit statuses of the client after the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
 
 
@@ -48,10 +48,10 @@ class ChildLink:
         self._sending = threading.Lock()
         self._patient = False
         self._silent = Silence(0, spared=SPARED)  # no message; counted once the child runs
-        self._beaten = False  # there was a heartbeat since the guard's last tick
+        self._beaten = False  # whether a heartbeat came since the guard's last tick
         self._frozen = Silence(0, spared=SPARED)  # heartbeats, but no new state
-        self._silent_s = 0.0  # nothing has come from the controller for so long
-        self._elsewhere = False  # it has processors of its own
+        self._silent_s = 0.0  # time without data from the controller
+        self._is_remote = False  # whether the controller runs on another machine
         context = multiprocessing.get_context("spawn")
         self._pipe: Connection[Request, Message]
         self._pipe, self._child_pipe = context.Pipe()
@@ -67,22 +67,22 @@ class ChildLink:
         )
 
     def start(self) -> None:
-        """Start the child; `on_message` gets `Connected` or `Failed`."""
-        found = address(self._host)
-        self._elsewhere = found is None or not found.is_loopback
-        if found is not None and not self._elsewhere and (controller := listener(found, PORT)) is not None:
-            self._frozen = Silence(controller, spared=SPARED, thread=controller)
-        with _interrupts_held():
+        """Start the child; `on_message` gets `Connected` or `RequestFailed`."""
+        ip = resolve_address(self._host)
+        self._is_remote = ip is None or not ip.is_loopback
+        if ip is not None and not self._is_remote and (controller_pid := find_listener(ip, PORT)) is not None:
+            self._frozen = Silence(controller_pid, spared=SPARED, thread=controller_pid)
+        with _block_interrupts():
             self._process.start()
         self._child_pipe.close()
         assert self._process.pid is not None
-        # Its main thread sends the heartbeats; the client's own threads may wait for a processor as long as they like.
+        # Its main thread sends the heartbeats; delays of the client's own threads do not count.
         self._silent = Silence(self._process.pid, spared=SPARED, thread=self._process.pid)
         for thread in self._threads:
             thread.start()
 
     def send(self, request: Request) -> None:
-        """Pass a request to the child; a child that is gone is noticed by the reader, so that is no error here."""
+        """Pass a request to the child; if the child has ended, the reader reports it."""
         with self._sending:
             try:
                 self._pipe.send(request)
@@ -91,7 +91,9 @@ class ChildLink:
 
     @contextmanager
     def patience(self) -> Iterator[None]:
-        """Allow the child a long silence inside: it starts, or a constructor of the client holds its interpreter."""
+        """Tolerate a long silence inside the block: the child starts, or a constructor of the client holds its
+        interpreter.
+        """
         self._patient = True
         try:
             yield
@@ -106,7 +108,7 @@ class ChildLink:
         return self._ended.is_set()
 
     def close(self) -> None:
-        """End the child and both threads; an arm that is held must have been stopped before."""
+        """End the child and both threads. Stop an arm under control before."""
         self._ended.set()
         if self._process.pid is None:
             self._pipe.close()
@@ -117,7 +119,7 @@ class ChildLink:
             if thread is not threading.current_thread():
                 thread.join(1.0)
         self._pipe.close()
-        with suppress(ValueError):  # killed, but held up by the system: it ends when that lets it go
+        with suppress(ValueError):  # killed, but still in a system call; it ends with that
             self._process.close()
 
     def kill(self) -> None:
@@ -130,7 +132,7 @@ class ChildLink:
             while True:
                 message = self._pipe.recv()
                 self._silent.heard()
-                if isinstance(message, Heartbeat):
+                if isinstance(message, ChildHeartbeat):
                     self._beaten, self._silent_s = True, message.silent_s
                     if message.states:
                         self._frozen.heard()
@@ -154,12 +156,12 @@ class ChildLink:
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             frozen = self._frozen.lasts_over(PATIENT_TICKS if self._patient else FROZEN_TICKS)
-            if frozen or (self._elsewhere and not self._patient and self._silent_s > LINK_S):
+            if frozen or (self._is_remote and not self._patient and self._silent_s > LINK_S):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
     def _say_alive(self) -> None:
-        """Tell the child that somebody is there; never wait for it: a child that does not listen is to be noticed."""
+        """Tell the child that its parent lives; never wait: a child that does not read must be detected."""
         if not self._sending.acquire(blocking=False):
             return
         try:
@@ -171,7 +173,7 @@ class ChildLink:
             self._sending.release()
 
     def _give_up(self, name: str, what: str) -> None:
-        """End a child that cannot be trusted any more: a client that reconnects uploads its script again."""
+        """End an unresponsive child: a client that reconnects uploads its script again."""
         self._ended.set()
         self._process.kill()
         self._lose(name, what)
@@ -181,25 +183,25 @@ class ChildLink:
 
 
 def _readable(pipe: "Connection[Request, Message]") -> bool:
-    """Whether a message lies in the pipe that this process has not come to; False where the system cannot be asked."""
+    """Return whether a message waits in the pipe; False if the system cannot tell."""
     return os.name == "posix" and bool(select.select([pipe.fileno()], [], [], 0)[0])
 
 
 def _writable(pipe: "Connection[Request, Message]") -> bool:
-    """Whether the pipe takes a message at once; where the system cannot be asked, it is taken for granted."""
+    """Return whether the pipe takes a message at once; True if the system cannot tell."""
     if os.name != "posix":
         return True
     return bool(select.select([], [pipe.fileno()], [], 0)[1])
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back, so that a child born inside never sees one; it is delivered here afterwards."""
+def _block_interrupts() -> Iterator[None]:
+    """Block Ctrl-C, so that a child started inside never gets it; the parent gets it afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

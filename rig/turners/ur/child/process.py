@@ -1,9 +1,9 @@
-"""The supervised process: the only place where the `ur_rtde` client lives.
+"""The supervised process, the only place of the `ur_rtde` client.
 
-The client can block for minutes, loop or crash the interpreter when a connection is lost; here that harms nothing but
-this process. The main thread reads states and sends heartbeats and never waits for the client; other threads serve the
-parent's requests, so that a stop is heard while a move runs, and watch for the end of a move. When the parent is gone
-the arm is stopped and the process ends.
+After a lost connection the client can block for minutes, loop or crash the interpreter; here that harms only this
+process. The main thread reads states and sends heartbeats and never waits for the client; other threads serve the
+parent's requests, so that a stop is served during a move, and watch for the end of a move. If the parent is gone, the
+arm is stopped and the process ends.
 """
 
 import os
@@ -28,25 +28,25 @@ from rig.turners.ur.child.client_problems import (
     payload_changed,
     payload_failure,
 )
-from rig.turners.ur.controller.registers import UPPER, free_half, registers_in_use
-from rig.turners.ur.controller.state_stream import Packet, StateStream
+from rig.turners.ur.controller.registers import UPPER, find_free_half, registers_in_use
+from rig.turners.ur.controller.state_stream import StatePacket, StateStream
 from rig.turners.ur.messages import (
     Braked,
+    BrakeRequest,
+    ChildHeartbeat,
     Connected,
     ControlTaken,
     Disturbed,
-    Failed,
-    Heartbeat,
     Message,
-    Move,
     MoveFinished,
+    MoveRequest,
     MoveStarted,
     Request,
+    RequestFailed,
     ScriptStarted,
-    Stop,
     TakeControl,
 )
-from rig.turners.ur.stopping.stop import BRAKE_RAD_S2, STOP_S, Order
+from rig.turners.ur.stopping.stop import BRAKE_RAD_S2, STOP_S, StopOrder
 from rig.turners.ur.stopping.stop_paths import stop_paths
 
 HEARTBEAT_S = 0.01
@@ -54,18 +54,18 @@ MOVE_POLL_S = 0.003
 FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
-PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
-ABANDON_S = 5.0  # the last stop, over the controller's own ports or else over the client, has so long
+PARENT_SPARED = 2  # factor on that limit while the parent gets no processor
+ABANDON_S = 5.0  # time for the last stop, over the controller's own ports or else over the client
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
 PAYLOAD_TOLERANCE_KG, CENTRE_TOLERANCE_M = 0.01, 0.001
-REGISTERS_S = 2.0  # the controller has so long to say which registers are free
-SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client
+REGISTERS_S = 2.0  # time for the controller to report its free registers
+SILENCE_S = 0.8  # after a longer silence the controller may have lost the client
 
 
 def main(
     pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, robot_api_port: int, log: str | None
 ) -> None:
-    """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
+    """Run until the parent ends the process or disappears. `log` names the file for the client's own output."""
     _outlive_the_parent()
     _send_output_to(log)
     child = _Child(pipe, host, state_rate_hz, robot_api_port)
@@ -78,7 +78,7 @@ def main(
         try:
             child.connect()
         except OSError as error:
-            child.send(Failed(connection_failure(host, error)))
+            child.send(RequestFailed(connection_failure(host, error)))
             requests.join()  # the parent reads this and ends the process
         child.stream()
     except BaseException:
@@ -95,12 +95,12 @@ class _Child:
         self._robot_api_port = robot_api_port
         self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
-        self._states: StateStream  # these two once it is connected
-        self._latest: Packet
+        self._states: StateStream  # this and the next: set once connected
+        self._latest: StatePacket
         self._control: Any = None
-        self._carried: Packet | None = None  # as the controller reckons with the payload, once that is set
+        self._carried: StatePacket | None = None  # with the payload that the controller uses, once set
         self._beats = 0  # heartbeats sent
-        self._holds_arm = False  # our program may run on the controller
+        self._holds_arm = False  # whether our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
         self._parent = Silence(os.getppid(), spared=PARENT_SPARED)
@@ -110,11 +110,11 @@ class _Child:
             self._pipe.send(message)
 
     def connect(self) -> None:
-        """Let the controller send its states and wait for the first; `OSError` when none comes."""
+        """Subscribe to the controller's states and wait for the first. Raise `OSError` if none comes."""
         self._states = StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S)
         first = self._latest = self._states.first
         self.send(Connected(self._states.version))
-        self.send(Heartbeat((first.state,)))
+        self.send(ChildHeartbeat((first.state,)))
 
     def stream(self) -> NoReturn:
         """Send every state to the parent, in order, until the parent is gone."""
@@ -131,7 +131,7 @@ class _Child:
             if time.monotonic() - beat_s >= HEARTBEAT_S or problem is not None:
                 beat_s = time.monotonic()
                 try:
-                    self.send(Heartbeat(tuple(batch), self._states.silent_s))
+                    self.send(ChildHeartbeat(tuple(batch), self._states.silent_s))
                     if problem is not None:
                         reported = True
                         self.send(Disturbed(problem))
@@ -140,13 +140,13 @@ class _Child:
                 self._beats += 1
                 batch.clear()
 
-    def _payload_changed(self, packet: Packet) -> Problem | None:
-        """Whether somebody else has set another payload than ours."""
+    def _payload_changed(self, packet: StatePacket) -> Problem | None:
+        """Return the problem if another program has set a payload since ours."""
         ours = self._carried
         if ours is None:
             return None
-        off_m = max(abs(a - b) for a, b in zip(packet.payload_centre_m, ours.payload_centre_m, strict=True))
-        if abs(packet.payload_kg - ours.payload_kg) <= PAYLOAD_TOLERANCE_KG and off_m <= CENTRE_TOLERANCE_M:
+        centre_change_m = max(abs(a - b) for a, b in zip(packet.payload_centre_m, ours.payload_centre_m, strict=True))
+        if abs(packet.payload_kg - ours.payload_kg) <= PAYLOAD_TOLERANCE_KG and centre_change_m <= CENTRE_TOLERANCE_M:
             return None
         return payload_changed(ours, packet)
 
@@ -161,14 +161,14 @@ class _Child:
                 self._serving = False
         except (EOFError, OSError):  # the parent is gone
             self.abandon()
-        except BaseException:  # without this thread nobody would hear a stop
+        except BaseException:  # without this thread no stop would be served
             traceback.print_exc()
             self.abandon()
 
     def watch_parent(self) -> None:
-        """Stop the arm when the parent has been silent for too long: it hangs, and nobody watches the arm.
+        """Stop the arm if the parent is silent for too long: it hangs, and the arm is unsupervised.
 
-        A thread of its own, because sending states to a parent that does not read them blocks in the end.
+        In a thread of its own, because sending states to a parent that does not read them blocks in the end.
         """
         while True:
             time.sleep(TICK_S)
@@ -180,16 +180,16 @@ class _Child:
     def watch_move(self) -> NoReturn:
         """Report the end of a move.
 
-        A thread of its own: the client answers only when none of its own threads holds it up, and heartbeats must not
+        In a thread of its own: the client answers only between the work of its own threads, and heartbeats must not
         wait for that.
         """
         while True:
             time.sleep(MOVE_POLL_S)
-            before = self._operations_before
-            if before is None:
+            changes_before = self._operations_before
+            if changes_before is None:
                 continue
             status = self._control.getAsyncOperationProgressEx()
-            if status.changeCount() != before and not status.isAsyncOperationRunning():
+            if status.changeCount() != changes_before and not status.isAsyncOperationRunning():
                 self._operations_before = None
                 self.send(MoveFinished())
 
@@ -197,9 +197,9 @@ class _Child:
         match request:
             case TakeControl():
                 self.send(self._take_control(request))
-            case Move():
+            case MoveRequest():
                 self._move(request)
-            case Stop():
+            case BrakeRequest():
                 self._operations_before = None
                 self.send(Braked(self._brake(request.deceleration_rad_s2)))
 
@@ -208,11 +208,11 @@ class _Child:
 
         flags = RTDEControlInterface.FLAG_UPLOAD_SCRIPT.value | RTDEControlInterface.FLAG_NO_EXT_FT.value
         try:
-            half = free_half(self._host, self._states.version, REGISTERS_S)
+            half = find_free_half(self._host, self._states.version, REGISTERS_S)
         except OSError as error:
-            return Failed(link_lost(f"the arm at {self._host} no longer answers ({error})"))
+            return RequestFailed(link_lost(f"the arm at {self._host} no longer answers ({error})"))
         if half is None:
-            return Failed(registers_in_use(self._host, self._states.version))
+            return RequestFailed(registers_in_use(self._host, self._states.version))
         if half == UPPER:
             flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS.value
         self._holds_arm = True
@@ -221,7 +221,7 @@ class _Child:
         except RuntimeError as error:
             self._let_parent_see()
             silent = self._states.silent_s > SILENCE_S
-            return Failed(
+            return RequestFailed(
                 self._link_problem(silent=silent) or control_failure(self._host, self._states.version, str(error))
             )
         self.send(ScriptStarted())
@@ -229,75 +229,75 @@ class _Child:
         return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
-        """Wait until the states show the payload. What else they show is the parent's affair."""
+        """Wait until the states show the payload; the parent judges everything else in them."""
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if (lost := self._link_problem()) is not None:
-                return Failed(lost)
+                return RequestFailed(lost)
             if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
                 self._let_parent_see()
-                return Failed(payload_failure(latest.payload_kg, wanted_kg))
+                return RequestFailed(payload_failure(latest.payload_kg, wanted_kg))
             time.sleep(HEARTBEAT_S)
         self._carried = latest
         return ControlTaken()
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """A link that is lost, if it is: what follows from it is no fault of the arm's."""
+        """Return the problem of a lost link, if any: its consequences are not the arm's faults."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state comes from the arm at {self._host}")
 
     def _let_parent_see(self) -> None:
-        """Wait until the parent has been sent all states that have come so far."""
+        """Wait until all states so far have been sent to the parent."""
         beats, began_s = self._beats, time.monotonic()
         while self._beats < beats + 2 and time.monotonic() - began_s < ABANDON_S:
             time.sleep(HEARTBEAT_S)
 
-    def _move(self, move: Move) -> None:
-        before = self._control.getAsyncOperationProgressEx().changeCount()
+    def _move(self, move: MoveRequest) -> None:
+        changes_before = self._control.getAsyncOperationProgressEx().changeCount()
         try:
             started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
         except (RuntimeError, ValueError) as error:
-            self.send(Failed(move_failure(f"the client refused the move ({error})")))
+            self.send(RequestFailed(move_failure(f"the client refused the move ({error})")))
             return
         if started:
             self.send(MoveStarted())
-            self._operations_before = before
+            self._operations_before = changes_before
         else:
             self._await_state()
-            self.send(Failed(move_failure("the controller did not start the move")))
+            self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for another state: a link that is lost, and not the controller, may be why a move was not begun.
+        """Wait for another state: a lost link, not the controller, may have kept the move from beginning.
 
-        Without one the parent names the link before this ends.
+        Without a state the parent reports the link before this ends.
         """
         latest, began_s = self._latest, time.monotonic()
         while self._latest is latest and time.monotonic() - began_s < ABANDON_S:
             time.sleep(HEARTBEAT_S)
 
     def _brake(self, deceleration_rad_s2: float) -> bool:
-        """Stop the joints and the script; whether the client says that they were."""
+        """Stop the joints and the script; return whether the client confirms it."""
         if self._control is None:
             return False
         try:
-            taken = bool(self._control.stopJ(deceleration_rad_s2))
+            confirmed = bool(self._control.stopJ(deceleration_rad_s2))
             self._control.stopScript()
         except RuntimeError as error:
             print(f"the client could not brake: {error}", file=sys.stderr)
             return False
-        return taken
+        return confirmed
 
     def abandon(self) -> NoReturn:
-        """Stop the arm that nobody supervises any more, and leave.
+        """Stop the arm, which is now unsupervised, and leave.
 
-        Over the client where no port of the controller's own says that the program has ended.
+        Over the client only if no port of the controller confirms the end of the program.
         """
         if self._holds_arm:
-            # The client's own stop may wait for ever for a controller that is gone; the system's alarm ends that.
+            # The client's stop may wait forever for a controller that is gone; the system's alarm ends that.
             signal.setitimer(signal.ITIMER_REAL, ABANDON_S)
-            order = Order(stop_paths(self._host, self._states.version, self._robot_api_port), STOP_S)
-            if not order.program_ended():
+            order = StopOrder(stop_paths(self._host, self._states.version, self._robot_api_port), STOP_S)
+            if not order.await_program_end():
                 print(f"{order.words}; the client brakes", file=sys.stderr)
                 self._brake(BRAKE_RAD_S2)
         _leave(1)
@@ -310,19 +310,19 @@ def _leave(status: int) -> NoReturn:
 
 
 def _outlive_the_parent() -> None:
-    """Signals meant for the whole group must not end the process that has to stop the arm; a closed pipe does.
+    """Ignore signals to the process group, which must not end the process that stops the arm; a closed pipe does.
 
-    SIGTERM stops the arm, and SIGALRM is how `_Child.abandon` ends a stop that does not come back.
+    SIGTERM stops the arm, and SIGALRM ends a stop in `_Child.abandon` that does not return.
     """
     for number in ENDING_SIGNALS:
         if number not in (signal.SIGTERM, getattr(signal, "SIGALRM", None)):
             signal.signal(number, signal.SIG_IGN)
-    if hasattr(os, "setsid"):  # POSIX: a session of its own, which no key and no closed terminal reaches
+    if hasattr(os, "setsid"):  # POSIX: a session of its own, out of reach of keys and of a closed terminal
         os.setsid()
 
 
 def _send_output_to(log: str | None) -> None:
-    """The client writes to stdout and stderr as it likes; stdout belongs to results."""
+    """Redirect stdout and stderr to the log: the client prints to both, and stdout is for results."""
     sink = os.open(os.devnull, os.O_WRONLY) if log is None else open_to_append(log)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()

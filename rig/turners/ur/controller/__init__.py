@@ -1,1 +1,1 @@
-"""The controller's interfaces as the rig uses them: RTDE, dashboard, primary, Robot API."""
+"""The controller's interfaces in use: RTDE, dashboard, primary interface, Robot API."""

@@ -1,8 +1,8 @@
-"""What the controller says to everybody at its primary interface: errors by their code, what ended a program. Pure.
+"""Messages of the controller's primary interface: errors by their code, and ends of programs. Pure.
 
-(Client interface description of the maker: a robot message holds a time stamp, a source and its kind; of an error
-code, kind 6, code, argument, level, a type and a value follow, of a runtime exception, kind 10, line and column, of a
-key message, kind 7, code, argument and a title; then a text.)
+(Client interface description of the maker: a robot message holds a time stamp, a source and its kind. An error code,
+kind 6, continues with code, argument, level, a type and a value; a runtime exception, kind 10, with line and column; a
+key message, kind 7, with code, argument and a title. A text ends each.)
 """
 
 import struct
@@ -13,7 +13,7 @@ from rig.turners.ur.controller.primary import MESSAGE
 
 ERROR_CODE, KEY, EXCEPTION = 6, 7, 10
 ERROR = struct.Struct(">iiiII")  # code, argument, level, type of the value, value
-PLACE = struct.Struct(">ii")  # line, column
+POSITION = struct.Struct(">ii")  # line, column
 TITLED = struct.Struct(">iiB")  # code, argument, length of the title that follows
 STOPPED = b"PROGRAM_XXX_STOPPED"
 READ_ONLY = 210  # the answer to a line of script in local control
@@ -36,20 +36,20 @@ class ErrorCode:
 
 @dataclass(frozen=True, slots=True)
 class ProgramException:
-    """Why the controller ended a program."""
+    """The controller's reason for ending a program."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramStopped:
-    """A program of that name has ended, for whatever reason."""
+    """The end of the program of that name, for whatever reason."""
 
     program: str
 
 
-def words_in(message: bytes) -> ErrorCode | ProgramException | ProgramStopped | None:
-    """What a robot message says; None for one that is none of these, or is cut short."""
+def decode_message(message: bytes) -> ErrorCode | ProgramException | ProgramStopped | None:
+    """Decode a robot message; return None for one of another kind, or one cut short."""
     if len(message) < MESSAGE.size:
         return None
     kind, rest = MESSAGE.unpack_from(message)[2], message[MESSAGE.size :]
@@ -59,10 +59,10 @@ def words_in(message: bytes) -> ErrorCode | ProgramException | ProgramStopped | 
     if kind == KEY and len(rest) >= TITLED.size:
         title, text = rest[TITLED.size :][: rest[TITLED.size - 1]], rest[TITLED.size + rest[TITLED.size - 1] :]
         return ProgramStopped(_text(text)) if title == STOPPED else None
-    if kind == EXCEPTION and len(rest) >= PLACE.size:
-        return ProgramException(_text(rest[PLACE.size :]))
+    if kind == EXCEPTION and len(rest) >= POSITION.size:
+        return ProgramException(_text(rest[POSITION.size :]))
     return None
 
 
-def _text(told: bytes) -> str:
-    return printable(told.decode(errors="replace").strip())[:TEXT]
+def _text(data: bytes) -> str:
+    return printable(data.decode(errors="replace").strip())[:TEXT]

@@ -1,4 +1,4 @@
-"""The arm's dashboard server over plain TCP: the stop path that does not depend on `ur_rtde`."""
+"""The arm's dashboard server over plain TCP: the stop path that is independent of `ur_rtde`."""
 
 import socket
 import time
@@ -9,15 +9,15 @@ from rig.errors.quoting import printable
 
 DASHBOARD_PORT = 29999
 GREETING = "Connected:"
-STOPPED, FAILED = "Stopped", "Failed to execute"  # the answers to `stop`, beside that it is not allowed
-ANSWER = 160  # characters of an answer that are repeated
+STOPPED, FAILED = "Stopped", "Failed to execute"  # answers to `stop`; a refusal is a sentence
+ANSWER = 160  # characters of an answer in a message
 LINE_BYTES = 4096  # the longest answer has some dozens
 
 
 class Dashboard:
     """One connection to the dashboard server of the controller at `host`.
 
-    Every method raises `OSError` when the controller does not answer a command within `timeout_s`.
+    Every method raises `OSError` if the controller does not answer a command within `timeout_s`.
     """
 
     name = "dashboard"
@@ -27,13 +27,13 @@ class Dashboard:
         self.refusal: str | None = None
         self.acknowledged = False
         self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
-        self._heard = bytearray()
+        self._received = bytearray()
         self._timeout_s = timeout_s
 
     def ask(self, command: str) -> str:
         """Send one command and return the controller's answer, without the line end.
 
-        The first command does not wait for the greeting: a controller that is slow to greet still finds the `stop`.
+        The first command does not wait for the greeting, so that a `stop` also reaches a controller that greets slowly.
         """
         deadline_s = time.monotonic() + self._timeout_s
         self._socket.sendall(command.encode() + b"\n")
@@ -44,8 +44,8 @@ class Dashboard:
     def stop_program(self) -> None:
         """Stop the running program, and with it the arm.
 
-        In local control it refuses in a sentence. Where no program runs it may fail to execute the command, which is
-        no refusal.
+        In local control it refuses in a sentence. Without a running program it may fail to execute the command, which
+        is no refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED
@@ -53,23 +53,23 @@ class Dashboard:
             self.refusal = f'"{answer[:ANSWER]}"'
 
     def program_running(self) -> bool:
-        """Whether any program runs on the controller."""
+        """Return whether any program runs on the controller."""
         return self.ask("running").lower().endswith("true")
 
-    def in_remote_control(self) -> bool | None:
-        """Whether the pendant has handed control over; None when the controller does not know the question."""
+    def is_in_remote_control(self) -> bool | None:
+        """Return whether the pendant is in remote control; None if the controller does not know the command."""
         return {"true": True, "false": False}.get(self.ask("is in remote control").lower())
 
     def polyscope(self) -> str:
-        """The controller's software version, as it says it."""
+        """Return the controller's software version, as it states it."""
         return self.ask("PolyscopeVersion")
 
     def serial_number(self) -> str:
-        """The arm's serial number."""
+        """Return the arm's serial number."""
         return self.ask("get serial number")
 
     def robot_model(self) -> str:
-        """What it calls the arm; other words from one that does not know the question."""
+        """Return the arm's name; an error text from a controller that does not know the command."""
         return self.ask("get robot model")
 
     def close(self) -> None:
@@ -84,17 +84,17 @@ class Dashboard:
         self.close()
 
     def _line(self, deadline_s: float) -> str:
-        while b"\n" not in self._heard:
-            left_s = deadline_s - time.monotonic()
-            if left_s <= 0.0:
+        while b"\n" not in self._received:
+            remaining_s = deadline_s - time.monotonic()
+            if remaining_s <= 0.0:
                 raise TimeoutError("the dashboard server does not answer in time")
-            if len(self._heard) > LINE_BYTES:
+            if len(self._received) > LINE_BYTES:
                 raise ConnectionError("this is no dashboard server")
-            self._socket.settimeout(left_s)
+            self._socket.settimeout(remaining_s)
             data = self._socket.recv(LINE_BYTES)
             if not data:
                 raise ConnectionError("the dashboard server closed the connection")
-            self._heard += data
-        line, _, rest = self._heard.partition(b"\n")
-        self._heard = rest
+            self._received += data
+        line, _, rest = self._received.partition(b"\n")
+        self._received = rest
         return printable(line.decode(errors="replace").strip())

@@ -1,4 +1,4 @@
-"""Which process of this machine listens at an address: a simulated controller has to share the machine's processors."""
+"""The process of this machine that listens at an address: a simulated controller shares the machine's processors."""
 
 import socket
 from collections.abc import Iterator
@@ -10,26 +10,26 @@ LISTENS = "0A"  # the state of a socket in the system's table
 PROC = Path("/proc")
 
 
-def address(host: str) -> IPv4Address | None:
-    """The address of a host by its name; None where nobody knows one."""
+def resolve_address(host: str) -> IPv4Address | None:
+    """Return the IPv4 address of a host name; None if it cannot be resolved."""
     try:
         return IPv4Address(socket.gethostbyname(host))
     except OSError:
         return None
 
 
-def is_here(host: str) -> bool:
-    """Whether a host is this machine by a loopback address."""
-    found = address(host)
-    return found is not None and found.is_loopback
+def is_loopback(host: str) -> bool:
+    """Return whether a host is this machine by a loopback address."""
+    ip = resolve_address(host)
+    return ip is not None and ip.is_loopback
 
 
-def listener(host: IPv4Address, port: int) -> int | None:
-    """The process that listens at that address.
+def find_listener(host: IPv4Address, port: int) -> int | None:
+    """Return the id of the process that listens at that address.
 
-    None where proc(5) does not tell: on other systems than Linux, of another user's processes, in another container.
+    None if proc(5) does not show it: on systems other than Linux, for another user's processes, in another container.
     """
-    addresses = {f"{int.from_bytes(each.packed, 'little'):08X}:{port:04X}" for each in (host, IPv4Address(0))}
+    addresses = {f"{int.from_bytes(ip.packed, 'little'):08X}:{port:04X}" for ip in (host, IPv4Address(0))}
     with suppress(OSError):
         for row in (PROC / "net" / "tcp").read_text().splitlines()[1:]:
             _, address, _, state, _, _, _, _, _, inode, *_ = row.split()
@@ -41,6 +41,10 @@ def listener(host: IPv4Address, port: int) -> int | None:
 def _holders(file: str) -> Iterator[int]:
     for process in PROC.iterdir():
         if process.name.isdecimal():
-            with suppress(OSError):  # it has ended, or is somebody else's
-                if any(str(held.readlink()) == file for held in (process / "fd").iterdir() if held.is_symlink()):
+            with suppress(OSError):  # it has ended, or belongs to another user
+                if any(
+                    str(descriptor.readlink()) == file
+                    for descriptor in (process / "fd").iterdir()
+                    if descriptor.is_symlink()
+                ):
                     yield int(process.name)

@@ -1,11 +1,11 @@
-"""What the controller says of its arm and of its tool's frame: primary interface, port 30001. Receives only.
+"""The controller's description of its arm and of its tool's frame: primary interface, port 30001. Receives only.
 
-Every UR is measured in the factory, and its controller reckons with what was found. (Client interface description of
-the maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, holds
+Every UR is measured in the factory, and its controller computes with the result. (Client interface description of the
+maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, holds
 sub-packages of the same form. Of these KinematicsInfo, type 5, and Configuration Data, type 6, are sent once after
-connecting: how the factory measured this arm, and for which arm the controller is set up; Cartesian Info, type 4, in
-every state: the tool centre point's pose, and where it stands in the flange's frame. A robot message, type 20, holds a
-time stamp, a source and its kind; the version message, kind 3, is sent once after connecting.)
+connecting: the factory's measurement of this arm, and the arm that the controller is set up for; Cartesian Info, type
+4, in every state: the tool centre point's pose in the base's frame and in the flange's. A robot message, type 20, holds
+a time stamp, a source and its kind; the version message, kind 3, is sent once after connecting.)
 """
 
 import socket
@@ -25,20 +25,20 @@ HEADER = struct.Struct(">iB")
 ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO, CONFIGURATION_DATA = 16, 4, 5, 6
 ROBOT_MESSAGE, VERSION_MESSAGE = 20, 3
 MESSAGE = struct.Struct(">QbB")  # time stamp, source, kind
-VERSION = struct.Struct(">BBii")  # major, minor, bugfix, build; the project's name comes before, the date after
-KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; how well it was calibrated
+VERSION = struct.Struct(">BBii")  # major, minor, bugfix, build; between the project's name and the date
+KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; quality of the calibration
 CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
-# Of each joint least and greatest angle; of each speed and acceleration; defaults; a, d, α, θ; boards, type, sub-type.
+# Per joint: least and greatest angle; speed and acceleration; then defaults; a, d, α, θ; boards, type, sub-type.
 CONFIGURATION = struct.Struct(">12d 12d 5d 6d 6d 6d 6d 4i".replace(" ", ""))
 SIZE_MAX = 1 << 20  # a robot state has some 1500 bytes
-VALUE_MAX = 1e4  # m or rad: axes that are almost parallel meet some hundred metres away, which stands in a calibration
+VALUE_MAX = 1e4  # m or rad: a calibration of almost parallel axes has lengths of some hundred metres
 
 
 @dataclass(frozen=True, slots=True)
-class Account:
-    """The arm's geometry, where its tool centre point stands in the flange's frame, and which arm it is.
+class ArmDescription:
+    """The arm's geometry, its tool centre point in the flange's frame, its setup, and the controller's software.
 
-    `software` is the controller's, in its own words. None where it is not told.
+    None for items that the controller has not sent.
     """
 
     kinematics: DenavitHartenberg | None = None
@@ -48,16 +48,16 @@ class Account:
 
     @property
     def complete(self) -> bool:
-        """Whether all is told that a look waits for; the software is told before it, or never."""
+        """Whether all items to wait for are there; the software comes before them, or never."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 
-def read_account(host: str, timeout_s: float) -> Account:
-    """What the controller at `host` tells within `timeout_s`. Raises `OSError`."""
-    deadline_s, buffer, account = time.monotonic() + timeout_s, bytearray(), Account()
+def read_description(host: str, timeout_s: float) -> ArmDescription:
+    """Read the description from the controller at `host` within `timeout_s`. Raise `OSError`."""
+    deadline_s, buffer, description = time.monotonic() + timeout_s, bytearray(), ArmDescription()
     with socket.create_connection((host, PORT), timeout_s) as connection:
-        while not account.complete and (left_s := deadline_s - time.monotonic()) > 0:
-            connection.settimeout(left_s)
+        while not description.complete and (remaining_s := deadline_s - time.monotonic()) > 0:
+            connection.settimeout(remaining_s)
             try:
                 data = connection.recv(65536)
             except TimeoutError:
@@ -67,32 +67,32 @@ def read_account(host: str, timeout_s: float) -> Account:
             buffer += data
             for kind, payload in packages(buffer):
                 if kind == ROBOT_STATE:
-                    account = _completed(account, payload)
+                    description = _add_state(description, payload)
                 elif kind == ROBOT_MESSAGE and (software := _software(payload)):
-                    account = replace(account, software=software)
-    return account
+                    description = replace(description, software=software)
+    return description
 
 
-def _completed(account: Account, state: bytes) -> Account:
-    """The account with what a robot state says, as far as it can be so."""
+def _add_state(description: ArmDescription, state: bytes) -> ArmDescription:
+    """Return the description with the valid sub-packages of a robot state added."""
     for kind, payload in packages(bytearray(state)):
         if kind == KINEMATICS_INFO and (values := _numbers(KINEMATICS, payload)[6:30]):
-            told = DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
-            account = replace(account, kinematics=told)
+            kinematics = DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
+            description = replace(description, kinematics=kinematics)
         elif kind == CARTESIAN_INFO and (values := _numbers(CARTESIAN, payload)[6:]):
-            account = replace(account, tcp_offset=values)
+            description = replace(description, tcp_offset=values)
         elif kind == CONFIGURATION_DATA and (setup := _setup(payload)):
-            account = replace(account, setup=setup)
-    return account
+            description = replace(description, setup=setup)
+    return description
 
 
 def _setup(payload: bytes) -> ArmSetup | None:
-    """The setup in a package of configuration data; None where it is too short, or no arm is made so."""
+    """Decode a package of configuration data; return None if it is too short or its values are impossible."""
     if len(payload) < CONFIGURATION.size:
         return None
     values = CONFIGURATION.unpack_from(payload)
     limits, drawing, robot_type = values[:24], values[29:53], values[55]
-    if any(map(isnan, limits)) or not all(abs(each) <= VALUE_MAX for each in drawing):
+    if any(map(isnan, limits)) or not all(abs(length) <= VALUE_MAX for length in drawing):
         return None
     least, greatest = limits[0:12:2], limits[1:12:2]
     speed, acceleration = limits[12::2], limits[13::2]
@@ -103,7 +103,7 @@ def _setup(payload: bytes) -> ArmSetup | None:
 
 
 def _software(message: bytes) -> str | None:
-    """Name, version and date in a version message, as a dashboard says them; None for any other message."""
+    """Return name, version and date of a version message in the dashboard's form; None for any other message."""
     if len(message) <= MESSAGE.size or MESSAGE.unpack_from(message)[2] != VERSION_MESSAGE:
         return None
     name_end = MESSAGE.size + 1 + message[MESSAGE.size]
@@ -115,13 +115,15 @@ def _software(message: bytes) -> str | None:
 
 
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
-    """The numbers of a payload, whole ones first; none when it is too short for them, or no arm is made so."""
+    """Decode the numbers of a payload; return none if it is too short or a value is impossible."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
-    return values if all(isinstance(each, int) or abs(each) <= VALUE_MAX for each in values) else ()
+    return values if all(isinstance(value, int) or abs(value) <= VALUE_MAX for value in values) else ()
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """The whole packages at the beginning of the bytes, taken from them. Raises `ConnectionError` for other bytes."""
+    """Remove the complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other
+    bytes.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= SIZE_MAX:

@@ -1,9 +1,9 @@
-"""The script line that ends a program, by the primary interface over plain TCP: a stop that no PolyScope is without.
+"""The script line that ends a program, sent to the primary interface over plain TCP: a stop in every PolyScope.
 
 The controller itself reads it, not the program on its screen that serves the dashboard. It takes lines in remote
-control only, and acknowledges none; in local control it answers each by an error, C210. What it sends ten times a
-second tells whether a program runs. (The maker's client library, `PrimaryClient::commandStop`; client interface
-description: robot mode data, sub-package 0 of a robot state.)
+control only, and acknowledges none; in local control it answers each by an error, C210. Its states, ten a second, show
+whether a program runs. (The maker's client library, `PrimaryClient::commandStop`; client interface description: robot
+mode data, sub-package 0 of a robot state.)
 """
 
 import socket
@@ -11,7 +11,7 @@ import struct
 import time
 from collections.abc import Iterator
 
-from rig.turners.ur.controller.controller_words import READ_ONLY, ErrorCode, ProgramStopped, words_in
+from rig.turners.ur.controller.controller_words import READ_ONLY, ErrorCode, ProgramStopped, decode_message
 from rig.turners.ur.controller.primary import PORT, ROBOT_MESSAGE, ROBOT_STATE, packages
 
 ROBOT_MODE_DATA = 0
@@ -22,23 +22,23 @@ MODE_DATA = struct.Struct(">Q7?")
 class PrimaryStop:
     """One connection to the primary interface of the controller at `host`.
 
-    Every method raises `OSError` when the controller does not answer within `timeout_s`.
+    Every method raises `OSError` if the controller does not answer within `timeout_s`.
     """
 
     name = "primary interface"
     tells_of_programs = True
-    acknowledged = False  # it never does
+    acknowledged = False  # the interface acknowledges nothing
 
     def __init__(self, host: str, timeout_s: float) -> None:
         self.refusal: str | None = None
-        self.stopped_programs: set[str] = set()  # of which it has said that they ended, by their names
+        self.stopped_programs: set[str] = set()  # names of programs that it reported as ended
         self._socket = socket.create_connection((host, PORT), timeout_s)
         self._timeout_s = timeout_s
         self._buffer = bytearray()
         self._greeted = False
 
     def send(self, script: str) -> None:
-        """Hand the controller a script of whole lines; it does not say whether it takes them."""
+        """Send a script of complete lines, without acknowledgement."""
         self._socket.settimeout(self._timeout_s)
         self._socket.sendall(script.encode())
 
@@ -47,20 +47,20 @@ class PrimaryStop:
         self.send("stop program\n")
 
     def program_running(self) -> bool:
-        """Whether any program runs on the controller or is paused there, by the next state that it sends.
+        """Return whether any program runs or is paused on the controller, by its next state.
 
-        The first state is passed over: it may be older than what was sent to the controller.
+        The first state is skipped: it may be older than the last script.
         """
         deadline_s = time.monotonic() + self._timeout_s
         while True:
-            for running in self._told():
+            for running in self._decode_states():
                 if self._greeted:
                     return running
                 self._greeted = True
-            left_s = deadline_s - time.monotonic()
-            if left_s <= 0.0:
+            remaining_s = deadline_s - time.monotonic()
+            if remaining_s <= 0.0:
                 raise TimeoutError("the primary interface does not tell in time whether a program runs")
-            self._socket.settimeout(left_s)
+            self._socket.settimeout(remaining_s)
             data = self._socket.recv(65536)
             if not data:
                 raise ConnectionError("the primary interface closed the connection")
@@ -69,11 +69,11 @@ class PrimaryStop:
     def close(self) -> None:
         self._socket.close()
 
-    def _told(self) -> Iterator[bool]:
-        """What the states that have come say, oldest first."""
+    def _decode_states(self) -> Iterator[bool]:
+        """Yield, oldest first, whether a program runs or is paused in the received states."""
         for kind, payload in packages(self._buffer):
             if kind == ROBOT_MESSAGE:
-                match words_in(payload):
+                match decode_message(payload):
                     case ErrorCode(code=code) as error if code == READ_ONLY:
                         self.refusal = f"{error.words}: it is read-only in local control"
                     case ProgramStopped(program):

@@ -1,7 +1,7 @@
-"""The Robot API of a PolyScope X, HTTP at port 80: asked for what nothing else tells, and told to stop the program.
+"""The Robot API of a PolyScope X, HTTP at port 80: for items that no other interface reports, and for the stop.
 
-(The maker's client library, `DashboardClientImplX`: programs are stopped from 10.11 on, the control mode is told from
-10.12 on, the serial number from 10.14 on. In local control an order is answered by 403.)
+(The maker's client library, `DashboardClientImplX`: programs are stopped from 10.11 on, the control mode is reported
+from 10.12 on, the serial number from 10.14 on. In local control an order is answered by 403.)
 """
 
 import json
@@ -19,23 +19,23 @@ SINCE = (10, 11)  # versions before it have none
 PROGRAM = "/program/v1/state"
 CONTROL_MODE, INFORMATION = "/system/v1/controlmode", "/system/v1/information"
 ANSWER_BYTES = 1 << 16
-REDIRECTED = 3  # times at most: some questions have moved from one version to the next
+REDIRECTED = 3  # most redirections: some paths have moved between versions
 MOVED = (301, 302, 307, 308)
 WORD, ANSWER = 60, 160  # characters of an answer
 
 
 class RobotApi:
-    """The Robot API at `host` and `port`; None for an answer where there is none within `timeout_s`."""
+    """The Robot API at `host` and `port`; an answer is None if none comes within `timeout_s`."""
 
     def __init__(self, host: str, port: int, timeout_s: float) -> None:
         self._host, self._port, self._timeout_s = host, port, timeout_s
 
-    def in_remote_control(self) -> bool | None:
-        """Whether the pendant has handed control over."""
+    def is_in_remote_control(self) -> bool | None:
+        """Return whether the pendant is in remote control."""
         return {"REMOTE": True, "LOCAL": False}.get(self._word(CONTROL_MODE, "mode") or "")
 
     def serial_number(self) -> str | None:
-        """The arm's serial number."""
+        """Return the arm's serial number."""
         return self._word(INFORMATION, "serialNumber")
 
     def _word(self, question: str, key: str) -> str | None:
@@ -53,9 +53,9 @@ class RobotApi:
         return body
 
     def request(self, method: str, path: str, order: Mapping[str, str] | None = None) -> tuple[int, bytes]:
-        """Status and body of an answer; what has moved is followed on the same controller.
+        """Send a request and return status and body of the answer; follow redirections on the same controller.
 
-        Raises `OSError` and `HTTPException` where there is none.
+        Raise `OSError` and `HTTPException` if none comes.
         """
         body = None if order is None else json.dumps(order)
         headers = {"Accept": "application/json", **({} if body is None else {"Content-Type": "application/json"})}
@@ -63,17 +63,17 @@ class RobotApi:
             with closing(HTTPConnection(self._host, self._port, timeout=self._timeout_s)) as connection:
                 connection.request(method, path, body, headers)
                 answer = connection.getresponse()
-                place = answer.getheader("Location")
-                if answer.status not in MOVED or not place:
+                location = answer.getheader("Location")
+                if answer.status not in MOVED or not location:
                     return answer.status, answer.read(ANSWER_BYTES)
-                path = urlsplit(place).path
+                path = urlsplit(location).path
         raise HTTPException("it is moved on and on")
 
 
 class RobotApiStop:
-    """The order to end the program, by the Robot API at `host` and `port`, as a way to stop an arm.
+    """The order to end the program, by the Robot API at `host` and `port`, as one path of a stop.
 
-    What it says of programs is not asked: nobody has told whether it knows of those that clients send.
+    Its report on programs is not used: whether it includes those of clients is undocumented.
     """
 
     name = "Robot API"
@@ -85,7 +85,7 @@ class RobotApiStop:
         self._api = RobotApi(host, port, timeout_s)
 
     def stop_program(self) -> None:
-        """Stop the running program, and with it the arm. Raises `OSError` where no answer comes."""
+        """Stop the running program, and with it the arm. Raise `OSError` if no answer comes."""
         try:
             status, body = self._api.request("PUT", BASE + PROGRAM, {"action": "stop"})
         except HTTPException as error:
@@ -95,18 +95,18 @@ class RobotApiStop:
             self.refusal = " ".join(filter(None, (f"HTTP status {status}", _message(body))))
 
     def program_running(self) -> bool:
-        """Whether a program runs is not told. Raises `ConnectionError`."""
+        """Raise `ConnectionError`: the Robot API is not queried for programs."""
         raise ConnectionError("the Robot API is not asked")
 
     def close(self) -> None:
-        """Every exchange has closed its connection."""
+        """Return at once: every exchange has closed its connection."""
 
 
 def _message(body: bytes) -> str:
-    """What an answer says in words."""
+    """Return the message in an answer's body, or ""."""
     try:
-        told = json.loads(body)
+        answer = json.loads(body)
     except (ValueError, RecursionError):
         return ""
-    message = told.get("message") if isinstance(told, dict) else None
+    message = answer.get("message") if isinstance(answer, dict) else None
     return printable(message[:ANSWER]) if isinstance(message, str) else ""

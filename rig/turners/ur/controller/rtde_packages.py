@@ -9,12 +9,14 @@ HEADER = struct.Struct(">HB")
 
 
 def package(kind: str, payload: bytes) -> bytes:
-    """The bytes of one package."""
+    """Return the bytes of one package."""
     return HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
-    """The whole packages at the beginning of the bytes, taken from them. Raises `ConnectionError` for other bytes."""
+    """Remove the complete packages from the start of `buffer` and yield them. Raise `ConnectionError` for other
+    bytes.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if size < HEADER.size:

@@ -1,7 +1,7 @@
-"""Whether a state is one that an arm can be in, and whether it follows the one before in time. Pure.
+"""Checks of a state: is it possible for an arm, and does its time follow the one before. Pure.
 
-A controller whose clock is set while it runs, or whose states are no numbers, cannot be solved afterwards: the times of
-the states are the reference of a recording. So both end a run at once, by name.
+The times of the states are the reference of a recording. A controller whose clock is set during a run, or whose states
+are not finite, leaves it unsolvable; so both end a run at once, by name.
 """
 
 import math
@@ -11,18 +11,18 @@ from itertools import chain
 from rig.errors import Problem
 from rig.motion.state import JOINT_NAMES, ArmState
 
-# No arm turns so far or so fast, or has other modes: a UR3e's wrist 3 turns without end, and counts its turns.
+# Beyond all arms; the angle is large because a UR3e's wrist 3 turns without limit and counts its revolutions.
 ANGLE_RAD, SPEED_RAD_S, MODES = 1e3, 20.0, range(-1, 64)
-# A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is none.
+# A joint of the fastest arm of this kind turns by 6.3 rad/s, and by 3.14 under the rig; three times that is impossible.
 ENCODER_RAD, FASTEST_RAD_S = 0.03, 10.0
-CYCLE_S = 0.002  # of the controller, at whose ends states are made: of a CB3 one is four of these
-OFF_CYCLE = 0.3  # of a period: a time stamp that far from its place is none
-LOST_S = 0.1  # so long states may be missing without anything else that shows it
+CYCLE_S = 0.002  # the controller's cycle, at whose ends states are made: four of these for a CB3
+OFF_CYCLE = 0.3  # fraction of a cycle: a time stamp farther from its cycle is wrong
+LOST_S = 0.1  # longest gap in the states without other evidence of it
 RESTART = "Restart the controller if it happens again"
 
 
 def impossible_state(state: ArmState) -> Problem | None:
-    """Why no arm is in such a state: values that are no numbers, or that no arm and no mode of it has."""
+    """Return the problem of a state with values that are not finite, or impossible for an arm."""
     values = {
         "time": (state.time_s,),
         "speed slider": (state.target_speed_fraction,),
@@ -43,13 +43,13 @@ def impossible_state(state: ArmState) -> Problem | None:
 
 
 def impossible_payload(mass_kg: float, centre_m: Sequence[float]) -> Problem | None:
-    """Why no controller reckons with such a payload: a value of it is no number."""
+    """Return the problem of a payload that is not finite."""
     numbers = (mass_kg, *centre_m)
     return None if all(map(math.isfinite, numbers)) else _impossible(f"its payload is {mass_kg:g} kg at {centre_m} m")
 
 
-def impossible_way(before: ArmState, after: ArmState) -> Problem | None:
-    """Why no arm goes from one state to the next: a joint would have turned farther than any can in that time."""
+def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
+    """Return the problem of two states between which a joint turned farther than any arm can."""
     step_s = abs(after.time_s - before.time_s)
     for name, q1, q2 in zip(JOINT_NAMES, before.q_rad, after.q_rad, strict=True):
         if abs(q2 - q1) > ENCODER_RAD + FASTEST_RAD_S * step_s:
@@ -58,14 +58,14 @@ def impossible_way(before: ArmState, after: ArmState) -> Problem | None:
 
 
 def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float) -> Problem | None:
-    """Why a state's time is not the last one's plus so many periods, of which states may have been lost.
+    """Return the problem of a time that is not a whole number of periods after the last one.
 
-    `missed_s` is for how long, by the controller's clock, states may have been lost of late.
+    `missed_s` is the longest recent gap, by the controller's clock, in which states may have been lost.
     """
     step_s = after_s - before_s
-    whole_s = period_s if _divides(period_s) else CYCLE_S
-    off_s = abs(step_s - max(1, round(step_s / whole_s)) * whole_s)
-    if off_s <= OFF_CYCLE * whole_s and step_s - period_s <= LOST_S + missed_s:
+    step_unit_s = period_s if _divides(period_s) else CYCLE_S
+    error_s = abs(step_s - max(1, round(step_s / step_unit_s)) * step_unit_s)
+    if error_s <= OFF_CYCLE * step_unit_s and step_s - period_s <= LOST_S + missed_s:
         return None
     return Problem(
         "arm_clock_stepped",
@@ -76,7 +76,7 @@ def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float
 
 
 def _divides(period_s: float) -> bool:
-    """Whether a period is made of whole cycles of the controller's; else states come now earlier, now later."""
+    """Return whether a period is a whole number of the controller's cycles; otherwise states jitter."""
     cycles = period_s / CYCLE_S
     return abs(cycles - round(cycles)) < 1e-6
 

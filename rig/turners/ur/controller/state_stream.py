@@ -1,8 +1,8 @@
-"""The arm's states, every one of them: the reading half of RTDE, port 30004, protocol version 2.
+"""The complete stream of the arm's states: the receiving half of RTDE, port 30004, protocol version 2.
 
-The receive interface of `ur_rtde` keeps only the newest packet and does not say when one comes: who is held up for a
-moment, by another thread or by a busy machine, loses states. Here they wait in the socket until they are read. Only
-reading is done here; what drives the arm is `ur_rtde`. (Real-Time Data Exchange guide of the maker.)
+The receive interface of `ur_rtde` keeps only the newest packet and does not signal its arrival: a reader that is
+delayed, by another thread or a busy machine, loses states. Here they wait in the socket until they are read. This
+module only receives; `ur_rtde` drives the arm. (Real-Time Data Exchange guide of the maker.)
 """
 
 import math
@@ -17,17 +17,17 @@ from typing import Self
 
 from rig.errors import Problem
 from rig.motion.state import ArmState
-from rig.turners.ur.controller.listener import is_here
+from rig.turners.ur.controller.listener import is_loopback
 from rig.turners.ur.controller.rtde_packages import PORT, VERSION, package, packages
-from rig.turners.ur.controller.state_checks import clock_step, impossible_payload, impossible_state, impossible_way
+from rig.turners.ur.controller.state_checks import clock_step, impossible_motion, impossible_payload, impossible_state
 
-# Ten seconds at the fastest rate, if the system gives it. What does not fit waits at the controller, and nobody says
-# how long that keeps it.
+# Ten seconds at the fastest rate, if the system grants it. The rest waits at the controller, for an undocumented
+# time.
 ROOM_BYTES = 1 << 20
-CLOCKS_DIFFER = 1.05  # a controller's clock against this computer's: far more than either is off
-SILENT_S = 0.3  # a controller here that was silent for so long may have sent something to nobody
-RECENT_S = 2.0  # states that a network held back come, or are missing, so soon after the gap that it made
-# What is asked for, with the type it must have. Asking for nothing else keeps the packets small.
+CLOCKS_DIFFER = 1.05  # a controller's clock against this computer's: far beyond the error of either
+SILENT_S = 0.3  # after a longer silence a local controller may have sent states without a receiver
+RECENT_S = 2.0  # states delayed or lost by a network show within this after the gap
+# The requested variables and their types. Nothing else is requested, which keeps the packets small.
 VARIABLES = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
@@ -47,24 +47,24 @@ PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the 
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
-    """One packet: the arm's state, and the payload the controller reckons with (kg; m from the flange)."""
+class StatePacket:
+    """One packet: the arm's state, and the payload that the controller uses (kg; m from the flange)."""
 
     state: ArmState
     payload_kg: float
     payload_centre_m: tuple[float, float, float]
 
 
-class NotSpoken(ConnectionError):
-    """The controller answers, but does not know `what` is asked of it; `version` is its software's."""
+class NotSupported(ConnectionError):
+    """A controller that answers, but does not support the requested item `what`; `version` is its software's."""
 
     def __init__(self, what: str, version: tuple[int, ...]) -> None:
         super().__init__(f"it does not know {what}")
         self.what, self.version = what, version
 
 
-class Disbelieved(ConnectionError):
-    """A state that cannot be true, with the `problem` that it is."""
+class ImpossibleState(ConnectionError):
+    """An impossible state, with its `problem`."""
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem.what)
@@ -75,21 +75,21 @@ class StateStream:
     """A connection over which the controller at `host` sends its state at `rate_hz` of its own time."""
 
     def __init__(self, host: str, rate_hz: float, timeout_s: float) -> None:
-        """Connects and waits for the first packet.
+        """Connect and wait for the first packet.
 
-        Raises `OSError` when none comes within `timeout_s`, of it `NotSpoken` when none can come, and `Disbelieved`
-        when no arm is in the state that the first one tells.
+        Raise `OSError` if none comes within `timeout_s`: `NotSupported` if none can come, `ImpossibleState` for a first
+        state that is impossible.
         """
         self._deadline_s = time.monotonic() + timeout_s
         self._buffer = bytearray()
         self._period_s = 1 / rate_hz
-        self.closed = False  # by the controller, or nothing that follows can be believed
-        self.problem: Problem | None = None  # what it has told that cannot be true
-        self.version: tuple[int, ...] = ()  # of the controller's software: major, minor, bugfix, build
-        self.silent_s = 0.0  # nothing has come for so long at least, however late it was looked for
-        self._heard_s = time.monotonic()
-        self._gap_s, self._gap_ended_s = 0.0, self._heard_s  # the longest silence of late, and its end
-        self._elsewhere = not is_here(host)
+        self.closed = False  # by the controller, or after an impossible state
+        self.problem: Problem | None = None  # the first impossible item that it sent
+        self.version: tuple[int, ...] = ()  # the controller's software: major, minor, bugfix, build
+        self.silent_s = 0.0  # least time without data, excluding delays of this reader
+        self._received_s = time.monotonic()
+        self._gap_s, self._gap_ended_s = 0.0, self._received_s  # the longest recent silence, and its end
+        self._is_remote = not is_loopback(host)
         self._socket = socket.create_connection((host, PORT), timeout_s)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -98,7 +98,7 @@ class StateStream:
             self._set_up(rate_hz)
             self._first = self._await_packet()
             if (problem := impossible_state(self._first.state)) is not None:
-                raise Disbelieved(problem)
+                raise ImpossibleState(problem)
             self._last = self._first.state
         except BaseException:
             self._socket.close()
@@ -113,105 +113,105 @@ class StateStream:
         self._socket.close()
 
     @property
-    def first(self) -> Packet:
-        """The packet that came first; `read` returns those after it."""
+    def first(self) -> StatePacket:
+        """The first packet; `read` returns those after it."""
         return self._first
 
-    def read(self, timeout_s: float) -> list[Packet]:
-        """The packets that have come, oldest first; waits for one for at most `timeout_s`. Empty once `closed`.
+    def read(self, timeout_s: float) -> list[StatePacket]:
+        """Return the packets received, oldest first; wait for one for at most `timeout_s`. Empty once `closed`.
 
-        What cannot be true is left out, and is the stream's `problem` from then on. A state that no arm is in closes it
-        too; after a clock that was set states go on, which still tell whether the arm stands.
+        An impossible state or time is omitted and becomes the stream's `problem`. An impossible state also closes the
+        stream; after a clock step states continue, which still show whether the arm stands.
         """
         looked_s = time.monotonic()
         if self.closed:
             time.sleep(timeout_s)
-            self.silent_s = looked_s - self._heard_s
+            self.silent_s = looked_s - self._received_s
             return []
-        if not select.select([self._socket], [], [], timeout_s)[0]:  # what had come while nobody looked would be there
-            self.silent_s = looked_s - self._heard_s
+        if not select.select([self._socket], [], [], timeout_s)[0]:  # data that came meanwhile would be there
+            self.silent_s = looked_s - self._received_s
             return []
         self._receive()
         now_s = time.monotonic()
         if self.silent_s >= self._gap_s or now_s - self._gap_ended_s > RECENT_S:
             self._gap_s, self._gap_ended_s = self.silent_s, now_s
-        self.silent_s, self._heard_s = 0.0, now_s
-        packets: list[Packet] = []
+        self.silent_s, self._received_s = 0.0, now_s
+        packets: list[StatePacket] = []
         try:
             for kind, payload in packages(self._buffer):
                 if kind != "U":
                     continue
-                packet = _packet(payload)
-                step = self._checked(packet)
+                packet = _decode_packet(payload)
+                step = self._check(packet)
                 self._last = packet.state
                 if step is not None:
                     self.problem = self.problem or step
-                    break  # those after it come with the next reading, when the problem is known
+                    break  # the next call returns the rest, with the problem known
                 packets.append(packet)
-        except ConnectionError as error:  # what is not readable is a link that is lost
+        except ConnectionError as error:  # unreadable bytes count as a lost link
             self.closed = True
-            if isinstance(error, Disbelieved):
+            if isinstance(error, ImpossibleState):
                 self.problem = self.problem or error.problem
         return packets
 
-    def _checked(self, packet: Packet) -> Problem | None:
-        """Whether the clock was set since the last state. Raises `Disbelieved` for a state that no arm is in."""
+    def _check(self, packet: StatePacket) -> Problem | None:
+        """Return the problem of a clock set since the last state. Raise `ImpossibleState` for an impossible one."""
         before, after = self._last, packet.state
         impossible = impossible_state(after) or impossible_payload(packet.payload_kg, packet.payload_centre_m)
         step = None
         if impossible is None:
             step = clock_step(before.time_s, after.time_s, self._period_s, self._missed_s)
         if impossible is None and step is None:
-            impossible = impossible_way(before, after)
+            impossible = impossible_motion(before, after)
         if impossible is not None:
-            raise Disbelieved(impossible)
+            raise ImpossibleState(impossible)
         return step
 
     @property
     def _missed_s(self) -> float:
-        """Seconds of the controller's clock, at most, of which states may have been lost in the silences of late.
+        """The greatest time, s of the controller's clock, in which recent silences may have lost states.
 
-        One here has a pace of its own, and between its states and this process lies nothing that could lose some.
+        A local controller sets its own pace, and nothing between it and this process can lose states.
         """
-        if self._elsewhere:
+        if self._is_remote:
             return CLOCKS_DIFFER * self._gap_s
         return 0.0 if self._gap_s < SILENT_S else math.inf
 
     def _set_up(self, rate_hz: float) -> None:
-        spoken = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
-        told = self._ask("v", b"")
-        if len(told) != CONTROLLER_VERSION.size:
+        is_supported = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
+        version = self._ask("v", b"")
+        if len(version) != CONTROLLER_VERSION.size:
             raise ConnectionError("it does not tell its version")
-        self.version = CONTROLLER_VERSION.unpack(told)
-        if not spoken:
-            raise NotSpoken(f"version {VERSION} of RTDE", self.version)
+        self.version = CONTROLLER_VERSION.unpack(version)
+        if not is_supported:
+            raise NotSupported(f"version {VERSION} of RTDE", self.version)
         answer = self._ask("O", struct.pack(">d", rate_hz) + ",".join(VARIABLES).encode())
         types = answer[1:].decode(errors="replace").split(",")
         wrong = [name for name, type_ in zip_longest(VARIABLES, types[: len(VARIABLES)]) if type_ != VARIABLES[name]]
         if wrong:
-            raise NotSpoken(", ".join(wrong), self.version)
+            raise NotSupported(", ".join(wrong), self.version)
         if self._ask("S", b"") != b"\1":
             raise ConnectionError("it does not start to send")
 
     def _ask(self, kind: str, payload: bytes) -> bytes:
-        """One question and its answer; messages in between are passed over."""
+        """Send a request and return its answer; skip messages in between."""
         self._socket.sendall(package(kind, payload))
         while True:
             self._await_bytes()
-            for answered, answer in packages(self._buffer):
-                if answered == kind:
+            for answer_kind, answer in packages(self._buffer):
+                if answer_kind == kind:
                     return answer
 
-    def _await_packet(self) -> Packet:
+    def _await_packet(self) -> StatePacket:
         while True:
             for kind, payload in packages(self._buffer):
                 if kind == "U":
-                    return _packet(payload)
+                    return _decode_packet(payload)
             self._await_bytes()
 
     def _await_bytes(self) -> None:
-        left_s = self._deadline_s - time.monotonic()
-        if left_s <= 0.0 or not select.select([self._socket], [], [], left_s)[0]:
+        remaining_s = self._deadline_s - time.monotonic()
+        if remaining_s <= 0.0 or not select.select([self._socket], [], [], remaining_s)[0]:
             raise TimeoutError("it does not answer")
         self._receive()
         if self.closed:
@@ -228,8 +228,8 @@ class StateStream:
         self._buffer += data
 
 
-def _packet(payload: bytes) -> Packet:
-    """Raises `ConnectionError` for another number of bytes: some have got lost on the way."""
+def _decode_packet(payload: bytes) -> StatePacket:
+    """Decode a packet. Raise `ConnectionError` for another number of bytes: some were lost in transfer."""
     if len(payload) != PACKET.size:
         raise ConnectionError(f"a state of {len(payload)} bytes where {PACKET.size} belong")
     values = PACKET.unpack(payload)
@@ -247,4 +247,4 @@ def _packet(payload: bytes) -> Packet:
         robot_status_bits=robot_bits,
         safety_status_bits=safety_bits,
     )
-    return Packet(state, payload_kg, values[22:25])
+    return StatePacket(state, payload_kg, values[22:25])

@@ -1,1 +1,1 @@
-"""Every way to stop the arm, and the trial of them before anything moves."""
+"""All paths of a stop, and the trial of the stop before anything moves."""

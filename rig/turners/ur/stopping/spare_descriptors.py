@@ -1,27 +1,27 @@
-"""Descriptors kept back for the stop: it needs sockets also when this process has used up all that it may have."""
+"""Descriptors reserved for the stop: it needs sockets even if this process has used up its limit."""
 
 import os
 
-SPARE = 16  # the sockets of two ways, and what finding a host's address by its name opens for each
+SPARE = 16  # the sockets of two paths, and those of the host's name resolution for each
 
 
 class SpareDescriptors:
-    """Spare descriptors, held from `keep` until `release`, which may be called again and from any thread."""
+    """Spare descriptors, reserved from `keep` until `release`, which may be called repeatedly and from any thread."""
 
     def __init__(self) -> None:
-        self._held: list[int] = []
+        self._descriptors: list[int] = []
 
     def keep(self) -> None:
-        """Take the descriptors. Raises OSError when there are none left."""
+        """Reserve the descriptors. Raise OSError if none are available."""
         try:
-            while len(self._held) < SPARE:
-                self._held.append(os.open(os.devnull, os.O_RDONLY))
+            while len(self._descriptors) < SPARE:
+                self._descriptors.append(os.open(os.devnull, os.O_RDONLY))
         except OSError:
             self.release()
             raise
 
     def release(self) -> None:
-        """Give them back, for whoever opens something next."""
-        held, self._held = self._held, []
-        for descriptor in held:
+        """Close them, so that sockets can be opened."""
+        descriptors, self._descriptors = self._descriptors, []
+        for descriptor in descriptors:
             os.close(descriptor)

@@ -1,4 +1,4 @@
-"""How the program on a controller is ended without the client: over plain TCP, at ports of its own."""
+"""The paths of a stop without the client: over plain TCP, at ports of the controller."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from rig.turners.ur.identity import is_polyscope_x
 class StopConnection(Protocol):
     """A connection to the controller by which its program is ended.
 
-    Once the order is given, `acknowledged` says whether the controller has said that it took it, and `refusal` its
-    words where it has said no; that may come later, with what it says of its programs (where it `tells_of_programs`).
-    Its methods raise `OSError` when the controller does not answer in time.
+    Once the order is given, `acknowledged` says whether the controller confirmed it, and `refusal` holds its words if
+    it refused; both may come later, with its report on programs (if it `tells_of_programs`). Its methods raise
+    `OSError` if the controller does not answer in time.
     """
 
     @property
@@ -33,14 +33,16 @@ class StopConnection(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class StopPath:
-    """Where a stop goes, by its name; `open` makes the connection, which has so many seconds for each answer."""
+    """A path of a stop, by its name; `open` makes the connection with a time-out in s for each answer."""
 
     name: str
     open: Callable[[float], StopConnection]
 
 
 def stop_paths(host: str, version: tuple[int, ...], robot_api_port: int) -> tuple[StopPath, ...]:
-    """The paths at the controller `host` with that software, the one no arm is moved without first."""
+    """Return the paths at the controller `host` with software `version`; the first is required before an arm is
+    moved.
+    """
     primary = StopPath(PrimaryStop.name, partial(PrimaryStop, host))
     if not is_polyscope_x(version):
         return StopPath(Dashboard.name, partial(Dashboard, host)), primary
